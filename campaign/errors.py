@@ -1,0 +1,107 @@
+"""Every error a user can cause or meet, and the exit code each one means.
+
+The codes are part of the public interface (README, `docs/exit-codes.md`):
+
+====  =======================================================================
+code  meaning
+====  =======================================================================
+0     done
+1     some trials failed
+2     bad usage, protocol or bench file, or no such run
+3     a backend fault or a limit (also a plan that breaks one)
+4     an unreadable or damaged archive
+5     safe state NOT confirmed
+130   interrupted
+====  =======================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+
+class ExitCode(IntEnum):
+    """What a command's exit status says. Worst first when several apply: see `worst_exit_code`."""
+
+    DONE = 0
+    TRIALS_FAILED = 1
+    USAGE = 2
+    LIMIT_OR_FAULT = 3
+    ARCHIVE = 4
+    NOT_SAFE = 5
+    INTERRUPTED = 130
+
+
+PRECEDENCE = (
+    ExitCode.NOT_SAFE,
+    ExitCode.INTERRUPTED,
+    ExitCode.LIMIT_OR_FAULT,
+    ExitCode.ARCHIVE,
+    ExitCode.USAGE,
+    ExitCode.TRIALS_FAILED,
+    ExitCode.DONE,
+)
+
+
+def worst_exit_code(codes: Sequence[ExitCode]) -> ExitCode:
+    """The first code of the documented precedence that is among `codes`; DONE when there is none."""
+    return next((code for code in PRECEDENCE if code in codes), ExitCode.DONE)
+
+
+class CampaignError(Exception):
+    """An error with one clear message for the user: what, where, what to do."""
+
+    exit_code: ExitCode = ExitCode.USAGE
+
+
+class UsageError(CampaignError):
+    """A command, option, name or file that cannot be used as given."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in a text file.
+
+    Attributes:
+        file: the file as the user named it.
+        line, column: position from 1; 0 when the mistake has no place of its own.
+        message: what stands there, what is allowed, and the nearest valid name for a typo.
+    """
+
+    file: Path
+    line: int
+    column: int
+    message: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else str(self.file)
+        return f"{place}: {self.message}"
+
+
+class ProtocolError(UsageError):
+    """All the mistakes found in a protocol, its includes and its benches, at once."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class LimitError(CampaignError):
+    """A planned trial would break a limit of its bench; nothing was moved."""
+
+    exit_code = ExitCode.LIMIT_OR_FAULT
+
+
+class BackendError(CampaignError):
+    """A backend failed in a way that is not one trial's outcome."""
+
+    exit_code = ExitCode.LIMIT_OR_FAULT
+
+
+class ArchiveError(CampaignError):
+    """An archive that cannot be read, or fails its own checks."""
+
+    exit_code = ExitCode.ARCHIVE

@@ -1,0 +1,78 @@
+"""What an experiment is: options, how they become trials, and what their recordings say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Result
+from campaign.trial import Ending, Recording, Trial, TrialRequest, Tree
+
+
+class TrialData(Protocol):
+    """A finished trial as an analysis sees it; its samples are read only when asked for."""
+
+    @property
+    def trial(self) -> Trial: ...
+
+    @property
+    def ending(self) -> Ending: ...
+
+    def recording(self) -> Recording:
+        """The samples. Raises ArchiveError when they cannot be read."""
+
+
+@dataclass(frozen=True)
+class TestData:
+    """All there is about one test of a run, for its analysis.
+
+    Attributes:
+        options: the test's normalised options before the sweep (SI).
+        trials: in plan order, failed ones included.
+    """
+
+    name: str
+    kind: str
+    options: Tree
+    trials: tuple[TrialData, ...]
+
+    def completed(self) -> Iterator[TrialData]:
+        """The measurements that ran to their end, in plan order."""
+        return (
+            data
+            for data in self.trials
+            if data.ending.outcome == "completed" and data.trial.role == "measurement"
+        )
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A kind of test.
+
+    Attributes:
+        name: what a protocol's `kind` says.
+        summary: one line for `campaign kinds`.
+        options: what a test of this kind accepts, besides what every test accepts.
+        trials: the trials of one point of the test's matrix, in the order to execute them. Raises
+            ValueError with a message for the user when options and bench do not go together.
+        analyse: tables, figures and findings of a whole test. Must cope with failed trials.
+    """
+
+    name: str
+    summary: str
+    options: type[Options]
+    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
+    analyse: Callable[[TestData], Result]
+
+
+def bench_of(trial: Trial) -> Bench:
+    """The trial's bench as an object."""
+    return Bench.model_validate(trial.bench, context={"si": True})
+
+
+def options_of(experiment: Experiment, tree: Mapping[str, Any]) -> Any:
+    """Normalised options as an object of the experiment's own class."""
+    return experiment.options.model_validate(tree, context={"si": True})

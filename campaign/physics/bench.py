@@ -1,0 +1,252 @@
+"""The bench: the platform under test, as validated from `benches/*.toml`.
+
+Symbols are the thesis' (Figure 5.3, Table 5.1, appendix); every number is SI after validation.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from campaign.options import Options
+from campaign.physics.compensation import CompensationField
+from campaign.physics.friction import FrictionField
+from campaign.units import (
+    Angle,
+    AngularAcceleration,
+    AngularRate,
+    BackEmfConstant,
+    Current,
+    CurrentGain,
+    CurrentIntegralGain,
+    Frequency,
+    Inductance,
+    Inertia,
+    InverseTime,
+    RateGain,
+    RateIntegralGain,
+    Resistance,
+    Time,
+    Torque,
+    TorqueConstant,
+)
+
+
+class AxisOptions(Options):
+    """The stabilized axis."""
+
+    name: str
+    """Which axis of the platform this is, e.g. azimuth."""
+    inertia: Inertia = Field(gt=0)
+    """J: effective moment of inertia of motor, transmission and load, seen at the load."""
+
+
+class MotorOptions(Options):
+    """The servo motor."""
+
+    torque_constant: TorqueConstant = Field(gt=0)
+    """Kt: motor torque per ampere."""
+    back_emf_constant: BackEmfConstant = Field(ge=0)
+    """Ke: voltage per rate of the motor shaft relative to the hull."""
+    resistance: Resistance = Field(gt=0)
+    """R: armature resistance."""
+    inductance: Inductance = Field(gt=0)
+    """L: armature inductance."""
+
+
+class GearOptions(Options):
+    """The gear between motor and load."""
+
+    ratio: float = Field(gt=0)
+    """N: motor rate over load rate."""
+
+
+class IdealRateController(Options):
+    """PI of the rate loop in ideal form: i = Kp (e + Ki * integral of e)."""
+
+    form: Literal["ideal"]
+    """ideal: the integral gain multiplies inside the proportional one."""
+    proportional: RateGain = Field(gt=0)
+    """Kpv: current per rate error."""
+    integral: InverseTime = Field(ge=0)
+    """Kiv: reciprocal of the integral time."""
+
+    @property
+    def integral_gain(self) -> float:
+        """Current per integrated rate error (A/rad)."""
+        return self.proportional * self.integral
+
+
+class ParallelRateController(Options):
+    """PI of the rate loop in parallel form: i = Kp e + Ki * integral of e."""
+
+    form: Literal["parallel"]
+    """parallel: the integral gain stands alone."""
+    proportional: RateGain = Field(gt=0)
+    """Kpv: current per rate error."""
+    integral: RateIntegralGain = Field(ge=0)
+    """Kiv: current per integrated rate error."""
+
+    @property
+    def integral_gain(self) -> float:
+        """Current per integrated rate error (A/rad)."""
+        return self.integral
+
+
+class IdealCurrentController(Options):
+    """PI of the current loop in ideal form: V = Kp (e + Ki * integral of e)."""
+
+    form: Literal["ideal"]
+    """ideal: the integral gain multiplies inside the proportional one."""
+    proportional: CurrentGain = Field(gt=0)
+    """Kpc: voltage per current error."""
+    integral: InverseTime = Field(ge=0)
+    """Kic: reciprocal of the integral time."""
+
+    @property
+    def integral_gain(self) -> float:
+        """Voltage per integrated current error (V/(A s))."""
+        return self.proportional * self.integral
+
+
+class ParallelCurrentController(Options):
+    """PI of the current loop in parallel form: V = Kp e + Ki * integral of e."""
+
+    form: Literal["parallel"]
+    """parallel: the integral gain stands alone."""
+    proportional: CurrentGain = Field(gt=0)
+    """Kpc: voltage per current error."""
+    integral: CurrentIntegralGain = Field(ge=0)
+    """Kic: voltage per integrated current error."""
+
+    @property
+    def integral_gain(self) -> float:
+        """Voltage per integrated current error (V/(A s))."""
+        return self.integral
+
+
+class ControllerOptions(Options):
+    """The nested loops: rate outside, current inside (Figure 5.3)."""
+
+    rate: Annotated[IdealRateController | ParallelRateController, Field(discriminator="form")]
+    """The rate (velocity) PI, fed by the gyro."""
+    current: Annotated[
+        IdealCurrentController | ParallelCurrentController, Field(discriminator="form")
+    ]
+    """The current PI. It stays continuous when the rate loop is sampled."""
+    sample_rate: Frequency | None = Field(default=None, gt=0, le=1e5)
+    """Rate at which the rate loop and the compensation run; absent: they are continuous."""
+    delay: Time = Field(default=0.0, ge=0, le=1.0)
+    """From a sample to the current command that answers it, rounded up to whole samples."""
+    relative_rate_filter: Time = Field(default=0.0, ge=0)
+    """Time constant of the first-order low-pass of the relative rate that compensation uses."""
+
+
+class RateSensor(Options):
+    """A sensor of angular rate, read by the sampled controller."""
+
+    noise: AngularRate = Field(default=0.0, ge=0)
+    """Standard deviation of white noise per sample."""
+    resolution: AngularRate = Field(default=0.0, ge=0)
+    """One count; 0 for no quantisation."""
+    delay: Time = Field(default=0.0, ge=0, le=1.0)
+    """Age of a reading, rounded to whole controller samples."""
+
+
+class AngleSensor(Options):
+    """A sensor of angle relative to the hull, read by the sampled controller."""
+
+    noise: Angle = Field(default=0.0, ge=0)
+    """Standard deviation of white noise per sample."""
+    resolution: Angle = Field(default=0.0, ge=0)
+    """One count; 0 for no quantisation."""
+    delay: Time = Field(default=0.0, ge=0, le=1.0)
+    """Age of a reading, rounded to whole controller samples."""
+
+
+class CurrentSensor(Options):
+    """The sensor of motor current, read by the sampled controller."""
+
+    noise: Current = Field(default=0.0, ge=0)
+    """Standard deviation of white noise per sample."""
+    resolution: Current = Field(default=0.0, ge=0)
+    """One count; 0 for no quantisation."""
+    delay: Time = Field(default=0.0, ge=0, le=1.0)
+    """Age of a reading, rounded to whole controller samples."""
+
+
+class SensorsOptions(Options):
+    """What the controller sees. A continuous controller sees everything exactly."""
+
+    gyro: RateSensor = RateSensor()
+    """Inertial rate of the load."""
+    encoder: AngleSensor = AngleSensor()
+    """Angle of the load relative to the hull."""
+    resolver: AngleSensor = AngleSensor()
+    """Angle of the motor shaft relative to the hull (motor side: N times the load's)."""
+    current: CurrentSensor = CurrentSensor()
+    """Motor current."""
+
+
+class LimitsOptions(Options):
+    """What must never be exceeded: checked before anything moves, and watched during a trial."""
+
+    angle: Angle = Field(gt=0)
+    """Largest angle of the load relative to the hull, either way from zero."""
+    rate: AngularRate = Field(gt=0)
+    """Largest rate of the load relative to the hull."""
+    acceleration: AngularAcceleration = Field(gt=0)
+    """Largest commanded acceleration, of the load or of the hull."""
+    torque: Torque = Field(gt=0)
+    """Largest drive torque at the load."""
+    current: Current = Field(gt=0)
+    """Largest motor current."""
+    duration: Time = Field(gt=0)
+    """Longest single trial."""
+
+
+class Bench(Options):
+    """A platform under test."""
+
+    name: str
+    """Its name, in the archive and on the page."""
+    description: str = ""
+    """What it is and where its numbers come from."""
+    given: tuple[str, ...] = ()
+    """Published tables whose values this bench was given: finding them again is `recovered`."""
+    fitted: tuple[str, ...] = ()
+    """Published cells it was fitted to, `table/row/column` or `table`: those are `calibrated`."""
+    axis: AxisOptions
+    """The stabilized axis."""
+    motor: MotorOptions
+    """The servo motor."""
+    gear: GearOptions
+    """The gear."""
+    friction: dict[str, FrictionField] = Field(min_length=0, max_length=8)
+    """The true friction, by interface (`load`, `motor` ...)."""
+    controller: ControllerOptions
+    """The loops."""
+    sensors: SensorsOptions = SensorsOptions()
+    """The sensors."""
+    compensation: dict[str, CompensationField] = {}
+    """Compensation methods tuned for this bench, by the name that a test uses."""
+    limits: LimitsOptions
+    """The limits."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_methods(cls, tree: Any) -> Any:
+        """`[compensation.observer]` needs no `method = "observer"`: its name says it."""
+        if not isinstance(tree, dict) or not isinstance(tree.get("compensation"), dict):
+            return tree
+        named = {
+            name: {"method": name, **entry} if isinstance(entry, dict) else entry
+            for name, entry in tree["compensation"].items()
+        }
+        return {**tree, "compensation": named}
+
+    @property
+    def torque_per_current(self) -> float:
+        """N Kt: torque at the load per ampere (N m/A)."""
+        return self.gear.ratio * self.motor.torque_constant

@@ -1,0 +1,49 @@
+"""What a friction model is, to the bench that describes it and to the engine that advances it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.options import Options
+
+Array = NDArray[np.float64]
+
+
+class FrictionOptions(Options):
+    """What every friction interface has, whatever its model."""
+
+    side: Literal["load", "motor"] = "load"
+    """Where it acts: a motor-side torque counts N times at the load."""
+    velocity: Literal["load", "motor"] = "load"
+    """Which relative rate drives it: the load's, or the motor's (N times the load's)."""
+
+
+@dataclass(frozen=True)
+class FrictionModel:
+    """A friction model.
+
+    Attributes:
+        name: what a bench's `model` says.
+        summary: one line for `campaign kinds`.
+        options: its parameters; a subclass of FrictionOptions with `model: Literal[name]`.
+        parameters: the flat parameters its step function reads, from validated options.
+        state_size: how many numbers its step function keeps.
+        step: compiled step function; see `campaign.physics.friction.step`.
+        viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
+        steady_state: friction torque (N m) at constant velocity (rad/s), shape (n,), viscous
+            part included.
+    """
+
+    name: str
+    summary: str
+    options: type[FrictionOptions]
+    parameters: Callable[[Any], Array]
+    state_size: int
+    step: Any
+    viscous: Callable[[Any], float]
+    steady_state: Callable[[Any, Array], Array]

@@ -1,0 +1,65 @@
+"""What is commanded over time: rate commands, torque ramps and base motion, as data.
+
+A signal is a frozen description that every room can read: a protocol writes it, a plan checks its
+extremes, the simulator samples it and a controller receives its parameters. The unit of its value
+is the business of the field that holds it (rad/s, N m ...), so the fields here are bare SI numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from campaign.options import Options
+
+Array = NDArray[np.float64]
+
+
+class Zero(Options):
+    """Nothing is commanded."""
+
+    shape: Literal["zero"] = "zero"
+
+    def sample(self, time: Array) -> Array:
+        """Values at `time` (s), shape (n,)."""
+        return np.zeros_like(time)
+
+
+class Sine(Options):
+    """amplitude * sin(2 pi frequency t + phase), from t = 0 until `stop`."""
+
+    shape: Literal["sine"] = "sine"
+    amplitude: float
+    frequency: float = Field(gt=0)
+    phase: float = 0.0
+
+    def sample(self, time: Array) -> Array:
+        """Values at `time` (s), shape (n,)."""
+        return self.amplitude * np.sin(2 * np.pi * self.frequency * time + self.phase)
+
+
+class Polyline(Options):
+    """Straight lines between points; the first and last value hold outside them.
+
+    A trapezoidal rate profile, a torque ramp and a measured series are all polylines.
+    """
+
+    shape: Literal["polyline"] = "polyline"
+    times: tuple[float, ...] = Field(min_length=1)
+    values: tuple[float, ...] = Field(min_length=1)
+
+    def model_post_init(self, context: object) -> None:
+        if len(self.times) != len(self.values):
+            raise ValueError("a polyline needs as many values as times")
+        if any(b < a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("the times of a polyline never decrease")
+
+    def sample(self, time: Array) -> Array:
+        """Values at `time` (s), shape (n,)."""
+        return np.interp(time, self.times, self.values)
+
+
+Signal = Annotated[Zero | Sine | Polyline, Field(discriminator="shape")]

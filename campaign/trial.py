@@ -1,0 +1,285 @@
+"""The nouns every room shares: Trial, Recording, Channel, Outcome.
+
+A Trial is everything a backend needs to execute one atomic thing. A Recording is what came back.
+Neither knows where protocols come from, how samples are made, or where they are kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, JsonValue
+
+from campaign.options import Options
+from campaign.signals import Signal, Zero
+
+Array = NDArray[np.float64]
+Tree = dict[str, JsonValue]
+"""A normalised, JSON-like description: SI numbers, text, booleans, lists and tables."""
+
+
+class Role(StrEnum):
+    """Why a trial is in the plan. Only measurements are analysed; all are archived."""
+
+    MEASUREMENT = "measurement"
+    WARM_UP = "warm-up"
+
+
+class Task(Options):
+    """What the bench does during a trial, in SI: no names, no sweep, nothing to look up.
+
+    Attributes:
+        mode: `rate` closes the velocity loop on `command` (rad/s); `torque` opens it and commands
+            `command` (N m at the load) through the current loop.
+        command: the commanded rate or torque over the trial's own time.
+        base_acceleration: angular acceleration of the hull (rad/s^2); its rate has zero mean when
+            it is a sine, and starts from rest otherwise.
+        compensation: name of a compensation method that the bench has parameters for, or `none`.
+        duration: length of the trial (s).
+        window: the part of it that an analysis uses (start, stop) (s).
+        sample_rate: of the recording (Hz).
+        start_angle: where the load stands relative to the hull when the trial begins (rad).
+    """
+
+    mode: Literal["rate", "torque"]
+    command: Signal = Zero()
+    base_acceleration: Signal = Zero()
+    compensation: str = "none"
+    duration: float = Field(gt=0)
+    window: tuple[float, float]
+    sample_rate: float = Field(gt=0)
+    start_angle: float = 0.0
+
+
+class Trial(Options):
+    """One atomic, fully resolved thing to execute; a backend needs nothing else.
+
+    Attributes:
+        number: place in the plan, from 1.
+        test, kind: the protocol's test it belongs to, and the experiment of that test.
+        point: the swept values that lead to it, dotted path to value, for display and analysis.
+        options: the test's normalised options at this point (SI).
+        repeat: which repetition it is, from 1.
+        seed: of everything random in it.
+        bench: the normalised bench (SI) with the sweep applied.
+        task: what the bench does.
+        note: what the plan says about it, e.g. which rule set the measuring window.
+    """
+
+    number: int = Field(ge=1)
+    test: str
+    kind: str
+    role: Role = Role.MEASUREMENT
+    point: dict[str, JsonValue] = {}
+    options: Tree = {}
+    repeat: int = Field(default=1, ge=1)
+    seed: int = Field(ge=0, lt=2**63)
+    bench: Tree
+    task: Task
+    note: str = ""
+
+    @property
+    def name(self) -> str:
+        """Unique in its run: `trial-00017`. Also the name of its group in the archive."""
+        return f"trial-{self.number:05d}"
+
+    @property
+    def label(self) -> str:
+        """For people: the test, and what is particular about this trial of it."""
+        point = ", ".join(f"{path}={_short(value)}" for path, value in self.point.items())
+        repeat = f" #{self.repeat}" if self.repeat > 1 else ""
+        role = f" ({self.role})" if self.role is not Role.MEASUREMENT else ""
+        return f"{self.test}{role}{f' [{point}]' if point else ''}{repeat}"
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of what determines the samples: bench, task and seed, in canonical JSON."""
+        what = {"bench": self.bench, "task": self.task.model_dump(mode="json"), "seed": self.seed}
+        return hashlib.sha256(canonical_json(what).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class TrialRequest:
+    """A trial as an experiment asks for it; the plan adds number, seed, bench and sweep point.
+
+    Attributes:
+        point: what distinguishes it within the test, e.g. {"speed": 0.0175}; SI.
+        note: what the plan should say about it.
+    """
+
+    task: Task
+    role: Role = Role.MEASUREMENT
+    point: Mapping[str, JsonValue] = field(default_factory=dict)
+    note: str = ""
+
+
+class Outcome(StrEnum):
+    """How a trial ended."""
+
+    COMPLETED = "completed"  # it ran to its end; its recording is whole
+    LIMIT = "limit"  # a measured limit of the bench ended it
+    DIVERGED = "diverged"  # a channel became infinite or undefined
+    FAULT = "fault"  # the backend or the bench failed
+    INTERRUPTED = "interrupted"  # somebody stopped it
+
+
+class SafeState(StrEnum):
+    """Whether the bench was seen at rest with its drive off after a trial."""
+
+    CONFIRMED = "confirmed"
+    NOT_CONFIRMED = "not confirmed"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a trial ended and why.
+
+    Attributes:
+        outcome: see `Outcome`.
+        reason: empty when completed; else what happened, with the value and the limit.
+        safe_state: whether the bench is known to be safe afterwards.
+    """
+
+    outcome: Outcome
+    reason: str = ""
+    safe_state: SafeState = SafeState.CONFIRMED
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened during a trial, at its own time (s)."""
+
+    time: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One recorded quantity: `unit` is SI, `display_unit` what a reader is shown.
+
+    Attributes:
+        samples: shape (n,), float64.
+        measured: False for what only a simulator can know (the true friction torque).
+    """
+
+    name: str
+    unit: str
+    label: str
+    display_unit: str
+    samples: Array
+    measured: bool = True
+
+
+@dataclass(frozen=True)
+class ChannelInfo:
+    """A channel before it has samples: what a backend announces when a trial starts."""
+
+    name: str
+    unit: str
+    label: str
+    display_unit: str
+    measured: bool = True
+
+    def with_samples(self, samples: Array) -> Channel:
+        return Channel(
+            self.name, self.unit, self.label, self.display_unit, samples, self.measured
+        )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What came back from one trial: channels on one time base, events and how it ended.
+
+    Attributes:
+        time: shape (n,), s, float64, from the trial's start.
+        channels: by name; each as long as `time`.
+    """
+
+    time: Array
+    channels: Mapping[str, Channel]
+    events: tuple[Event, ...] = ()
+    ending: Ending = field(default_factory=lambda: Ending(Outcome.COMPLETED))
+
+    def __getitem__(self, name: str) -> Array:
+        """Samples of a channel, SI, shape (n,); KeyError naming what there is."""
+        try:
+            return self.channels[name].samples
+        except KeyError:
+            raise KeyError(f"no channel {name!r}; there are {', '.join(self.channels)}") from None
+
+    def window(self, start: float, stop: float) -> Recording:
+        """The part with start <= time < stop (s), half a sample tolerant."""
+        if len(self.time) < 2:
+            return self
+        half = 0.5 * (self.time[1] - self.time[0])
+        first, last = np.searchsorted(self.time, (start - half, stop - half))
+        cut = slice(int(first), int(last))
+        channels = {
+            name: Channel(c.name, c.unit, c.label, c.display_unit, c.samples[cut], c.measured)
+            for name, c in self.channels.items()
+        }
+        return Recording(self.time[cut], channels, self.events, self.ending)
+
+
+class Recorder(Protocol):
+    """Where a backend puts samples as they come: an archive's trial file, or memory."""
+
+    def start(self, channels: tuple[ChannelInfo, ...]) -> None:
+        """Announce the channels, once, before the first block."""
+
+    def append(self, time: Array, block: Array) -> None:
+        """Add samples: `time` (n,) in s, `block` (channels, n) in the announced order and units."""
+
+    def event(self, event: Event) -> None:
+        """Note something that happened."""
+
+
+class MemoryRecorder:
+    """A Recorder that keeps everything, for tests and for work without an archive."""
+
+    def __init__(self) -> None:
+        self._channels: tuple[ChannelInfo, ...] = ()
+        self._times: list[Array] = []
+        self._blocks: list[Array] = []
+        self._events: list[Event] = []
+
+    def start(self, channels: tuple[ChannelInfo, ...]) -> None:
+        self._channels = channels
+
+    def append(self, time: Array, block: Array) -> None:
+        self._times.append(time)
+        self._blocks.append(block)
+
+    def event(self, event: Event) -> None:
+        self._events.append(event)
+
+    def recording(self, ending: Ending) -> Recording:
+        """Everything recorded, once the trial has ended."""
+        time = np.concatenate(self._times) if self._times else np.empty(0)
+        samples = (
+            np.concatenate(self._blocks, axis=1)
+            if self._blocks
+            else np.empty((len(self._channels), 0))
+        )
+        channels = {
+            info.name: info.with_samples(row)
+            for info, row in zip(self._channels, samples, strict=True)
+        }
+        return Recording(time, channels, tuple(self._events), ending)
+
+
+def canonical_json(tree: Any) -> str:
+    """JSON that is equal for equal content: sorted keys, no spaces, no NaN."""
+    return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _short(value: JsonValue) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
