@@ -1,0 +1,61 @@
+# Only git, make and Python 3.11 or newer are needed. `make demo` and `make test` share .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+PINNED := --quiet --constraint constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check format clean
+
+help:
+	@echo "make demo    run the quick-start protocol on the simulated bench and report it"
+	@echo "make test    run the whole test suite"
+	@echo "make check   lint, formatting, types, import contracts"
+	@echo "make format  put the code into the project's format"
+	@echo "make clean   remove the environment and everything built (results/ stays)"
+
+demo: $(VENV)/installed
+	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) \
+		&& echo "archive  $$run" && echo "report   $${run%.nxs}-report/report.html"
+
+test: $(VENV)/installed-test
+	$(BIN)/python -m pytest -n auto $(PYTEST_OPTIONS)
+
+check: $(VENV)/installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(VENV)/installed-test
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Build tools are pinned as well, hence no isolated (unpinned) build environment.
+$(VENV)/installed: $(VENV)/made pyproject.toml constraints.txt
+	$(PIP) install $(PINNED) hatchling editables
+	$(PIP) install $(PINNED) --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/installed-test: $(VENV)/installed
+	$(PIP) install $(PINNED) --no-build-isolation --editable ".[test]"
+	@touch $@
+
+# PYTHON=... overrides the search. A candidate must run: a bare shim on the PATH is not enough.
+$(VENV)/made:
+	@for python in $(PYTHON) python3.13 python3.12 python3.11 python3 python; do \
+		if $$python -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' \
+			>/dev/null 2>&1; then \
+			echo "making $(VENV) with $$($$python --version)"; \
+			$$python -m venv --clear $(VENV) && touch $@ && exit 0; \
+			exit 1; \
+		fi; \
+	done; \
+	echo "No Python 3.11 or newer with venv was found on the PATH." >&2; \
+	echo "Install one (on Debian: python3 and python3-venv) or say: make PYTHON=/path/to/python3" >&2; \
+	exit 1

@@ -1,0 +1,76 @@
+"""Where the protocols, benches and templates that come with the program are.
+
+In a wheel they lie beside the code, under `campaign/_shipped`; in a checkout they are the
+top-level folders. Nothing is ever looked up in the working directory: a template is code.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from campaign.errors import CampaignError, UsageError
+
+SHIPPED = ("protocols", "templates")
+
+
+def protocols_folder() -> Path:
+    """The shipped protocols, with their benches under `benches/`."""
+    return _shipped_root() / "protocols"
+
+
+def templates_folder() -> Path:
+    """The shipped Jinja2 templates of the report."""
+    return _shipped_root() / "templates"
+
+
+def shipped_protocols() -> tuple[str, ...]:
+    """Names of the shipped protocols, sorted: what `campaign run NAME` accepts without a file."""
+    return tuple(sorted(path.stem for path in protocols_folder().glob("*.toml")))
+
+
+def shipped_protocol(name: str) -> Path | None:
+    """The shipped protocol of that bare name (`quickstart`), or None."""
+    return protocols_folder() / f"{name}.toml" if name in shipped_protocols() else None
+
+
+def copy_shipped(destination: Path) -> tuple[Path, ...]:
+    """Copy protocols, benches and templates into `destination` and return what was written.
+
+    Raises UsageError, before anything is written, when a file would be overwritten; and when the
+    folder cannot be written.
+    """
+    copies = {
+        source: destination / source.relative_to(_shipped_root())
+        for folder in SHIPPED
+        for source in sorted((_shipped_root() / folder).rglob("*"))
+        if source.is_file() and "__pycache__" not in source.parts
+    }
+    taken = [path for path in copies.values() if path.exists()]
+    if taken:
+        raise UsageError(
+            f"{taken[0]} is there already{_and_more(len(taken) - 1)}; "
+            "nothing was written: name a new folder, or move the old files away"
+        )
+    try:
+        for source, copy in copies.items():
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, copy)
+    except OSError as error:
+        raise UsageError(f"{destination}: cannot be written: {error.strerror}") from None
+    return tuple(copies.values())
+
+
+def _shipped_root() -> Path:
+    package = Path(__file__).resolve().parent
+    installed = package / "_shipped"
+    root = installed if installed.is_dir() else package.parent
+    if not all((root / folder).is_dir() for folder in SHIPPED):
+        raise CampaignError(
+            f"the shipped protocols and templates are missing from {root}; install again"
+        )
+    return root
+
+
+def _and_more(count: int) -> str:
+    return f", and {count} more of the files" if count else ""
