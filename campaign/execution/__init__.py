@@ -1,0 +1,1 @@
+"""Executing a plan: order, progress, stopping, safe state. Displays subscribe to progress."""

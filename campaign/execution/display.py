@@ -1,0 +1,118 @@
+"""Showing progress: a live line on a terminal, now and then a plain line elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, TaskID, TextColumn
+from rich.progress import Progress as Live
+from rich.text import Text
+
+from campaign.execution.progress import Display, Progress
+from campaign.trial import Ending, Outcome, Trial
+
+PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
+
+
+@contextmanager
+def progress_display(console: Console) -> Iterator[Display]:
+    """The display that suits `console`, for as long as the block lasts."""
+    if console.is_terminal and not console.is_dumb_terminal:
+        with live_display(console) as display:
+            yield display
+    else:
+        yield PlainDisplay(console)
+
+
+@contextmanager
+def live_display(console: Console) -> Iterator[Display]:
+    """One line that is redrawn in place; trials that fail are kept above it."""
+    live = Live(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=None),
+        TextColumn("{task.fields[counts]}", markup=False),
+        TextColumn("{task.fields[time_left]}", markup=False),
+        console=console,
+        transient=True,
+        expand=True,
+    )
+    task: TaskID | None = None
+
+    def display(progress: Progress) -> None:
+        nonlocal task
+        if task is None:
+            task = live.add_task("", total=progress.total, counts="", time_left="")
+        if (failure := _failure(progress.ended)) is not None:
+            live.console.print(failure)
+        live.update(
+            task,
+            description=current_test(progress),
+            completed=progress.total - progress.left,
+            counts=counts(progress),
+            time_left=time_left(progress),
+        )
+
+    with live:
+        yield display
+
+
+class PlainDisplay:
+    """A line when a test begins, when a trial fails, and every `PLAIN_INTERVAL` in between."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._test = ""
+        self._printed = time.monotonic()
+
+    def __call__(self, progress: Progress) -> None:
+        """Print what there is to say, if anything."""
+        if (failure := _failure(progress.ended)) is not None:
+            self._print(failure)
+        test = current_test(progress)
+        due = time.monotonic() - self._printed >= PLAIN_INTERVAL
+        if test and (test != self._test or due or not progress.left):
+            self._test = test
+            line = ", ".join(filter(None, (counts(progress), time_left(progress))))
+            self._print(Text(f"{test}: {line}"))
+
+    def _print(self, text: Text) -> None:
+        self._console.print(text, soft_wrap=True)
+        self._printed = time.monotonic()
+
+
+def current_test(progress: Progress) -> str:
+    """The test of the first running trial, else of the one that has just ended."""
+    if progress.running:
+        return progress.running[0].test
+    return progress.ended[0].test if progress.ended else ""
+
+
+def counts(progress: Progress) -> str:
+    """`37 done, 1 failed, 125 left`."""
+    failed = f", {progress.failed} failed" if progress.failed else ""
+    return f"{progress.done} done{failed}, {progress.left} left"
+
+
+def time_left(progress: Progress) -> str:
+    """`about 1:05 left`, or nothing while there is nothing to go by."""
+    if progress.time_left is None or not progress.left:
+        return ""
+    return f"about {clock(progress.time_left)} left"
+
+
+def clock(seconds: float) -> str:
+    """`0:42`, `12:05`, `3:07:30`."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"
+
+
+def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
+    if ended is None or ended[1].outcome is Outcome.COMPLETED:
+        return None
+    trial, ending = ended
+    reason = f": {ending.reason}" if ending.reason else ""
+    return Text(f"{trial.name} {trial.label} {ending.outcome.value}{reason}", style="yellow")

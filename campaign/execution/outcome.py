@@ -1,0 +1,60 @@
+"""How a run ended, and the exit code that says so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from campaign.errors import ExitCode, worst_exit_code
+from campaign.trial import Outcome, SafeState
+
+
+class RunStatus(StrEnum):
+    """How a run ended as a whole; single trials may have failed in any case."""
+
+    COMPLETED = "completed"  # every trial of the plan was executed
+    INTERRUPTED = "interrupted"  # somebody stopped it
+    FAULT = "fault"  # the backend gave up, or the bench was left in an unknown state
+
+
+_TRIAL_CODES = {
+    Outcome.COMPLETED: ExitCode.DONE,
+    Outcome.DIVERGED: ExitCode.TRIALS_FAILED,
+    Outcome.LIMIT: ExitCode.LIMIT_OR_FAULT,
+    Outcome.FAULT: ExitCode.LIMIT_OR_FAULT,
+    Outcome.INTERRUPTED: ExitCode.TRIALS_FAILED,  # whether by somebody, the run's status says
+}
+_STATUS_CODES = {
+    RunStatus.COMPLETED: ExitCode.DONE,
+    RunStatus.INTERRUPTED: ExitCode.INTERRUPTED,
+    RunStatus.FAULT: ExitCode.LIMIT_OR_FAULT,
+}
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """How a run ended.
+
+    Attributes:
+        reason: empty when completed; else why it ended early or is not known to be safe.
+        safe_state: of the bench, after the last trial.
+        outcomes: how many trials ended how.
+        archive: the sealed file.
+    """
+
+    status: RunStatus
+    reason: str
+    safe_state: SafeState
+    outcomes: Mapping[Outcome, int]
+    archive: Path
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The documented code: the worst of what the run and its trials say."""
+        codes = [_TRIAL_CODES[outcome] for outcome, count in self.outcomes.items() if count]
+        codes.append(_STATUS_CODES[self.status])
+        if self.safe_state is not SafeState.CONFIRMED:
+            codes.append(ExitCode.NOT_SAFE)
+        return worst_exit_code(codes)

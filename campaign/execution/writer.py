@@ -1,0 +1,25 @@
+"""What the runner needs of an archive, as two small interfaces (`campaign.archive` has them)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from campaign.trial import Ending, Recorder, SafeState, Trial
+
+
+class TrialWriter(Recorder, Protocol):
+    """Takes the samples of one trial and keeps them once it has ended."""
+
+    def finish(self, ending: Ending) -> None:
+        """Keep the trial, whole, with its ending. Raises ArchiveError when it cannot be written."""
+
+
+class PlanWriter(Protocol):
+    """Takes the trials of a run; `begin` and what it returns may be used from several threads."""
+
+    def begin(self, trial: Trial) -> TrialWriter:
+        """Open a trial for its samples."""
+
+    def seal(self, status: str, reason: str, safe_state: SafeState) -> Path:
+        """Close the run for good and say where it is."""
