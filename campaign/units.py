@@ -100,6 +100,19 @@ def convert(value: Any, unit: str, to: str) -> Any:
     return value * factor(unit, to)
 
 
+def to_si(text: str) -> float:
+    """SI value of `text` in any unit (`"18 deg/s^2"`), where no one field's whitelist applies.
+
+    Raises ValueError when it is not a number with a known unit.
+    """
+    number, unit = split_quantity(text)
+    registry = _registry()
+    try:
+        return float(registry.Quantity(number, _unit(unit)).to_base_units().magnitude)
+    except Exception:
+        raise ValueError(f"{unit!r} is not a unit") from None
+
+
 @cache
 def factor(unit: str, to: str) -> float:
     """How many `to` one `unit` is. Purely multiplicative units only."""

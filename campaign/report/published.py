@@ -1,0 +1,323 @@
+"""Published values: the numbers of a source document, as data, and how their file is read.
+
+`campaign/published/thesis.toml` holds the thesis' tables; a laboratory may hand in its own file of
+the same form (`docs/published-values.md`). A table's rows and columns each add conditions, a
+quantity, a unit; a cell is the sum of its table, its row and its column.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from typing import Any, Literal, Self, TypeVar
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from campaign.errors import UsageError
+from campaign.options import Options
+from campaign.result import Value
+from campaign.units import to_si
+
+T = TypeVar("T")
+Relation = Literal["equal", "near", "at most", "at least"]
+Verdict = Literal["inconsistent", "not reproducible"]
+
+
+class Part(Options):
+    """What a table, a row or a column says about its cells; what is inside wins."""
+
+    symbol: str = ""
+    """How the document writes it, e.g. σ2."""
+    quantity: str | None = None
+    """The word a finding uses for it, e.g. stabilization_error."""
+    unit: str | None = None
+    """The unit of the printed number; absent for a number without one."""
+    relation: Relation | None = None
+    """What the document claims: this value (the default), near it, at most or at least it."""
+    decimals: int | None = Field(default=None, ge=0, le=12)
+    """Printed digits after the point."""
+    conditions: dict[str, str | int | float | bool] = {}
+    """What a finding must state to be this number: text, numbers, or text with a unit."""
+
+
+class Names(Options):
+    """What the names of a table's rows, or columns, are values of."""
+
+    condition: str
+    """The condition that a name gives the value of, e.g. compensation, frequency."""
+    unit: str = ""
+    """The unit of names that are numbers."""
+    names: tuple[str, ...] = ()
+    """The columns in printed order (rows are named by their cells)."""
+
+
+class MarkOptions(Options):
+    """A remark on some cells of a table."""
+
+    cells: tuple[str, ...] = Field(min_length=1)
+    """`row/column`; `*` stands for all of them."""
+    status: Verdict | None = None
+    """Whether the document contradicts itself there, or nobody could reproduce it."""
+    reason: str = Field(min_length=1)
+    """Why, or what to know about it."""
+
+
+class TableOptions(Part):
+    """One published table, figure or claim in words."""
+
+    name: str = Field(pattern=r"^(figure |text )?[A-Z0-9]+(\.[0-9A-Za-z]+)*$")
+    """Its number: 5.8, or `figure 5.14`, `text 4.2.3`."""
+    title: str
+    """What it shows."""
+    domain: Literal["", "simulation", "hardware"] = ""
+    """Where the document has it from; for the reader, not matched."""
+    rows: Names | None = None
+    """What row names are values of."""
+    columns: Names | None = None
+    """What column names are values of."""
+    row: dict[str, Part] = {}
+    """Rows that say more than their name does."""
+    column: dict[str, Part] = {}
+    """Columns that say more than their name does, in printed order."""
+    cells: dict[str, tuple[float | None, ...]] = Field(min_length=1)
+    """The printed numbers: row name to one number per column; `""` for an empty cell."""
+    mark: tuple[MarkOptions, ...] = ()
+    """Remarks."""
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Columns in printed order."""
+        named = self.columns.names if self.columns else ()
+        return (*named, *(name for name in self.column if name not in named))
+
+    @field_validator("cells", mode="before")
+    @classmethod
+    def _empty_cells(cls, cells: Any) -> Any:
+        """TOML has no null, so an empty text is an empty cell."""
+        if not isinstance(cells, dict):
+            return cells
+        return {
+            row: [None if value == "" else value for value in values]
+            if isinstance(values, list)
+            else values
+            for row, values in cells.items()
+        }
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        columns = self.column_names
+        for row, values in self.cells.items():
+            if len(values) != len(columns):
+                raise ValueError(
+                    f"row {row!r} has {len(values)} numbers for {len(columns)} columns"
+                    f" ({', '.join(columns)})"
+                )
+        for row in self.row:
+            if row not in self.cells:
+                raise ValueError(f"row {row!r} has no cells")
+        for pattern in (pattern for mark in self.mark for pattern in mark.cells):
+            if not any(_covers(pattern, row, column) for row in self.cells for column in columns):
+                raise ValueError(f"a mark names {pattern!r}, which is no row/column of it")
+        return self
+
+    def marks(self, row: str, column: str) -> Iterable[MarkOptions]:
+        """The remarks on one cell, in file order."""
+        return (
+            mark
+            for mark in self.mark
+            if any(_covers(pattern, row, column) for pattern in mark.cells)
+        )
+
+
+class PublishedOptions(Options):
+    """A file of published values."""
+
+    source: str
+    """The document they are from."""
+    table: tuple[TableOptions, ...] = ()
+    """Its tables."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One published number.
+
+    Attributes:
+        table, row, column: where it stands, e.g. `5.8`, `lugre`, `stabilization_error`.
+        value: as printed, in `unit`.
+        conditions: what a finding must state to be this number; numbers SI.
+        decimals: printed digits after the point, None when unknown.
+        status: `inconsistent`, `not reproducible` or None; `reason` says why.
+        notes: what else to know about it.
+    """
+
+    table: str
+    row: str
+    column: str
+    quantity: str
+    unit: str
+    value: float
+    conditions: Mapping[str, Value]
+    relation: Relation = "equal"
+    decimals: int | None = None
+    status: Verdict | None = None
+    reason: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> str:
+        """`table/row/column`, as a bench's `fitted` names it."""
+        return f"{self.table}/{self.row}/{self.column}"
+
+    @property
+    def printed(self) -> str:
+        """The number as the document prints it."""
+        return f"{self.value:.15g}" if self.decimals is None else f"{self.value:.{self.decimals}f}"
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """One published table with its cells in printed order."""
+
+    name: str
+    title: str
+    domain: str
+    source: str
+    cells: tuple[Cell, ...]
+    symbols: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def heading(self) -> str:
+        """`Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
+        return self.name.capitalize() if " " in self.name else f"Table {self.name}"
+
+    @property
+    def slug(self) -> str:
+        """For anchors and file names: `table-5.8`, `figure-5.14`, `text-4.2.3`."""
+        return self.heading.lower().replace(" ", "-")
+
+
+Published = Mapping[str, PublishedTable]
+
+
+@cache
+def thesis() -> Published:
+    """The packaged published values, by table name, in printed order."""
+    path = files("campaign") / "published" / "thesis.toml"
+    return read_published(path.read_text(encoding="utf-8"), "thesis.toml")
+
+
+def published_values(own: str | None = None, name: str = "published.toml") -> Published:
+    """The thesis' tables, and those of a laboratory's `own` file (its text), which win by name."""
+    return {**thesis(), **read_published(own, name)} if own else thesis()
+
+
+def read_published(text: str, name: str) -> Published:
+    """Tables of a TOML text by name, in file order; `name` is the file's, for messages.
+
+    Raises UsageError naming every mistake.
+    """
+    try:
+        options = PublishedOptions.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{name}: {error}") from None
+    except ValidationError as error:
+        raise UsageError("\n".join(_messages(name, error))) from None
+    tables: dict[str, PublishedTable] = {}
+    for table in options.table:
+        if table.name in tables:
+            raise UsageError(f"{name}: two tables are called {table.name!r}")
+        try:
+            tables[table.name] = _table(table, options.source)
+        except ValueError as error:
+            raise UsageError(f"{name}: table {table.name}: {error}") from None
+    return tables
+
+
+def _table(table: TableOptions, source: str) -> PublishedTable:
+    cells = tuple(
+        _cell(table, row, column, value)
+        for row, values in table.cells.items()
+        for column, value in zip(table.column_names, values, strict=True)
+        if value is not None
+    )
+    symbols = {
+        name: part.symbol for name, part in (table.row | table.column).items() if part.symbol
+    }
+    return PublishedTable(table.name, table.title, table.domain, source, cells, symbols)
+
+
+def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
+    parts = (table, table.row.get(row, Part()), table.column.get(column, Part()))
+    quantity = _innermost(part.quantity for part in parts)
+    if quantity is None:
+        raise ValueError(f"cell {row}/{column} has no quantity; give the table, row or column one")
+    unit = _innermost(part.unit for part in parts) or ""
+    _check_unit(unit)
+    conditions: dict[str, Value] = {}
+    for part, names, name in zip(
+        parts, (None, table.rows, table.columns), ("", row, column), strict=True
+    ):
+        conditions |= {key: _condition(text) for key, text in part.conditions.items()}
+        # A row such as `mean` that states conditions of its own is no value of the others' one.
+        if names and not part.conditions:
+            conditions[names.condition] = _named_value(name, names.unit)
+    marks = tuple(table.marks(row, column))
+    verdict = next((mark for mark in marks if mark.status), None)
+    return Cell(
+        table.name,
+        row,
+        column,
+        quantity,
+        unit,
+        value,
+        conditions,
+        relation=_innermost(part.relation for part in parts) or "equal",
+        decimals=_innermost(part.decimals for part in parts),
+        status=verdict.status if verdict else None,
+        reason=verdict.reason if verdict else "",
+        notes=tuple(mark.reason for mark in marks if mark.status is None),
+    )
+
+
+def _covers(pattern: str, row: str, column: str) -> bool:
+    wanted_row, _, wanted_column = pattern.partition("/")
+    return wanted_row in ("*", row) and wanted_column in ("*", column)
+
+
+def _innermost(values: Iterable[T | None]) -> T | None:
+    given = [value for value in values if value is not None]
+    return given[-1] if given else None
+
+
+def _check_unit(unit: str) -> None:
+    if unit != "dB":  # a level has no factor to SI; findings state it in dB too
+        to_si(f"1 {unit}")
+
+
+def _condition(given: str | int | float | bool) -> Value:
+    """A number with a unit in SI; any other text, number or truth as it stands."""
+    if not isinstance(given, str):
+        return given
+    try:
+        return to_si(given)
+    except ValueError:
+        return given
+
+
+def _named_value(name: str, unit: str) -> Value:
+    """What a row's or column's name says: a number (in `unit`, to SI) or a word."""
+    try:
+        float(name)
+    except ValueError:
+        return name
+    return to_si(f"{name} {unit}")
+
+
+def _messages(name: str, error: ValidationError) -> Iterator[str]:
+    for problem in error.errors(include_url=False, include_context=False):
+        place = ".".join(str(step) for step in problem["loc"])
+        yield f"{name}: {place}: {problem['msg'].removeprefix('Value error, ')}"
