@@ -1,0 +1,88 @@
+"""A backend that does as told and an archive in memory."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from campaign.trial import (
+    ChannelInfo,
+    Ending,
+    MemoryRecorder,
+    Outcome,
+    Recorder,
+    SafeState,
+    Task,
+    Trial,
+)
+
+COMPLETED = Ending(Outcome.COMPLETED)
+RATE = ChannelInfo("gyro_rate", "rad/s", "gyro rate", "deg/s")
+
+
+def make_trials(count: int, *, duration: float = 2.0) -> list[Trial]:
+    task = Task(mode="rate", duration=duration, window=(0.0, duration), sample_rate=10.0)
+    return [
+        Trial(number=number, test="test", kind="kind", seed=0, bench={}, task=task)
+        for number in range(1, count + 1)
+    ]
+
+
+@dataclass
+class FakeBackend:
+    """Does `behaviour[number]` for a trial, or completes it; remembers what happened, in order."""
+
+    behaviour: dict[int, Callable[[Callable[[], bool]], Ending]] = field(default_factory=dict)
+    rest: Callable[[], SafeState] = lambda: SafeState.CONFIRMED
+    log: list[str] = field(default_factory=list)
+
+    def __enter__(self) -> FakeBackend:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.log.append("left")
+
+    def refuses(self, trial: Trial) -> str | None:
+        return None
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        self.log.append(trial.name)
+        recorder.start((RATE,))
+        recorder.append(np.array([0.0, 0.1]), np.array([[1.0, 2.0]]))
+        behave = self.behaviour.get(trial.number, lambda stopped: COMPLETED)
+        return behave(stopped)
+
+    def make_safe(self) -> SafeState:
+        self.log.append("made safe")
+        return self.rest()
+
+
+class MemoryTrial(MemoryRecorder):
+    def __init__(self, archive: MemoryArchive, trial: Trial) -> None:
+        super().__init__()
+        self.archive, self.trial = archive, trial
+
+    def finish(self, ending: Ending) -> None:
+        with self.archive.lock:
+            self.archive.endings[self.trial.number] = ending
+            self.archive.samples[self.trial.number] = len(self.recording(ending).time)
+
+
+@dataclass
+class MemoryArchive:
+    endings: dict[int, Ending] = field(default_factory=dict)
+    samples: dict[int, int] = field(default_factory=dict)
+    sealed: tuple[str, str, SafeState] | None = None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def begin(self, trial: Trial) -> MemoryTrial:
+        return MemoryTrial(self, trial)
+
+    def seal(self, status: str, reason: str, safe_state: SafeState) -> Path:
+        assert self.sealed is None, "sealed twice"
+        self.sealed = (str(status), reason, safe_state)
+        return Path("run.nxs")

@@ -1,0 +1,51 @@
+"""What is shown while a run goes on."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from campaign.execution.display import PlainDisplay, clock, live_display, progress_display
+from campaign.execution.progress import Ledger
+from campaign.trial import Ending, Outcome
+from tests.execution.fakes import COMPLETED, make_trials
+
+DIVERGED = Ending(Outcome.DIVERGED, "gyro_rate [rad/s] is infinite at 0.3 s")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0, "0:00"), (59.6, "1:00"), (725, "12:05"), (11250, "3:07:30")]
+)
+def test_a_time_reads_like_a_clock(seconds: float, text: str):
+    assert clock(seconds) == text
+
+
+def run_three(display) -> None:
+    trials = make_trials(3)
+    ledger = Ledger(trials, display)
+    for trial, ending in zip(trials, (COMPLETED, DIVERGED, COMPLETED), strict=True):
+        ledger.begin(trial)
+        ledger.end(trial, ending)
+
+
+def test_without_a_terminal_there_are_plain_lines_only_when_there_is_news():
+    stream = io.StringIO()
+    console = Console(file=stream, force_terminal=False, width=40)
+    with progress_display(console) as display:
+        assert isinstance(display, PlainDisplay)
+        run_three(display)
+    first, failure, last = stream.getvalue().splitlines()
+    assert first == "test: 0 done, 3 left"
+    assert failure == "trial-00002 test diverged: gyro_rate [rad/s] is infinite at 0.3 s"
+    assert last == "test: 2 done, 1 failed, 0 left"
+
+
+def test_a_terminal_keeps_failures_above_the_live_line_and_reads_no_markup_in_them():
+    stream = io.StringIO()
+    console = Console(file=stream, force_terminal=True, width=100, color_system=None)
+    with live_display(console) as display:
+        run_three(display)
+    assert "gyro_rate [rad/s] is infinite" in stream.getvalue()
+    assert "2 done, 1 failed, 0 left" in stream.getvalue()

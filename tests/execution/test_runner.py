@@ -1,0 +1,225 @@
+"""What a run does with trials that fail, backends that give up, and people who stop it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from campaign.errors import ArchiveError, BackendError, ExitCode
+from campaign.execution.outcome import RunOutcome, RunStatus
+from campaign.execution.progress import Progress
+from campaign.execution.runner import AbortedError, run_plan
+from campaign.execution.stop import StopSwitch
+from campaign.trial import Ending, Outcome, SafeState, Trial
+from tests.execution.fakes import COMPLETED, FakeBackend, MemoryArchive, make_trials
+
+
+class Bench:
+    """A run of a few trials, with everything around it in memory."""
+
+    def __init__(self, count: int, backend: FakeBackend) -> None:
+        self.trials = make_trials(count)
+        self.backend = backend
+        self.archive = MemoryArchive()
+        self.stop = StopSwitch()
+        self.progress: list[Progress] = []
+        self.display = self.progress.append
+
+    def run(self, workers: int = 1) -> RunOutcome:
+        return run_plan(
+            self.trials,
+            self.backend,
+            self.archive,
+            workers=workers,
+            display=self.display,
+            stop=self.stop,
+        )
+
+
+def raises(error: BaseException) -> Callable[[Callable[[], bool]], Ending]:
+    def behave(stopped: Callable[[], bool]) -> Ending:
+        raise error
+
+    return behave
+
+
+def ends(outcome: Outcome, reason: str = "", safe: SafeState = SafeState.CONFIRMED):
+    return lambda stopped: Ending(outcome, reason, safe)
+
+
+def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
+    bench = Bench(3, FakeBackend())
+    outcome = bench.run()
+    assert bench.backend.log == ["trial-00001", "trial-00002", "trial-00003", "made safe"]
+    assert outcome.status is RunStatus.COMPLETED
+    assert outcome.exit_code is ExitCode.DONE
+    assert bench.archive.sealed == ("completed", "", SafeState.CONFIRMED)
+    assert bench.archive.samples == {1: 2, 2: 2, 3: 2}
+
+
+@pytest.mark.parametrize(
+    ("outcome", "code"),
+    [
+        (Outcome.DIVERGED, ExitCode.TRIALS_FAILED),
+        (Outcome.LIMIT, ExitCode.LIMIT_OR_FAULT),
+        (Outcome.FAULT, ExitCode.LIMIT_OR_FAULT),
+    ],
+)
+def test_a_failed_trial_is_recorded_and_the_campaign_goes_on(outcome: Outcome, code: ExitCode):
+    bench = Bench(3, FakeBackend({2: ends(outcome, "something")}))
+    run = bench.run()
+    assert bench.archive.endings == {1: COMPLETED, 2: Ending(outcome, "something"), 3: COMPLETED}
+    assert run.status is RunStatus.COMPLETED
+    assert run.exit_code is code
+
+
+def test_a_fault_that_leaves_the_bench_unsafe_ends_the_run():
+    unsafe = ends(Outcome.FAULT, "no answer from the drive", SafeState.NOT_CONFIRMED)
+    bench = Bench(3, FakeBackend({2: unsafe}))
+    run = bench.run()
+    assert set(bench.archive.endings) == {1, 2}
+    assert bench.archive.sealed == ("fault", "no answer from the drive", SafeState.CONFIRMED)
+    assert run.exit_code is ExitCode.LIMIT_OR_FAULT
+
+
+def test_a_safe_state_that_nobody_saw_comes_before_every_other_exit_code():
+    bench = Bench(2, FakeBackend(rest=lambda: SafeState.NOT_CONFIRMED))
+    run = bench.run()
+    assert run.exit_code is ExitCode.NOT_SAFE
+    assert run.status is RunStatus.COMPLETED
+    assert "not seen at rest" in run.reason
+
+
+def test_a_make_safe_that_fails_is_not_taken_for_safe():
+    def fail() -> SafeState:
+        raise OSError("port is gone")
+
+    bench = Bench(1, FakeBackend(rest=fail))
+    assert bench.run().exit_code is ExitCode.NOT_SAFE
+    assert "port is gone" in bench.archive.sealed[1]
+
+
+def test_a_backend_that_gives_up_ends_the_run_as_a_fault_with_the_trial_kept():
+    bench = Bench(3, FakeBackend({2: raises(BackendError("the port closed"))}))
+    run = bench.run()
+    assert bench.archive.endings[2].outcome is Outcome.FAULT
+    assert bench.archive.endings[2].reason == "the port closed"
+    assert set(bench.archive.endings) == {1, 2}
+    assert bench.backend.log[-1] == "made safe"
+    assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
+
+
+def test_a_bug_in_a_backend_still_seals_the_archive_and_is_not_swallowed():
+    bench = Bench(3, FakeBackend({2: raises(ZeroDivisionError("oops"))}))
+    with pytest.raises(ZeroDivisionError):
+        bench.run()
+    assert bench.backend.log[-1] == "made safe"
+    status, reason, _ = bench.archive.sealed
+    assert status == "fault"
+    assert "ZeroDivisionError: oops" in reason
+
+
+def test_an_archive_that_cannot_be_written_ends_the_run_unsealed_with_the_bench_safe():
+    bench = Bench(3, FakeBackend())
+
+    def full(trial: Trial) -> None:
+        raise ArchiveError("no space left")
+
+    bench.archive.begin = full  # type: ignore[assignment]
+    with pytest.raises(ArchiveError, match="no space left"):
+        bench.run()
+    assert bench.backend.log == ["made safe"]
+    assert bench.archive.sealed is None
+
+
+def test_a_stop_lets_the_running_trial_end_and_begins_no_other():
+    bench = Bench(3, FakeBackend())
+
+    def stop_and_end(stopped: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        assert stopped()
+        return Ending(Outcome.INTERRUPTED, "stopped")
+
+    bench.backend.behaviour[2] = stop_and_end
+    run = bench.run()
+    assert set(bench.archive.endings) == {1, 2}
+    assert bench.archive.sealed == ("interrupted", "stopped by Ctrl-C", SafeState.CONFIRMED)
+    assert run.exit_code is ExitCode.INTERRUPTED
+
+
+def test_a_stop_after_the_last_trial_changes_nothing():
+    bench = Bench(1, FakeBackend())
+
+    def stop_but_complete(stopped: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        return COMPLETED
+
+    bench.backend.behaviour[1] = stop_but_complete
+    assert bench.run().exit_code is ExitCode.DONE
+
+
+def test_a_trial_interrupted_at_the_bench_interrupts_the_run():
+    bench = Bench(3, FakeBackend({1: ends(Outcome.INTERRUPTED, "emergency stop")}))
+    run = bench.run()
+    assert set(bench.archive.endings) == {1}
+    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "stopped by emergency stop")
+
+
+def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
+    bench = Bench(3, FakeBackend())
+
+    def insist(progress: Progress) -> None:
+        if progress.ended:
+            raise KeyboardInterrupt
+
+    bench.display = insist
+    with pytest.raises(AbortedError) as aborted:
+        bench.run()
+    assert aborted.value.exit_code is ExitCode.INTERRUPTED
+    assert bench.backend.log[-1] == "made safe"
+    assert bench.archive.sealed is None
+
+
+def test_parallel_trials_run_at_the_same_time_and_all_are_archived():
+    together = threading.Barrier(2, timeout=10)
+
+    def meet(stopped: Callable[[], bool]) -> Ending:
+        together.wait()  # breaks, and so fails the trial, when nobody else comes
+        return COMPLETED
+
+    bench = Bench(4, FakeBackend(dict.fromkeys(range(1, 5), meet)))
+    run = bench.run(workers=2)
+    assert run.outcomes == {Outcome.COMPLETED: 4}
+    assert set(bench.archive.endings) == {1, 2, 3, 4}
+
+
+def test_a_fault_lets_parallel_trials_end_without_calling_it_an_interruption():
+    def wait_for_stop(stopped: Callable[[], bool]) -> Ending:
+        waiting.set()
+        while not stopped():
+            pass
+        return Ending(Outcome.INTERRUPTED, "stopped")
+
+    def fail(stopped: Callable[[], bool]) -> Ending:
+        assert waiting.wait(10)
+        raise BackendError("the port closed")
+
+    waiting = threading.Event()
+    bench = Bench(6, FakeBackend({1: wait_for_stop, 2: fail}))
+    run = bench.run(workers=2)
+    assert set(bench.archive.endings) == {1, 2}
+    assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
+
+
+def test_progress_adds_up_to_the_plan_and_scales_the_time_left_by_bench_time():
+    bench = Bench(4, FakeBackend({2: ends(Outcome.DIVERGED)}))
+    bench.run()
+    last = bench.progress[-1]
+    assert (last.total, last.done, last.failed, last.left) == (4, 3, 1, 0)
+    assert (last.bench_time, last.bench_time_left) == (8.0, 0.0)
+    half_way = bench.progress[3]  # begin, end, begin, end
+    assert half_way.left == 2
+    assert half_way.time_left == pytest.approx(half_way.elapsed)
+    assert bench.progress[0].time_left is None
