@@ -33,7 +33,7 @@ class FrictionModel:
         options: its parameters; a subclass of FrictionOptions with `model: Literal[name]`.
         parameters: the flat parameters its step function reads, from validated options.
         state_size: how many numbers its step function keeps.
-        step: compiled step function; see `campaign.physics.friction.step`.
+        step: compiled step function; see `campaign.physics.step_function`.
         viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
         steady_state: friction torque (N m) at constant velocity (rad/s), shape (n,), viscous
             part included.

@@ -56,7 +56,7 @@ def _parameters(options: LuGreOptions) -> Array:
 def _step(
     parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
 ) -> None:
-    """See `campaign.physics.friction.step`. state[0] is z (rad)."""
+    """See `campaign.physics.step_function`. state[0] is z (rad)."""
     coulomb, static, stribeck_velocity = parameters[0], parameters[1], parameters[2]
     exponent, stiffness, damping = parameters[3], parameters[4], parameters[5]
     v = 0.5 * (v0 + v1)

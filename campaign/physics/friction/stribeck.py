@@ -59,7 +59,7 @@ def _parameters(options: StribeckOptions) -> Array:
 def _step(
     parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
 ) -> None:
-    """See `campaign.physics.friction.step`. No state is kept."""
+    """See `campaign.physics.step_function`. No state is kept."""
     coulomb, static, stribeck_velocity = parameters[0], parameters[1], parameters[2]
     exponent, smoothing = parameters[3], parameters[4]
     v = 0.5 * (v0 + v1)

@@ -22,8 +22,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import cfunc, types
+from numba import types
 from numba.extending import intrinsic
+
+from campaign.physics.compiled import compiled_callback
 
 _DOUBLES = types.CPointer(types.float64)
 SIGNATURE = types.void(
@@ -34,9 +36,9 @@ SIGNATURE = types.void(
 @cache
 def address_of(step: Callable[..., None]) -> int:
     """Address of the compiled step function; it stays valid for the life of the process."""
-    compiled = cfunc(SIGNATURE, cache=True)(step)
-    _KEEP_ALIVE.append(compiled)
-    return int(compiled.address)
+    callback = compiled_callback(SIGNATURE, step)
+    _KEEP_ALIVE.append(callback)
+    return int(callback.address)
 
 
 _KEEP_ALIVE: list[Any] = []

@@ -1,0 +1,161 @@
+"""The simulated bench: executes a trial with the engine of `campaign.physics`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydantic import Field
+
+from campaign.backends.interface import BackendKind
+from campaign.options import Options
+from campaign.physics.bench import Bench, LimitsOptions
+from campaign.trial import (
+    Array,
+    ChannelInfo,
+    Ending,
+    Event,
+    Outcome,
+    Recorder,
+    SafeState,
+    Trial,
+)
+from campaign.units import Time, convert
+
+CHANNELS = (
+    ChannelInfo("command", "", "Command", ""),
+    ChannelInfo("base_rate", "rad/s", "Rate of the hull", "deg/s"),
+    ChannelInfo("gyro_rate", "rad/s", "Rate of the load (gyro)", "deg/s"),
+    ChannelInfo("relative_rate", "rad/s", "Rate of the load relative to the hull", "deg/s"),
+    ChannelInfo("relative_angle", "rad", "Angle of the load relative to the hull", "deg"),
+    ChannelInfo("motor_current", "A", "Motor current", "A"),
+    ChannelInfo("drive_torque", "N m", "Drive torque at the load", "N m"),
+    ChannelInfo("pointing_error", "rad", "Integrated gyro rate", "mrad"),
+    ChannelInfo("compensation_torque", "N m", "Compensation torque", "N m"),
+    ChannelInfo("friction_torque", "N m", "True friction torque", "N m", measured=False),
+    ChannelInfo("load_rate", "rad/s", "True rate of the load", "deg/s", measured=False),
+)
+
+
+class SimOptions(Options):
+    """Options of the simulated bench."""
+
+    longest_step: Time = Field(default=0.25e-3, gt=0, le=0.01)
+    """Longest integration step; shorter ones follow from sample rates and sine frequencies."""
+
+
+class SimBackend:
+    """Simulates every trial from rest, whatever came before it."""
+
+    def __init__(self, options: SimOptions) -> None:
+        self._options = options
+
+    def __enter__(self) -> SimBackend:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        return None
+
+    def refuses(self, trial: Trial) -> str | None:
+        """Why this backend cannot execute `trial`, or None."""
+        from campaign.physics.simulate import make_grid
+
+        try:
+            make_grid(_bench(trial), trial.task, self._options.longest_step)
+        except ValueError as error:
+            return str(error)
+        return None
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        """Simulate `trial`; end it at a limit, at a divergence, or when `stopped()`."""
+        from campaign.physics.base_motion import base_rate
+        from campaign.physics.simulate import simulate
+
+        bench, task = _bench(trial), trial.task
+        command = ChannelInfo(
+            "command",
+            *(
+                ("rad/s", "Commanded rate", "deg/s")
+                if task.mode == "rate"
+                else ("N m", "Commanded torque", "N m")
+            ),
+        )
+        recorder.start((command, *CHANNELS[1:]))
+        for time, out in simulate(bench, task, trial.seed, self._options.longest_step):
+            gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
+            block = np.stack(
+                [
+                    task.command.sample(time),
+                    base_rate(task.base_acceleration, time),
+                    gyro,
+                    relative,
+                    angle,
+                    current,
+                    current * bench.torque_per_current,
+                    pointing,
+                    compensation,
+                    friction,
+                    load_rate,
+                ]
+            )
+            end, ending = _first_violation(bench.limits, time, block)
+            recorder.append(time[:end], block[:, :end])
+            if ending is not None:
+                recorder.event(Event(float(time[min(end, len(time) - 1)]), ending.reason))
+                return ending
+            if stopped():
+                return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+        return Ending(Outcome.COMPLETED)
+
+    def make_safe(self) -> SafeState:
+        """A simulation has nothing that moves."""
+        return SafeState.CONFIRMED
+
+
+def _bench(trial: Trial) -> Bench:
+    return Bench.model_validate(trial.bench, context={"si": True})
+
+
+def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[int, Ending | None]:
+    """How many samples are good, and why the trial ends there (None: it goes on)."""
+    names = {info.name: row for info, row in zip(CHANNELS, block, strict=True)}
+    whole = len(time)
+    bad = ~np.isfinite(block).all(axis=0)
+    first = int(np.argmax(bad)) if bad.any() else whole
+    ending = None
+    if first < whole:
+        ending = Ending(
+            Outcome.DIVERGED, f"the simulation diverged at {time[first]:.4g} s: no finite value"
+        )
+    watched = (
+        ("angle", "relative_angle", limits.angle, "rad", "deg"),
+        ("rate", "relative_rate", limits.rate, "rad/s", "deg/s"),
+        ("torque", "drive_torque", limits.torque, "N m", "N m"),
+        ("current", "motor_current", limits.current, "A", "A"),
+    )
+    for limit, channel, bound, unit, display in watched:
+        beyond = np.abs(names[channel][:first]) > bound
+        if beyond.any():
+            first = int(np.argmax(beyond))
+            value = convert(float(names[channel][first]), unit, display)
+            ending = Ending(
+                Outcome.LIMIT,
+                f"{channel} reached {value:.6g} {display} at {time[first]:.4g} s; "
+                f"the {limit} limit is {convert(bound, unit, display):.6g} {display}",
+            )
+    # The offending sample is kept: it is the evidence.
+    return (min(first + 1, whole) if ending and ending.outcome is Outcome.LIMIT else first), ending
+
+
+def _open(options: Options) -> SimBackend:
+    assert isinstance(options, SimOptions)
+    return SimBackend(options)
+
+
+BACKEND = BackendKind(
+    name="sim",
+    summary="the bench simulated from its description",
+    options=SimOptions,
+    open=_open,
+    parallel=True,
+)

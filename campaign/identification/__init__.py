@@ -1,0 +1,1 @@
+"""Estimators: what recordings say about friction, with their uncertainty."""

@@ -1,0 +1,34 @@
+"""Motion of the hull: its rate and angle from the angular acceleration a task prescribes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from campaign.signals import Array, Polyline, Signal, Sine, Zero
+
+
+def base_rate(acceleration: Signal, time: Array) -> Array:
+    """Rate of the hull (rad/s) at `time` (s), shape (n,).
+
+    A sine acceleration belongs to a steady oscillation, so its rate has zero mean and the motion
+    is already under way at t = 0. Any other acceleration starts from rest.
+    """
+    match acceleration:
+        case Zero():
+            return np.zeros_like(time)
+        case Sine():
+            omega = 2 * np.pi * acceleration.frequency
+            return -acceleration.amplitude / omega * np.cos(omega * time + acceleration.phase)
+        case Polyline():
+            return _integral(acceleration, time)
+    raise TypeError(f"no base motion from {type(acceleration).__name__}")
+
+
+def _integral(polyline: Polyline, time: Array) -> Array:
+    """Exact integral of a polyline from t = 0, shape (n,)."""
+    knots = np.unique(np.concatenate([[0.0], [t for t in polyline.times if t > 0], [max(time[-1], 0.0)]]))
+    values = polyline.sample(knots)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots) * (values[1:] + values[:-1]))])
+    where = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 1)
+    passed = time - knots[where]
+    return np.asarray(area[where] + 0.5 * passed * (values[where] + polyline.sample(time)))

@@ -1,0 +1,196 @@
+"""The stabilization loop of Figure 5.3 as one linear system, without its friction.
+
+Everything linear is one matrix: rigid axis, gear, motor with back-EMF, the current loop, viscous
+friction, and, where the controller is continuous, the rate loop, the filter of the relative rate
+and the linear part of the compensation. Friction and friction-model compensation are inputs.
+
+    J dw/dt = N Kt i - sigma2 (w - wb) - T
+    L di/dt = V - R i - Ke N (w - wb)
+    V = Kpc (i* - i) + Kic integral of (i* - i)
+    i* = Kpv (r - w) + Kiv integral of (r - w) + Tc / (N Kt)
+
+w: inertial rate of the load, wb: rate of the hull, r: commanded rate, T: friction torque at the
+load, Tc: compensation torque at the load, i*: commanded current.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.physics.bench import Bench
+from campaign.physics.compensation import compensation_methods
+from campaign.physics.compensation.interface import Compensator, LinearBlock
+from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionOptions
+
+Array = NDArray[np.float64]
+
+# States that every loop has, in this order; the continuous controller's own follow.
+RATE, ANGLE, RELATIVE_ANGLE, CURRENT, CURRENT_INTEGRAL = range(5)
+# Inputs. DRIVE is the commanded rate or torque, or, with a sampled controller, the current.
+DRIVE, BASE_RATE, FRICTION, COMPENSATION = range(4)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """dx/dt = A x + B u, with what the engine reads from it.
+
+    Attributes:
+        a: (n, n), per second and SI.
+        b: (n, 4), columns DRIVE, BASE_RATE, FRICTION (N m at the load), COMPENSATION (N m).
+        relative_rate: (n,) and (4,): the relative rate that compensation sees, of x and u.
+        linear_compensation: (n,) and (4,): torque of the linear compensation block, of x and u.
+    """
+
+    a: Array
+    b: Array
+    relative_rate: tuple[Array, Array]
+    linear_compensation: tuple[Array, Array]
+
+
+def make_compensator(bench: Bench, name: str) -> Compensator:
+    """The compensation that a test asked for by name, built for this bench."""
+    if name == "none":
+        return Compensator()
+    options = bench.compensation[name]
+    method = compensation_methods()[options.method]
+    return method.build(options, bench.axis.inertia, bench.gear.ratio)
+
+
+def at_load(friction: FrictionOptions, bench: Bench) -> tuple[float, float]:
+    """What one N m of this interface counts at the load, and its rate per load relative rate."""
+    ratio = bench.gear.ratio
+    return (
+        ratio if friction.side == "motor" else 1.0,
+        ratio if friction.velocity == "motor" else 1.0,
+    )
+
+
+def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
+    """Viscous friction of one interface as the load's relative rate meets it (N m s/rad)."""
+    torque, rate = at_load(friction, bench)
+    model = friction_models()[friction.model]  # type: ignore[attr-defined]
+    return model.viscous(friction) * torque * rate
+
+
+def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compensator) -> Loop:
+    """The loop with a continuous controller."""
+    block = compensator.linear
+    order = 0 if block is None else len(block.c)
+    filtered = bench.controller.relative_rate_filter > 0.0
+    rate_integral, filter_state = 5, 6
+    first = 6 + filtered
+    a, b = _plant(bench, first + order)
+    filter_x, filter_u = np.zeros(len(a)), np.zeros(4)
+    if filtered:
+        filter_x[filter_state] = 1.0
+        a[filter_state, RATE] = 1.0 / bench.controller.relative_rate_filter
+        a[filter_state, filter_state] = -1.0 / bench.controller.relative_rate_filter
+        b[filter_state, BASE_RATE] = -1.0 / bench.controller.relative_rate_filter
+    else:
+        filter_x[RATE], filter_u[BASE_RATE] = 1.0, -1.0
+
+    torque_x, torque_u = np.zeros(len(a)), np.zeros(4)
+    if block is not None:
+        _add_block(a, b, block, first, bench.torque_per_current, filter_x, filter_u)
+        torque_x[first:] = block.c
+        torque_x[RATE] += block.d[0]
+        torque_x[CURRENT] += block.d[1] * bench.torque_per_current
+        torque_x += block.d[2] * filter_x
+        torque_u += block.d[2] * filter_u
+
+    command_x, command_u = np.zeros(len(a)), np.zeros(4)
+    if mode == "rate":
+        gains = bench.controller.rate
+        command_x[RATE], command_u[DRIVE] = -gains.proportional, gains.proportional
+        command_x[rate_integral] = gains.integral_gain
+        a[rate_integral, RATE], b[rate_integral, DRIVE] = -1.0, 1.0
+    else:
+        command_u[DRIVE] = 1.0 / bench.torque_per_current
+    command_x += torque_x / bench.torque_per_current
+    command_u += torque_u / bench.torque_per_current
+    command_u[COMPENSATION] += 1.0 / bench.torque_per_current
+    for friction, gain in compensator.friction:
+        viscous = gain * viscous_at_load(friction, bench) / bench.torque_per_current
+        command_x += viscous * filter_x
+        command_u += viscous * filter_u
+    _close_current_loop(a, b, bench, command_x, command_u)
+    return Loop(a, b, (filter_x, filter_u), (torque_x, torque_u))
+
+
+def make_plant(bench: Bench) -> Loop:
+    """The axis with its current loop; DRIVE is the commanded current that a controller holds."""
+    a, b = _plant(bench, 5)
+    command_u = np.zeros(4)
+    command_u[DRIVE] = 1.0
+    _close_current_loop(a, b, bench, np.zeros(5), command_u)
+    relative_x, relative_u = np.zeros(5), np.zeros(4)
+    relative_x[RATE], relative_u[BASE_RATE] = 1.0, -1.0
+    return Loop(a, b, (relative_x, relative_u), (np.zeros(5), np.zeros(4)))
+
+
+def _plant(bench: Bench, size: int) -> tuple[Array, Array]:
+    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    inertia, motor = bench.axis.inertia, bench.motor
+    viscous = sum(viscous_at_load(friction, bench) for friction in bench.friction.values())
+    a[RATE, RATE] = -viscous / inertia
+    a[RATE, CURRENT] = bench.torque_per_current / inertia
+    b[RATE, BASE_RATE] = viscous / inertia
+    b[RATE, FRICTION] = -1.0 / inertia
+    a[ANGLE, RATE] = 1.0
+    a[RELATIVE_ANGLE, RATE], b[RELATIVE_ANGLE, BASE_RATE] = 1.0, -1.0
+    back_emf = motor.back_emf_constant * bench.gear.ratio / motor.inductance
+    a[CURRENT, CURRENT] = -motor.resistance / motor.inductance
+    a[CURRENT, RATE], b[CURRENT, BASE_RATE] = -back_emf, back_emf
+    return a, b
+
+
+def _close_current_loop(
+    a: Array, b: Array, bench: Bench, command_x: Array, command_u: Array
+) -> None:
+    gains, inductance = bench.controller.current, bench.motor.inductance
+    error_x, error_u = command_x.copy(), command_u
+    error_x[CURRENT] -= 1.0
+    a[CURRENT] += gains.proportional * error_x / inductance
+    b[CURRENT] += gains.proportional * error_u / inductance
+    a[CURRENT, CURRENT_INTEGRAL] += gains.integral_gain / inductance
+    a[CURRENT_INTEGRAL] += error_x
+    b[CURRENT_INTEGRAL] += error_u
+
+
+def _add_block(
+    a: Array,
+    b: Array,
+    block: LinearBlock,
+    first: int,
+    torque_per_current: float,
+    relative_x: Array,
+    relative_u: Array,
+) -> None:
+    rows = slice(first, first + len(block.c))
+    a[rows, rows] = block.a
+    a[rows, RATE] += block.b[:, 0]
+    a[rows, CURRENT] += block.b[:, 1] * torque_per_current
+    a[rows] += np.outer(block.b[:, 2], relative_x)
+    b[rows] += np.outer(block.b[:, 2], relative_u)
+
+
+def discretise(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
+    """Exact step of dx/dt = A x + B u for inputs that are straight lines over the step.
+
+    x(t+h) = F x(t) + G u(t) + H (u(t+h) - u(t)), by one matrix exponential (Van Loan 1978).
+    Shapes: F (n, n), G and H (n, m).
+    """
+    from scipy.linalg import expm
+
+    n, m = b.shape
+    augmented = np.zeros((n + 2 * m, n + 2 * m))
+    augmented[:n, :n] = a * step
+    augmented[:n, n : n + m] = b * step
+    augmented[n : n + m, n + m :] = np.eye(m)
+    exponential = expm(augmented)
+    return exponential[:n, :n], exponential[:n, n : n + m], exponential[:n, n + m :]
