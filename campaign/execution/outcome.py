@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 
+from campaign.archive.header import RunStatus
 from campaign.errors import ExitCode, worst_exit_code
 from campaign.trial import Outcome, SafeState
-
-
-class RunStatus(StrEnum):
-    """How a run ended as a whole; single trials may have failed in any case."""
-
-    COMPLETED = "completed"  # every trial of the plan was executed
-    INTERRUPTED = "interrupted"  # somebody stopped it
-    FAULT = "fault"  # the backend gave up, or the bench was left in an unknown state
-
 
 _TRIAL_CODES = {
     Outcome.COMPLETED: ExitCode.DONE,
@@ -27,7 +18,8 @@ _TRIAL_CODES = {
     Outcome.INTERRUPTED: ExitCode.TRIALS_FAILED,  # whether by somebody, the run's status says
 }
 _STATUS_CODES = {
-    RunStatus.COMPLETED: ExitCode.DONE,
+    RunStatus.COMPLETE: ExitCode.DONE,
+    RunStatus.FAILED_TRIALS: ExitCode.TRIALS_FAILED,
     RunStatus.INTERRUPTED: ExitCode.INTERRUPTED,
     RunStatus.FAULT: ExitCode.LIMIT_OR_FAULT,
 }

@@ -12,9 +12,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from campaign.archive.header import RunStatus
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution.outcome import RunOutcome, RunStatus
+from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.stop import StopSwitch
 from campaign.execution.writer import PlanWriter
@@ -52,18 +53,26 @@ def run_plan(
     ended = _Ended()
     with _safe_afterwards(backend, ended):
         _execute_all(trials, backend, writer, ledger, ended, workers, stop)
-    interrupted = stop() and (ledger.left or Outcome.INTERRUPTED in ledger.outcomes)
-    status = (
-        RunStatus.INTERRUPTED
-        if interrupted
-        else (RunStatus.FAULT if ended.fault else RunStatus.COMPLETED)
-    )
-    reasons = (f"stopped by {stop.reason}" if interrupted else "", ended.fault, ended.unsafe)
-    reason = "; ".join(filter(None, reasons))
+    status, reason = _verdict(ledger, ended, stop)
     archive = writer.seal(status, reason, ended.safe_state)
     if ended.bug:
         raise ended.bug
     return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, archive)
+
+
+def _verdict(ledger: Ledger, ended: _Ended, stop: StopSwitch) -> tuple[RunStatus, str]:
+    """How the run stands, and every reason there is for it."""
+    interrupted = stop() and (ledger.left or Outcome.INTERRUPTED in ledger.outcomes)
+    if interrupted:
+        status = RunStatus.INTERRUPTED
+    elif ended.fault:
+        status = RunStatus.FAULT
+    elif ledger.outcomes.keys() - {Outcome.COMPLETED}:
+        status = RunStatus.FAILED_TRIALS
+    else:
+        status = RunStatus.COMPLETE
+    reasons = (f"stopped by {stop.reason}" if interrupted else "", ended.fault, ended.unsafe)
+    return status, "; ".join(filter(None, reasons))
 
 
 @dataclass

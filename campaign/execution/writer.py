@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
+from campaign.archive.header import RunStatus
 from campaign.trial import Ending, Recorder, SafeState, Trial
 
 
@@ -21,5 +22,5 @@ class PlanWriter(Protocol):
     def begin(self, trial: Trial) -> TrialWriter:
         """Open a trial for its samples."""
 
-    def seal(self, status: str, reason: str, safe_state: SafeState) -> Path:
+    def seal(self, status: RunStatus, reason: str, safe_state: SafeState) -> Path:
         """Close the run for good and say where it is."""

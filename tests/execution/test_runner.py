@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 import pytest
 
+from campaign.archive.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
-from campaign.execution.outcome import RunOutcome, RunStatus
+from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import AbortedError, run_plan
 from campaign.execution.stop import StopSwitch
@@ -53,9 +54,9 @@ def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
     bench = Bench(3, FakeBackend())
     outcome = bench.run()
     assert bench.backend.log == ["trial-00001", "trial-00002", "trial-00003", "made safe"]
-    assert outcome.status is RunStatus.COMPLETED
+    assert outcome.status is RunStatus.COMPLETE
     assert outcome.exit_code is ExitCode.DONE
-    assert bench.archive.sealed == ("completed", "", SafeState.CONFIRMED)
+    assert bench.archive.sealed == ("complete", "", SafeState.CONFIRMED)
     assert bench.archive.samples == {1: 2, 2: 2, 3: 2}
 
 
@@ -71,7 +72,7 @@ def test_a_failed_trial_is_recorded_and_the_campaign_goes_on(outcome: Outcome, c
     bench = Bench(3, FakeBackend({2: ends(outcome, "something")}))
     run = bench.run()
     assert bench.archive.endings == {1: COMPLETED, 2: Ending(outcome, "something"), 3: COMPLETED}
-    assert run.status is RunStatus.COMPLETED
+    assert run.status is RunStatus.FAILED_TRIALS
     assert run.exit_code is code
 
 
@@ -88,7 +89,7 @@ def test_a_safe_state_that_nobody_saw_comes_before_every_other_exit_code():
     bench = Bench(2, FakeBackend(rest=lambda: SafeState.NOT_CONFIRMED))
     run = bench.run()
     assert run.exit_code is ExitCode.NOT_SAFE
-    assert run.status is RunStatus.COMPLETED
+    assert run.status is RunStatus.COMPLETE
     assert "not seen at rest" in run.reason
 
 
