@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 
 from campaign.archive.header import RunStatus
 from campaign.backends.interface import Backend
@@ -51,10 +53,10 @@ def run_plan(
     """
     ledger = Ledger(trials, display)
     ended = _Ended()
-    with _safe_afterwards(backend, ended):
+    with _safe_afterwards(backend, ended, writer.folder):
         _execute_all(trials, backend, writer, ledger, ended, workers, stop)
     status, reason = _verdict(ledger, ended, stop)
-    archive = writer.seal(status, reason, ended.safe_state)
+    archive = writer.seal(status, reason, ended.safe_state, ended=utc_now())
     if ended.bug:
         raise ended.bug
     return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, archive)
@@ -108,13 +110,13 @@ class _Executed:
 
 
 @contextmanager
-def _safe_afterwards(backend: Backend, ended: _Ended) -> Iterator[None]:
+def _safe_afterwards(backend: Backend, ended: _Ended, folder: Path) -> Iterator[None]:
     """Bring the bench to rest however the block ends, and note whether that was seen."""
     try:
         yield
     except KeyboardInterrupt:
         _make_safe(backend, ended)
-        raise _aborted(ended) from None
+        raise _aborted(ended, folder) from None
     except BaseException:
         _make_safe(backend, ended)
         raise
@@ -132,10 +134,10 @@ def _make_safe(backend: Backend, ended: _Ended) -> None:
             ended.unsafe = "the bench was not seen at rest with its drive off"
 
 
-def _aborted(ended: _Ended) -> AbortedError:
+def _aborted(ended: _Ended, folder: Path) -> AbortedError:
     safe = ended.safe_state is SafeState.CONFIRMED
     aborted = AbortedError(
-        "stopped at once; the finished trials are kept, unsealed"
+        f"stopped at once; the finished trials are in {folder}"
         + ("" if safe else f"; safe state NOT confirmed: {ended.unsafe}")
     )
     if not safe:
@@ -192,6 +194,7 @@ def _execute(
     trial: Trial, backend: Backend, writer: PlanWriter, halted: Callable[[], bool]
 ) -> _Executed:
     """One trial, in a worker thread. Raises only what the archive raises."""
+    started = utc_now()
     recorder = writer.begin(trial)
     try:
         executed = _Executed(backend.execute(trial, recorder, halted))
@@ -203,8 +206,13 @@ def _execute(
     except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
         reason = f"internal error: {_describe(error)}"
         executed = _Executed(Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED), bug=error)
-    recorder.finish(executed.ending)
+    recorder.finish(executed.ending, started, utc_now())
     return executed
+
+
+def utc_now() -> str:
+    """The wall clock as archives keep it: ISO 8601, UTC, to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def _describe(error: Exception) -> str:

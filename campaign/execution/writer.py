@@ -12,15 +12,19 @@ from campaign.trial import Ending, Recorder, SafeState, Trial
 class TrialWriter(Recorder, Protocol):
     """Takes the samples of one trial and keeps them once it has ended."""
 
-    def finish(self, ending: Ending) -> None:
-        """Keep the trial, whole, with its ending. Raises ArchiveError when it cannot be written."""
+    def finish(self, ending: Ending, started: str, ended: str) -> None:
+        """Keep the trial, whole. Raises ArchiveError when it cannot be written."""
 
 
 class PlanWriter(Protocol):
     """Takes the trials of a run; `begin` and what it returns may be used from several threads."""
 
+    @property
+    def folder(self) -> Path:
+        """Where the run lies until it is sealed."""
+
     def begin(self, trial: Trial) -> TrialWriter:
         """Open a trial for its samples."""
 
-    def seal(self, status: RunStatus, reason: str, safe_state: SafeState) -> Path:
+    def seal(self, status: RunStatus, reason: str, safe_state: SafeState, *, ended: str) -> Path:
         """Close the run for good and say where it is."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,8 @@ class MemoryTrial(MemoryRecorder):
         super().__init__()
         self.archive, self.trial = archive, trial
 
-    def finish(self, ending: Ending) -> None:
+    def finish(self, ending: Ending, started: str, ended: str) -> None:
+        assert datetime.fromisoformat(started) <= datetime.fromisoformat(ended)
         with self.archive.lock:
             self.archive.endings[self.trial.number] = ending
             self.archive.samples[self.trial.number] = len(self.recording(ending).time)
@@ -79,10 +81,14 @@ class MemoryArchive:
     sealed: tuple[str, str, SafeState] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
 
+    @property
+    def folder(self) -> Path:
+        return Path("run.partial")
+
     def begin(self, trial: Trial) -> MemoryTrial:
         return MemoryTrial(self, trial)
 
-    def seal(self, status: str, reason: str, safe_state: SafeState) -> Path:
+    def seal(self, status: str, reason: str, safe_state: SafeState, *, ended: str) -> Path:
         assert self.sealed is None, "sealed twice"
         self.sealed = (str(status), reason, safe_state)
         return Path("run.nxs")
