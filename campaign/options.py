@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict
 from pydantic_core import PydanticUndefined
@@ -27,24 +27,90 @@ class Options(BaseModel):
 
 @dataclass(frozen=True)
 class OptionInfo:
-    """One line of `campaign kinds NAME`."""
+    """One line of `campaign kinds NAME`.
+
+    Attributes:
+        name: dotted, for an option of a table within a table.
+        quantity: the physical quantity it takes, SI inside; None for anything else.
+        accepts: what else it takes: `text`, `true or false`, the allowed words, a table's models.
+        default: SI; None when there is none.
+    """
 
     name: str
-    unit: str
+    quantity: Quantity | None
+    accepts: str
     default: Any
     required: bool
     meaning: str
 
+    @property
+    def unit(self) -> str:
+        """The unit a reader is shown, or the empty text."""
+        return self.quantity.display if self.quantity else ""
 
-def describe(options: type[BaseModel]) -> Iterator[OptionInfo]:
-    """The options of a class in the order they were declared; units as a reader writes them."""
+
+def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]:
+    """The options of a class in the order they were declared, with those of the tables in it."""
     for name, field in options.model_fields.items():
-        quantity = next((m for m in field.metadata if isinstance(m, Quantity)), None)
-        default = field.default_factory() if field.default_factory else field.default  # type: ignore[call-arg]
+        types = tuple(_leaf_types(field.annotation))
+        quantities = [m for m in (*field.metadata, *types) if isinstance(m, Quantity)]
+        tables = [t for t in types if isinstance(t, type) and issubclass(t, BaseModel)]
+        default = field.get_default(call_default_factory=True, validated_data={})
+        nested = isinstance(default, BaseModel) or default is PydanticUndefined
         yield OptionInfo(
-            name=name,
-            unit=quantity.display if quantity else "",
-            default=None if default is PydanticUndefined else default,
+            name=prefix + name,
+            quantity=quantities[0] if quantities else None,
+            accepts=_accepts(field.annotation, types, quantified=bool(quantities)),
+            default=None if nested else default,
             required=field.is_required(),
             meaning=" ".join((field.description or "").split()),
         )
+        if len(tables) == 1:
+            yield from describe(tables[0], f"{prefix}{name}.")
+
+
+def _leaf_types(annotation: Any) -> Iterator[Any]:
+    """Every type and every Quantity inside optional, list, dict, union and Annotated types."""
+    if isinstance(annotation, Quantity):
+        yield annotation
+        return
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        yield annotation
+    elif origin is dict:
+        yield from _leaf_types(arguments[1])
+    elif arguments:
+        for argument in arguments:
+            yield from _leaf_types(argument)
+    elif annotation is not type(None) and annotation is not Ellipsis:
+        yield annotation
+
+
+_PLAIN = {str: "text", int: "whole number", float: "number", bool: "true or false"}
+
+
+def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> str:
+    words = [str(w) for t in types if get_origin(t) is Literal for w in get_args(t)]
+    tables = [t for t in types if isinstance(t, type) and issubclass(t, BaseModel)]
+    plain = [_PLAIN[t] for t in types if isinstance(t, type) and t in _PLAIN]
+    if quantified:  # numbers come with their unit, as text
+        plain = []
+    if tables:
+        plain.append("table" if len(tables) == 1 else f"table: {_alternatives(tables)}")
+    accepted = " | ".join(dict.fromkeys((*words, *plain)))
+    many = get_origin(annotation) in (tuple, list)
+    return f"list of {accepted or 'values'}" if many else accepted
+
+
+def _alternatives(tables: list[type[BaseModel]]) -> str:
+    """The word by which each kind of table is told: its first field of one allowed word."""
+    words = []
+    for table in tables:
+        for name, field in table.model_fields.items():
+            allowed = get_args(field.annotation)
+            if get_origin(field.annotation) is Literal and len(allowed) == 1:
+                words.append(f"{name} = {allowed[0]}")
+                break
+        else:
+            words.append(table.__name__)
+    return " | ".join(words)

@@ -1,0 +1,199 @@
+"""What can be typed: commands, arguments and options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import campaign
+
+app = typer.Typer(
+    name="campaign",
+    help="Friction experiments on stabilized servo platforms: run, archive, identify, report.",
+    epilog="Exit codes: 0 done, 1 some trials failed, 2 bad usage or protocol, 3 a limit or a "
+    "backend fault, 4 a damaged archive, 5 safe state NOT confirmed, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+ProtocolArgument = Annotated[
+    str,
+    typer.Argument(metavar="PROTOCOL", help="A TOML file, or the name of a shipped protocol."),
+]
+RunArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="RUN",
+        help="A path, a run's name, or a unique beginning of it.",
+        show_default=False,
+    ),
+]
+NewestRunArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[RUN]",
+        help="A path, a run's name, or a unique beginning of it; the newest when absent.",
+        show_default=False,
+    ),
+]
+ResultsOption = Annotated[
+    Path, typer.Option("--results", metavar="DIR", help="Where the archives are.")
+]
+OnlyOption = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="TEST", help="Only this test; may be given again."),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help="Change a value of the protocol, a bench or the backend; may be given again.",
+    ),
+]
+BackendOption = Annotated[
+    str, typer.Option("--backend", metavar="NAME", help="What executes the trials.")
+]
+LargeOption = Annotated[
+    bool, typer.Option("--allow-large", help="Accept a plan of more than 100 000 trials.")
+]
+TemplatesOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--templates",
+        metavar="DIR",
+        help="Templates that win over the packaged ones; they are code, so trust them.",
+        show_default=False,
+    ),
+]
+RESULTS = Path("results")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"campaign {campaign.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def plan(
+    protocol: ProtocolArgument,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    only: OnlyOption = None,
+    changes: SetOption = None,
+    backend: BackendOption = "sim",
+    results: ResultsOption = RESULTS,
+    allow_large: LargeOption = False,
+) -> None:
+    """Show the trials, their time and limits, and what would be written; execute nothing."""
+    from campaign.cli.plan import show_plan
+    from campaign.cli.prepare import Request
+
+    request = Request(protocol, tuple(only or ()), tuple(changes or ()), backend, allow_large)
+    show_plan(request, results, as_json=as_json)
+
+
+@app.command()
+def run(
+    protocol: ProtocolArgument,
+    backend: BackendOption = "sim",
+    results: ResultsOption = RESULTS,
+    only: OnlyOption = None,
+    changes: SetOption = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            metavar="N",
+            min=1,
+            max=256,
+            help="Trials executed at once, where the backend can; one per processor if absent.",
+            show_default=False,
+        ),
+    ] = None,
+    report: Annotated[bool, typer.Option("--report", help="Build the report as well.")] = False,
+    allow_large: LargeOption = False,
+) -> None:
+    """Execute a protocol and archive it; the archive's path is the last line of the output."""
+    from campaign.cli.prepare import Request
+    from campaign.cli.run import run_protocol
+
+    request = Request(protocol, tuple(only or ()), tuple(changes or ()), backend, allow_large)
+    raise typer.Exit(run_protocol(request, results, workers=workers, report=report))
+
+
+@app.command()
+def report(
+    run: NewestRunArgument = None,
+    results: ResultsOption = RESULTS,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="DIR",
+            help="Where to write it; RUN-report beside the archive when absent.",
+            show_default=False,
+        ),
+    ] = None,
+    templates: TemplatesOption = None,
+    open_it: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+) -> None:
+    """Write report.html, its tables and its figures, from an archive alone."""
+    from campaign.cli.report import report_run
+
+    report_run(run, results, output, templates, open_it=open_it)
+
+
+@app.command("list")
+def list_command(results: ResultsOption = RESULTS) -> None:
+    """List the archived runs, the newest first."""
+    from campaign.cli.archives import list_archives
+
+    list_archives(results)
+
+
+@app.command()
+def show(run: RunArgument, results: ResultsOption = RESULTS) -> None:
+    """Show what a run was, how it ended, and which trials failed."""
+    from campaign.cli.archives import show_archive
+
+    show_archive(run, results)
+
+
+@app.command()
+def kinds(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="One of them, with its options.", show_default=False),
+    ] = None,
+) -> None:
+    """List experiments, friction models, compensation methods and backends."""
+    from campaign.cli.kinds import list_kinds, show_kind
+
+    if name is None:
+        list_kinds()
+    else:
+        show_kind(name)
+
+
+@app.command()
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Made when it is not there.")],
+) -> None:
+    """Copy the shipped protocols, benches and templates into DIR, to start from."""
+    from campaign.cli.archives import init_folder
+
+    init_folder(folder)

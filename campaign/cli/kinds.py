@@ -1,0 +1,78 @@
+"""`campaign kinds`: what protocols and benches can name, each option with unit and meaning."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from campaign.backends import backends
+from campaign.cli.output import print_line, print_table
+from campaign.errors import UsageError
+from campaign.experiments import experiments
+from campaign.options import OptionInfo, describe
+from campaign.physics.bench import Bench
+from campaign.physics.compensation import compensation_methods
+from campaign.physics.friction import friction_models
+from campaign.units import convert
+
+BENCH = ("bench", "bench", "what a bench file may contain", Bench)
+
+
+def list_kinds() -> None:
+    """One line per kind."""
+    print_table(("room", "name", "what it is"), [kind[:3] for kind in _all_kinds()])
+
+
+def show_kind(name: str) -> None:
+    """Every kind of that name with its options. Raises UsageError when there is none."""
+    kinds = list(_all_kinds())
+    chosen = [kind for kind in kinds if kind[1] == name]
+    if not chosen:
+        close = difflib.get_close_matches(name, sorted({kind[1] for kind in kinds}), n=1)
+        hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
+        raise UsageError(f"there is no kind {name!r}; {hint}")
+    for room, kind, summary, options in chosen:
+        print_line(f"{kind} ({room}): {summary}")
+        print_line()
+        rows = [_row(info) for info in describe(options)]
+        print_table(("option", "unit or values", "default", "meaning"), rows)
+
+
+def _all_kinds() -> Iterator[tuple[str, str, str, Any]]:
+    rooms: Sequence[tuple[str, dict[str, Any]]] = (
+        ("experiment", experiments()),
+        ("friction model", friction_models()),
+        ("compensation method", compensation_methods()),
+        ("backend", backends()),
+    )
+    for room, kinds in rooms:
+        for name, kind in kinds.items():
+            yield room, name, kind.summary, kind.options
+    yield BENCH
+
+
+def _row(info: OptionInfo) -> tuple[str, str, str, str]:
+    takes = " | ".join(filter(None, (info.unit, info.accepts)))
+    return info.name, takes, "required" if info.required else _default(info), info.meaning
+
+
+def _default(info: OptionInfo) -> str:
+    if info.default is None or info.default == "":
+        return ""
+    if info.quantity is not None:
+        return _quantities(info.default, info.quantity.si, info.quantity.display)
+    if isinstance(info.default, bool):
+        return "true" if info.default else "false"
+    if isinstance(info.default, tuple | list | dict) and not info.default:
+        return "none"
+    if isinstance(info.default, tuple | list):
+        return ", ".join(str(item) for item in info.default)
+    return f'"{info.default}"' if isinstance(info.default, str) else f"{info.default}"
+
+
+def _quantities(value: Any, si: str, display: str) -> str:
+    """`value` or a list of values as a reader writes it: `20 s`, `0.05 deg/s, 65 deg/s`."""
+    if isinstance(value, tuple | list):
+        return ", ".join(_quantities(item, si, display) for item in value)
+    return f"{convert(value, si, display):.6g} {display}"

@@ -1,0 +1,48 @@
+"""Running a command, and the one place where an error becomes a message and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import traceback
+
+from campaign.cli.app import app
+from campaign.cli.output import print_note
+from campaign.errors import CampaignError, ExitCode
+
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
+DEBUG = "CAMPAIGN_DEBUG"
+
+
+def main() -> None:
+    """Run the command line and exit with its documented code."""
+    try:
+        app(prog_name="campaign")
+    except CampaignError as error:
+        _explain_in_debug()
+        _leave(f"campaign: {error}", error.exit_code)
+    except KeyboardInterrupt:
+        _leave("campaign: interrupted", ExitCode.INTERRUPTED)
+    except Exception as error:  # noqa: BLE001 - a bug: no traceback unless asked for
+        _explain_in_debug()
+        _leave(
+            f"campaign: internal error: {type(error).__name__}: {error}\n"
+            f"This is a bug. Set {DEBUG}=1 and run the command again for its traceback.",
+            INTERNAL_ERROR,
+        )
+
+
+def _explain_in_debug() -> None:
+    if os.environ.get(DEBUG):
+        traceback.print_exc()
+
+
+def _leave(message: str, code: int) -> None:
+    """Print one message and end the program, even while a stuck backend's thread goes on."""
+    print_note(message)
+    if threading.active_count() == 1:
+        sys.exit(code)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

@@ -1,0 +1,46 @@
+"""Printing: rich on a terminal, plain lines elsewhere. No text from a file is read as markup."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+
+def console() -> Console:
+    """Standard output: what a command was asked for."""
+    return Console(file=sys.stdout, markup=False, highlight=False, emoji=False)
+
+
+def error_console() -> Console:
+    """Standard error: progress, warnings, everything else."""
+    return Console(file=sys.stderr, markup=False, highlight=False, emoji=False)
+
+
+def print_line(text: str = "") -> None:
+    """One line of output as it is, never wrapped by us."""
+    console().print(Text(text), soft_wrap=True)
+
+
+def print_note(text: str, style: str = "") -> None:
+    """One line on standard error."""
+    error_console().print(Text(text, style=style), soft_wrap=True)
+
+
+def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """A table for people on a terminal, tab-separated lines for other programs."""
+    out = console()
+    if not out.is_terminal:
+        for row in (headings, *rows):
+            print("\t".join(" ".join(cell.split()) for cell in row))  # noqa: T201
+        return
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    out.print(table)
