@@ -1,0 +1,25 @@
+"""The archive: a run in progress is a folder that no crash can spoil; a sealed run is one file.
+
+`RunWriter` writes, `open_run` reads, `find_run` and `list_runs` look around a results folder. The
+format is described in `docs/archive-format.md`. Importing this package does not import h5py.
+"""
+
+from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
+from campaign.archive.listing import RunSummary, find_run, list_runs
+from campaign.archive.reader import ArchivedTrial, RunReader, open_run
+from campaign.archive.writer import RunWriter, TrialWriter
+
+__all__ = [
+    "ArchivedTrial",
+    "PlannedTrial",
+    "RunHeader",
+    "RunReader",
+    "RunStatus",
+    "RunSummary",
+    "RunWriter",
+    "TrialWriter",
+    "find_run",
+    "list_runs",
+    "new_run_name",
+    "open_run",
+]

@@ -1,0 +1,215 @@
+"""Reading HDF5 that nobody vouches for.
+
+A file may be truncated, damaged or made to do harm. Nothing is followed out of the file (external
+and soft links, external storage, virtual datasets), no filter is loaded from anywhere (only shuffle
+and deflate), only fixed-length text, 64-bit integers and float64 are read (so no object type ever
+is), every size is checked against what is really stored before memory is asked for, and every
+dataset must match its checksum.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.archive.hdf5 import CHECKSUM, SAMPLE
+from campaign.errors import ArchiveError
+
+Array = NDArray[np.float64]
+
+_ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
+_MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
+_LARGEST_CHUNK = 1 << 22  # samples
+_LARGEST_ATTRIBUTE = 1 << 16  # bytes
+
+# What h5py raises on damage is not documented, and is of every kind.
+_DAMAGE = (
+    OSError,
+    RuntimeError,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    SystemError,
+)
+
+
+@contextlib.contextmanager
+def guarded(path: Path, place: str = "") -> Iterator[None]:
+    """Any failure inside becomes an ArchiveError that names the file and the place in it."""
+    try:
+        yield
+    except ArchiveError:
+        raise
+    except _DAMAGE as error:
+        where = f"{path}: {place}" if place else str(path)
+        text = " ".join(str(error).split())[:300] or type(error).__name__
+        raise ArchiveError(f"{where}: cannot be read: {text}") from None
+
+
+@contextlib.contextmanager
+def open_file(path: Path) -> Iterator[h5py.File]:
+    """An HDF5 file for reading; ArchiveError when it is none."""
+    with guarded(path):
+        if not path.is_file():
+            raise ArchiveError(f"{path}: there is no such file")
+        if not h5py.is_hdf5(path):
+            raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
+        with h5py.File(path, "r", locking=False) as file:
+            yield file
+
+
+def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
+    """The group `name`, stored in this very file, of the NeXus class."""
+    group = _own(parent, name)
+    if not isinstance(group, h5py.Group):
+        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+    if attribute(group, "NX_class") != nx_class:
+        raise ArchiveError(f"{_place(parent, name)}: is not of class {nx_class}")
+    return group
+
+
+def names(group: h5py.Group) -> list[str]:
+    """Names of what `group` holds, sorted."""
+    return sorted(group)
+
+
+def text_at(parent: h5py.Group, name: str) -> str:
+    """A text."""
+    dataset = _dataset_at(parent, name)
+    kind = dataset.dtype
+    if dataset.shape != () or kind.kind != "S" or dataset.chunks is not None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
+    if dataset.id.get_storage_size() != kind.itemsize:
+        raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
+    raw = bytes(dataset[()])
+    _check(dataset, raw)
+    return raw.decode("utf-8")
+
+
+def integer_at(parent: h5py.Group, name: str) -> int:
+    """A whole number."""
+    dataset = _dataset_at(parent, name)
+    if dataset.shape != () or dataset.dtype != np.dtype("<i8"):
+        raise ArchiveError(f"{_place(parent, name)}: is not a 64-bit whole number")
+    value = np.asarray(dataset[()], dtype="<i8")
+    _check(dataset, value.tobytes())
+    return int(value)
+
+
+def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
+    """A sample dataset whose stated size is backed by what is stored; not read yet."""
+    dataset = _dataset_at(parent, name)
+    place = _place(parent, name)
+    if dataset.ndim != 1 or dataset.dtype != SAMPLE or dataset.chunks is None:
+        raise ArchiveError(f"{place}: is not a chunked series of float64")
+    length, chunk = dataset.shape[0], dataset.chunks[0]
+    if not 0 < chunk <= _LARGEST_CHUNK:
+        raise ArchiveError(f"{place}: has chunks of {chunk} samples")
+    stored = dataset.id.get_storage_size()
+    if length * SAMPLE.itemsize > stored * _MOST_EXPANSION:
+        raise ArchiveError(f"{place}: states {length} samples but stores {stored} bytes")
+    return dataset
+
+
+def read_samples(dataset: h5py.Dataset) -> Array:
+    """All samples, checked; shape (n,), float64."""
+    values = np.empty(dataset.shape, dtype=SAMPLE)
+    if len(values):
+        dataset.read_direct(values)
+    _check(dataset, values.data)
+    return values.astype(np.float64, copy=False)
+
+
+def check_samples(dataset: h5py.Dataset) -> None:
+    """Read through a sample dataset in flat memory; ArchiveError when its checksum fails."""
+    digest = hashlib.sha256()
+    step = dataset.chunks[0] * max(1, _LARGEST_CHUNK // dataset.chunks[0])
+    for start in range(0, dataset.shape[0], step):
+        digest.update(np.ascontiguousarray(dataset[start : start + step]).data)
+    _compare(dataset, digest.hexdigest())
+
+
+def attribute(item: h5py.HLObject, name: str) -> str:
+    """A text attribute; ArchiveError when there is none."""
+    identifier = _attribute(item, name)
+    if identifier.shape != () or h5py.check_string_dtype(identifier.dtype) is None:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a text")
+    return str(item.attrs[name])
+
+
+def text_list(item: h5py.HLObject, name: str) -> list[str]:
+    """An attribute that is a list of texts; empty when there is none."""
+    if name not in item.attrs:
+        return []
+    identifier = _attribute(item, name)
+    if len(identifier.shape) != 1 or h5py.check_string_dtype(identifier.dtype) is None:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a list of texts")
+    return [str(text) for text in item.attrs[name]]
+
+
+def flag(item: h5py.HLObject, name: str) -> bool:
+    """An attribute that is 0 or 1."""
+    identifier = _attribute(item, name)
+    if identifier.shape != () or identifier.dtype.kind not in "iu":
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not 0 or 1")
+    return bool(item.attrs[name])
+
+
+def _attribute(item: h5py.HLObject, name: str) -> Any:
+    if name not in item.attrs:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is missing")
+    identifier = item.attrs.get_id(name)
+    if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is too large")
+    return identifier
+
+
+def _own(parent: h5py.Group, name: str) -> Any:
+    raw = name.encode()
+    if raw not in parent.id:
+        raise ArchiveError(f"{_place(parent, name)}: is missing")
+    if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
+        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
+    return parent[name]
+
+
+def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
+    dataset = _own(parent, name)
+    place = _place(parent, name)
+    if not isinstance(dataset, h5py.Dataset):
+        raise ArchiveError(f"{place}: is not a dataset")
+    plan = dataset.id.get_create_plist()
+    if plan.get_layout() == h5py.h5d.VIRTUAL or (
+        plan.get_layout() == h5py.h5d.CONTIGUOUS and plan.get_external_count()
+    ):
+        raise ArchiveError(f"{place}: lies in another file, which is not opened")
+    filters = {plan.get_filter(number)[0] for number in range(plan.get_nfilters())}
+    if not filters <= _ALLOWED_FILTERS:
+        raise ArchiveError(f"{place}: is stored with a filter other than shuffle and deflate")
+    return dataset
+
+
+def _check(dataset: h5py.Dataset, raw: Any) -> None:
+    _compare(dataset, hashlib.sha256(raw).hexdigest())
+
+
+def _compare(dataset: h5py.Dataset, digest: str) -> None:
+    if attribute(dataset, CHECKSUM) != digest:
+        raise ArchiveError(
+            f"{dataset.file.filename}: {dataset.name}: does not match its checksum; "
+            "it was damaged or changed"
+        )
+
+
+def _place(parent: h5py.Group, name: str) -> str:
+    return f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"

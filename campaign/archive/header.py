@@ -1,0 +1,121 @@
+"""What is known about a run before its first trial, and the words for how it ended."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from campaign.trial import Role, Tree, Trial
+
+FORMAT = 1
+"""Version of the archive format (`docs/archive-format.md`); a reader reads all up to its own."""
+
+SEALED = ".nxs"
+PARTIAL = ".partial"
+
+
+class RunStatus(StrEnum):
+    """How a run stands. All but `INCOMPLETE` are written when it is sealed."""
+
+    COMPLETE = "complete"  # every planned trial ran to its end
+    FAILED_TRIALS = "failed trials"  # the plan was worked through; some trials did not complete
+    INTERRUPTED = "interrupted"  # somebody stopped it
+    FAULT = "fault"  # the backend, the bench or the archive could not go on
+    INCOMPLETE = "incomplete"  # still running, or killed: there is no word of an end
+
+
+def _run_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,199}", name):
+        raise ValueError(f"{name!r} is not a run's name: letters, digits, '.', '_', '+' and '-'")
+    return name
+
+
+def _timestamp(text: str) -> str:
+    if datetime.fromisoformat(text).tzinfo is None:
+        raise ValueError(f"{text!r} has no time zone; timestamps are ISO 8601 in UTC")
+    return text
+
+
+Timestamp = Annotated[str, AfterValidator(_timestamp)]
+
+
+class _Record(BaseModel):
+    """Frozen, and tolerant of fields that a later program added."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, use_attribute_docstrings=True)
+
+
+class RunHeader(_Record):
+    """What is known about a run before its first trial. All of it is archived."""
+
+    name: Annotated[str, AfterValidator(_run_name)]
+    """The run's name, unique in its results folder: see `new_run_name`."""
+    created: Timestamp
+    """When the run began, ISO 8601 with a time zone."""
+    title: str = ""
+    description: str = ""
+    protocol_name: str = ""
+    """What people call the protocol, e.g. `quickstart`."""
+    sources: dict[str, str] = {}
+    """Protocol, included protocols and benches, verbatim, by the path the protocol names them."""
+    normalised: Tree = {}
+    """The protocol after validation: SI, defaults filled in, includes and benches resolved."""
+    tests: tuple[Tree, ...] = ()
+    """Per test: name, kind, title, description, what it reproduces, normalised options ..."""
+    trials: int = Field(default=0, ge=0)
+    """How many trials are planned."""
+    versions: dict[str, str] = {}
+    """Python, this program and the libraries that made the samples."""
+    host: dict[str, str] = {}
+    """The machine: name, system, processor."""
+    command: tuple[str, ...] = ()
+    """The command line."""
+    operator: str = ""
+    notes: str = ""
+    tags: tuple[str, ...] = ()
+    backend: str = ""
+    backend_options: Tree = {}
+    overrides: dict[str, str] = {}
+    """What `--set` changed, dotted path to value as written."""
+    only: tuple[str, ...] = ()
+    """The tests that `--only` chose; empty for all."""
+    git_revision: str = ""
+    """Revision of the working tree the protocol lies in, where there is one."""
+    fingerprint: str = ""
+    """SHA-256 of the normalised protocol in canonical JSON."""
+
+
+class PlannedTrial(_Record):
+    """A trial of the plan, whether or not it was executed."""
+
+    number: int = Field(ge=1)
+    test: str
+    kind: str
+    role: Role = Role.MEASUREMENT
+    label: str
+    fingerprint: str
+
+    @classmethod
+    def of(cls, trial: Trial) -> Self:
+        return cls(
+            number=trial.number,
+            test=trial.test,
+            kind=trial.kind,
+            role=trial.role,
+            label=trial.label,
+            fingerprint=trial.fingerprint,
+        )
+
+
+def new_run_name(results: Path, protocol_stem: str, now: datetime) -> str:
+    """A sortable name that no run in `results` has, e.g. `2026-11-21T09-36-58-quickstart`."""
+    stem = re.sub(r"[^A-Za-z0-9._+-]+", "-", protocol_stem).strip("-.")[:120] or "run"
+    base = f"{now:%Y-%m-%dT%H-%M-%S}-{stem}"
+    taken = {path.stem for path in results.glob(f"{base}*")} if results.is_dir() else set()
+    candidates = (base if n == 1 else f"{base}-{n}" for n in range(1, len(taken) + 2))
+    return next(name for name in candidates if name not in taken)

@@ -1,0 +1,152 @@
+"""The journal of a run in progress: the truth about what finished.
+
+One JSON object per line, appended and synced before anybody is told. A kill can tear the last line
+only; a torn line was never reported, so a reader leaves it out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from campaign.archive.header import RunStatus
+from campaign.errors import ArchiveError
+from campaign.trial import Outcome, SafeState, canonical_json
+
+JOURNAL = "journal.jsonl"
+
+
+class _Line(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class RunStarted(_Line):
+    """The first line."""
+
+    event: Literal["run started"] = "run started"
+    at: str
+    run: str
+    format: int
+    trials: int
+
+
+class TrialFinished(_Line):
+    """A trial ended, however it ended, and its file is on the disk under its real name."""
+
+    event: Literal["trial finished"] = "trial finished"
+    at: str
+    trial: int = Field(ge=1)
+    file: str = Field(pattern=r"^trial-[0-9]{5,10}\.nxs$")
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    bytes: int = Field(ge=0)
+    outcome: Outcome
+    reason: str
+    safe_state: SafeState
+
+
+class TrialAbandoned(_Line):
+    """A trial was begun and nothing of it is kept."""
+
+    event: Literal["trial abandoned"] = "trial abandoned"
+    at: str
+    trial: int = Field(ge=1)
+    reason: str
+
+
+class RunEnded(_Line):
+    """The last line: the run was closed and is being, or has been, sealed."""
+
+    event: Literal["run ended"] = "run ended"
+    at: str
+    status: RunStatus
+    reason: str
+    safe_state: SafeState
+
+
+Entry = Annotated[
+    RunStarted | TrialFinished | TrialAbandoned | RunEnded, Field(discriminator="event")
+]
+_ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
+
+
+class Journal:
+    """Appends lines; each is on the disk when `append` returns. Safe to share between threads."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+
+    def append(self, entry: Entry) -> None:
+        """Add one line. Raises ArchiveError, leaving the journal as it was, when that fails."""
+        line = canonical_json(entry.model_dump(mode="json")).encode() + b"\n"
+        with self._lock:
+            before = os.fstat(self._descriptor).st_size
+            try:
+                written = os.write(self._descriptor, line)
+                if written < len(line):
+                    raise OSError("no space for a whole line")
+                os.fsync(self._descriptor)
+            except OSError as error:
+                os.ftruncate(self._descriptor, before)
+                raise ArchiveError(f"{self._path}: cannot be written: {error}") from None
+
+    def close(self) -> None:
+        with self._lock:
+            if self._descriptor >= 0:
+                os.close(self._descriptor)
+                self._descriptor = -1
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a journal tells.
+
+    Attributes:
+        started: its first line.
+        finished: by trial number, in the order of their numbers; a trial's last line counts.
+        ended: None when the run is still in progress or was killed.
+        text: the whole lines, verbatim.
+    """
+
+    started: RunStarted
+    finished: dict[int, TrialFinished]
+    ended: RunEnded | None
+    text: str
+
+
+def read_journal(path: Path) -> Story:
+    """Read a journal. Raises ArchiveError naming the line that cannot be understood."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+    lines = content.split(b"\n")[:-1]  # what follows the last line's end was never reported
+    return _tell(path, lines)
+
+
+def _tell(path: Path, lines: list[bytes]) -> Story:
+    entries = list(_parse(path, lines))
+    if not entries or not isinstance(entries[0], RunStarted):
+        raise ArchiveError(f"{path}: does not begin with the start of a run")
+    finished = {e.trial: e for e in entries if isinstance(e, TrialFinished)}
+    ended = [e for e in entries if isinstance(e, RunEnded)]
+    text = b"".join(line + b"\n" for line in lines[: len(entries)]).decode()
+    return Story(entries[0], dict(sorted(finished.items())), ended[-1] if ended else None, text)
+
+
+def _parse(path: Path, lines: list[bytes]) -> Iterable[Entry]:
+    for number, line in enumerate(lines, start=1):
+        try:
+            yield _ENTRY.validate_python(json.loads(line))
+        except (ValidationError, ValueError, RecursionError):
+            if number == len(lines):  # a power cut may leave a last line of rubbish
+                return
+            raise ArchiveError(f"{path}:{number}: is not a line of a journal") from None

@@ -1,0 +1,144 @@
+"""Which runs a results folder has, and which one a user means."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive.header import PARTIAL, SEALED, RunStatus
+from campaign.archive.journal import JOURNAL, read_journal
+from campaign.archive.run_folder import read_header
+from campaign.errors import ArchiveError, UsageError
+from campaign.trial import Outcome
+
+_DATED = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}-\d{2}-\d{2}-")
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """One line of `campaign list`.
+
+    Attributes:
+        trials: finished ones, failed ones included; `planned` counts the whole plan.
+        problem: why the run cannot be read; everything but name, path and bytes is empty then.
+    """
+
+    name: str
+    path: Path
+    bytes: int
+    created: str = ""
+    status: RunStatus | None = None
+    protocol: str = ""
+    backend: str = ""
+    planned: int = 0
+    trials: int = 0
+    failed: int = 0
+    problem: str = ""
+
+
+def list_runs(results: Path) -> list[RunSummary]:
+    """Every run in `results`, oldest first; a bad file is listed with its problem."""
+    return [summarise(path) for path in run_paths(results)]
+
+
+def summarise(path: Path) -> RunSummary:
+    """A run at a glance, without its trials."""
+    size = 0
+    try:
+        if path.is_dir():
+            size = sum(file.stat().st_size for file in path.iterdir())
+            return _summarise_folder(path, size)
+        size = path.stat().st_size
+        return _summarise_file(path, size)
+    except ArchiveError as error:
+        return RunSummary(path.stem, path, size, problem=str(error))
+    except OSError as error:
+        return RunSummary(path.stem, path, size, problem=f"{path}: {error.strerror}")
+
+
+def run_paths(results: Path) -> list[Path]:
+    """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder."""
+    try:
+        found = sorted(results.iterdir()) if results.exists() else []
+    except OSError as error:
+        raise UsageError(f"{results}: cannot be read: {error.strerror}") from None
+    sealed = {path.stem: path for path in found if path.suffix == SEALED and path.is_file()}
+    partial = {path.stem: path for path in found if path.suffix == PARTIAL and path.is_dir()}
+    runs = partial | sealed
+    return [runs[name] for name in sorted(runs, key=lambda name: (bool(_DATED.match(name)), name))]
+
+
+def find_run(results: Path, name: str | None = None) -> Path:
+    """The run that a user means: a path, a name, a unique beginning of one, or None for the newest.
+
+    Raises UsageError listing what there is when it is none or several.
+    """
+    if name and (path := _as_path(name)):
+        return path
+    runs = {path.stem: path for path in run_paths(results)}
+    if not runs:
+        raise UsageError(f"{results}: there are no runs; `campaign run` makes one")
+    if name is None:
+        return list(runs.values())[-1]
+    wanted = name.removesuffix(SEALED).removesuffix(PARTIAL)
+    if wanted in runs:
+        return runs[wanted]
+    matching = [run for run in runs if wanted and run.startswith(wanted)]
+    if len(matching) == 1:
+        return runs[matching[0]]
+    if matching:
+        raise UsageError(f"{name!r} begins several runs: {_some(matching)}")
+    raise UsageError(f"{results}: there is no run {name!r}; there are {_some(list(runs))}")
+
+
+def _as_path(name: str) -> Path | None:
+    for path in (Path(name), Path(name + SEALED), Path(name + PARTIAL)):
+        if path.is_file() or (path.is_dir() and path.suffix == PARTIAL):
+            return path
+    return None
+
+
+def _some(names: list[str]) -> str:
+    latest = names[-10:]
+    return ", ".join(latest) + (f" and {len(names) - 10} more" if len(names) > 10 else "")
+
+
+def _summarise_folder(folder: Path, size: int) -> RunSummary:
+    header = read_header(folder)
+    story = read_journal(folder / JOURNAL)
+    return RunSummary(
+        name=folder.stem,
+        path=folder,
+        bytes=size,
+        created=header.created,
+        status=story.ended.status if story.ended else RunStatus.INCOMPLETE,
+        protocol=header.protocol_name,
+        backend=header.backend,
+        planned=header.trials,
+        trials=len(story.finished),
+        failed=sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values()),
+    )
+
+
+def _summarise_file(path: Path, size: int) -> RunSummary:
+    from campaign.archive import guarded
+    from campaign.archive.reader import check_trailer, read_provenance
+
+    check_trailer(path)
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        run = guarded.group_at(file, "run", "NXentry")
+        header = read_provenance(path, run)
+        outcome = guarded.group_at(run, "outcome", "NXcollection")
+        return RunSummary(
+            name=path.stem,
+            path=path,
+            bytes=size,
+            created=header.created,
+            status=RunStatus(guarded.text_at(outcome, "status")),
+            protocol=header.protocol_name,
+            backend=header.backend,
+            planned=header.trials,
+            trials=guarded.integer_at(outcome, "trials_finished"),
+            failed=guarded.integer_at(outcome, "trials_failed"),
+        )

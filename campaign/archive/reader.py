@@ -1,0 +1,221 @@
+"""Reading a run: the sealed file, or the folder of one that is in progress or was killed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from campaign.archive.files import PART, sha256_of, trailer_holds, trailer_stands
+from campaign.archive.header import PARTIAL, PlannedTrial, RunHeader, RunStatus
+from campaign.archive.journal import JOURNAL, read_journal
+from campaign.archive.run_folder import (
+    check_format,
+    first_line,
+    parse_plan,
+    read_header,
+    read_plan_text,
+)
+from campaign.errors import ArchiveError
+from campaign.trial import Ending, Recording, SafeState, Tree, Trial
+
+if TYPE_CHECKING:
+    import h5py
+
+
+@dataclass(frozen=True)
+class ArchivedTrial:
+    """A trial in an archive; what an analysis calls `TrialData`.
+
+    Attributes:
+        trial: as it was executed.
+        ending: how it ended and why.
+        started, ended: ISO 8601.
+        path: the file it lies in: the sealed run, or its own while the run is in progress.
+        entry: its group there.
+    """
+
+    trial: Trial
+    ending: Ending
+    started: str
+    ended: str
+    path: Path
+    entry: str
+
+    def recording(self) -> Recording:
+        """The samples, SI, read now. Raises ArchiveError when one fails its checksum."""
+        from campaign.archive.trial_reading import read_recording
+
+        return read_recording(self.path, self.entry, self.ending)
+
+    def problems(self) -> Iterator[str]:
+        """Reads every sample in flat memory; what is damaged, by trial and channel."""
+        from campaign.archive.trial_reading import check_recording
+
+        return check_recording(self.path, self.entry)
+
+
+@dataclass(frozen=True)
+class RunReader:
+    """An archived run. Samples are read only when a trial's `recording()` is asked for.
+
+    Attributes:
+        path: the sealed file, or the folder of a run in progress.
+        header: what was known before the first trial.
+        status, reason, safe_state: how the run ended. An `incomplete` run has no word of its end,
+            and its bench is not known to be safe.
+        ended: ISO 8601; empty when incomplete.
+        plan: every planned trial, executed or not.
+        trials: the executed ones, in plan order, failed ones included.
+        journal: verbatim.
+    """
+
+    path: Path
+    header: RunHeader
+    status: RunStatus
+    reason: str
+    safe_state: SafeState
+    ended: str
+    plan: tuple[PlannedTrial, ...]
+    trials: tuple[ArchivedTrial, ...]
+    journal: str = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        return self.header.name
+
+    @property
+    def tests(self) -> tuple[Tree, ...]:
+        """The protocol's tests: name, kind, title, normalised options ..."""
+        return self.header.tests
+
+    def trials_of(self, test: str) -> tuple[ArchivedTrial, ...]:
+        """The executed trials of one test, in plan order."""
+        return tuple(trial for trial in self.trials if trial.trial.test == test)
+
+    @property
+    def sealed(self) -> bool:
+        return self.path.is_file()
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the sealed file as `sha256sum` prints it; of the journal while in progress."""
+        return sha256_of(self.path if self.sealed else self.path / JOURNAL)
+
+    def unchanged(self) -> bool:
+        """Whether every byte of the sealed file is as it was written (reads it all)."""
+        return self.sealed and trailer_holds(self.path)
+
+    def problems(self) -> list[str]:
+        """What in the samples is damaged (reads them all, in flat memory); empty when sound."""
+        return [problem for trial in self.trials for problem in trial.problems()]
+
+
+def open_run(path: Path) -> RunReader:
+    """Open a sealed run, or the folder of a run in progress.
+
+    Raises ArchiveError, naming file and place, when it is none or is damaged.
+    """
+    if path.is_dir():
+        return _open_folder(path)
+    if path.suffix == PART:
+        raise ArchiveError(f"{path}: was never finished; what was is in the run's folder")
+    check_trailer(path)
+    return read_sealed(path)
+
+
+def check_trailer(path: Path) -> None:
+    """ArchiveError when the file does not end the way a sealed one does. Reads only its end."""
+    from campaign.archive import guarded
+
+    with guarded.open_file(path), guarded.guarded(path):
+        if not trailer_stands(path):
+            raise ArchiveError(
+                f"{path}: is HDF5 but not a whole archive: its end is missing or was changed"
+            )
+
+
+def read_sealed(path: Path) -> RunReader:
+    """Read a sealed file's structure, whatever its name; its trailer is not looked at."""
+    from campaign.archive import guarded
+    from campaign.archive.trial_reading import read_trials
+
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        run = guarded.group_at(file, "run", "NXentry")
+        header = read_provenance(path, run)
+        outcome = guarded.group_at(run, "outcome", "NXcollection")
+        return RunReader(
+            path=path,
+            header=header,
+            status=RunStatus(guarded.text_at(outcome, "status")),
+            reason=guarded.text_at(outcome, "reason"),
+            safe_state=SafeState(guarded.text_at(outcome, "safe_state")),
+            ended=guarded.text_at(run, "end_time"),
+            plan=parse_plan(path, _note(run, "plan")),
+            trials=tuple(read_trials(path, file)),
+            journal=_note(run, "journal"),
+        )
+
+
+def read_provenance(path: Path, run: h5py.Group) -> RunHeader:
+    """The header of a sealed run."""
+    from campaign.archive import guarded
+
+    provenance = guarded.group_at(run, "provenance", "NXcollection")
+    check_format(path, guarded.integer_at(provenance, "format"))
+    tree: dict[str, object] = {"sources": dict(_sources(run))}
+    for name, info in RunHeader.model_fields.items():
+        if name == "sources" or (name not in provenance and not info.is_required()):
+            continue
+        text = guarded.text_at(provenance, name)
+        tree[name] = text if info.annotation is str else _json(path, name, text)
+    try:
+        return RunHeader.model_validate(tree)
+    except ValueError as error:
+        raise ArchiveError(f"{path}: /run/provenance: {first_line(error)}") from None
+
+
+def _sources(run: h5py.Group) -> Iterator[tuple[str, str]]:
+    from campaign.archive import guarded
+
+    for name in guarded.names(run):
+        if name.startswith("source_"):
+            note = guarded.group_at(run, name, "NXnote")
+            yield guarded.text_at(note, "file_name"), guarded.text_at(note, "data")
+
+
+def _note(run: h5py.Group, name: str) -> str:
+    from campaign.archive import guarded
+
+    return guarded.text_at(guarded.group_at(run, name, "NXnote"), "data")
+
+
+def _json(path: Path, name: str, text: str) -> object:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ArchiveError(f"{path}: /run/provenance/{name}: {first_line(error)}") from None
+
+
+def _open_folder(folder: Path) -> RunReader:
+    from campaign.archive.trial_reading import read_trial_file
+
+    if folder.suffix != PARTIAL:
+        raise ArchiveError(f"{folder}: is a folder, but not that of a run in progress")
+    header = read_header(folder)
+    story = read_journal(folder / JOURNAL)
+    ended = story.ended
+    return RunReader(
+        path=folder,
+        header=header,
+        status=ended.status if ended else RunStatus.INCOMPLETE,
+        reason=ended.reason if ended else "the run is in progress or was killed",
+        safe_state=ended.safe_state if ended else SafeState.NOT_CONFIRMED,
+        ended=ended.at if ended else "",
+        plan=parse_plan(folder, read_plan_text(folder)),
+        trials=tuple(read_trial_file(folder / f.file, n) for n, f in story.finished.items()),
+        journal=story.text,
+    )

@@ -1,0 +1,144 @@
+"""From the folder of a run to the one file that is kept."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+
+from campaign.archive import hdf5
+from campaign.archive.files import PART, append_trailer, publish, sha256_of, sync_folder
+from campaign.archive.header import FORMAT, SEALED, RunHeader
+from campaign.archive.journal import JOURNAL, RunEnded, Story, TrialFinished, read_journal
+from campaign.archive.reader import read_sealed
+from campaign.archive.run_folder import PLAN, parse_plan, read_header, read_plan_text
+from campaign.archive.trial_file import entry_name, write_root
+from campaign.errors import ArchiveError
+from campaign.trial import Outcome, canonical_json
+
+
+def seal_folder(folder: Path) -> Path:
+    """Make one file of a run's folder, check it, and only then remove the folder.
+
+    The folder's journal says which trials there are. Raises ArchiveError, leaving the folder as it
+    is and no file, when a trial is not what the journal says or the disk is full.
+    """
+    sealed = folder.with_suffix(SEALED)
+    part = sealed.with_name(sealed.name + PART)
+    try:
+        _write(folder, part)
+        _verify(part)
+        append_trailer(part)
+        publish(part, sealed)
+    except (OSError, RuntimeError, ValueError, ArchiveError) as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise ArchiveError(
+            f"{sealed}: could not be sealed: {error}; every finished trial is in {folder}"
+        ) from None
+    with contextlib.suppress(OSError):  # a remnant does no harm: the sealed file goes first
+        shutil.rmtree(folder)
+        sync_folder(folder.parent)
+    return sealed
+
+
+def _write(folder: Path, part: Path) -> None:
+    header = read_header(folder)
+    story = read_journal(folder / JOURNAL)
+    if story.ended is None:
+        raise ArchiveError(f"{folder / JOURNAL}: the run has not ended")
+    with _create(part) as file:
+        _write_run(file, header, story, story.ended, read_plan_text(folder))
+        for finished in story.finished.values():
+            _copy_trial(folder, finished, file)
+        write_root(file, header.created, _shown(file, folder, story))
+
+
+@contextlib.contextmanager
+def _create(part: Path) -> Iterator[h5py.File]:
+    """A new file; after an error its handle is let go of without a second error on top."""
+    file = h5py.File(part, "w", locking=False)
+    try:
+        yield file
+    except BaseException:
+        with contextlib.suppress(OSError, RuntimeError, ValueError):
+            file.close()
+        raise
+    file.close()
+
+
+def _copy_trial(folder: Path, finished: TrialFinished, target: h5py.File) -> None:
+    path = folder / finished.file
+    if sha256_of(path) != finished.sha256:
+        raise ArchiveError(f"{path}: is not what the journal says was written")
+    name = entry_name(finished.trial)
+    with h5py.File(path, "r", locking=False) as source:
+        hdf5.copy_group(source[name], target.create_group(name))
+
+
+def _write_run(
+    file: h5py.File, header: RunHeader, story: Story, ended: RunEnded, plan: str
+) -> None:
+    run = hdf5.make_group(file, "run", "NXentry")
+    hdf5.put_text(run, "title", header.title or header.protocol_name or header.name)
+    hdf5.put_text(run, "entry_identifier", header.name)
+    hdf5.put_text(run, "start_time", header.created)
+    hdf5.put_text(run, "end_time", ended.at)
+    hdf5.put_text(
+        run, "program_name", "campaign", version=header.versions.get("campaign", "unknown")
+    )
+    for number, (name, text) in enumerate(sorted(header.sources.items()), start=1):
+        _note(run, f"source_{number:03d}", "application/toml", name, text)
+    _note(run, "plan", "application/jsonl", PLAN, plan)
+    _note(run, "journal", "application/jsonl", JOURNAL, story.text)
+    _write_provenance(run, header)
+    _write_outcome(run, story, ended)
+
+
+def _write_provenance(run: h5py.Group, header: RunHeader) -> None:
+    """One dataset per field of the header: text as it is, everything else as canonical JSON."""
+    provenance = hdf5.make_group(run, "provenance", "NXcollection")
+    hdf5.put_integer(provenance, "format", FORMAT)
+    for field, value in header.model_dump(mode="json", exclude={"sources"}).items():
+        text = value if isinstance(value, str) else canonical_json(value)
+        hdf5.put_text(provenance, field, text)
+
+
+def _write_outcome(run: h5py.Group, story: Story, ended: RunEnded) -> None:
+    outcome = hdf5.make_group(run, "outcome", "NXcollection")
+    failed = sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values())
+    hdf5.put_text(outcome, "status", ended.status)
+    hdf5.put_text(outcome, "reason", ended.reason)
+    hdf5.put_text(outcome, "safe_state", ended.safe_state)
+    hdf5.put_integer(outcome, "trials_finished", len(story.finished))
+    hdf5.put_integer(outcome, "trials_failed", failed)
+
+
+def _note(run: h5py.Group, name: str, kind: str, file_name: str, text: str) -> None:
+    note = hdf5.make_group(run, name, "NXnote")
+    hdf5.put_text(note, "type", kind)
+    hdf5.put_text(note, "file_name", file_name)
+    hdf5.put_text(note, "data", text)
+
+
+def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:
+    """What a viewer opens first: the first completed measurement, else the first with samples."""
+    roles = {p.number: p.role for p in parse_plan(folder, read_plan_text(folder))}
+    with_samples = [n for n in story.finished if "data" in file[entry_name(n)]]
+    telling = [
+        n
+        for n in with_samples
+        if story.finished[n].outcome is Outcome.COMPLETED and roles.get(n) == "measurement"
+    ]
+    best = (telling or with_samples)[:1]
+    return file[entry_name(best[0])] if best else None
+
+
+def _verify(part: Path) -> None:
+    """Read back every dataset of the new file against its checksum."""
+    problems = read_sealed(part).problems()
+    if problems:
+        raise ArchiveError("; ".join(problems[:3]))

@@ -1,0 +1,210 @@
+"""One trial's file while it is written, and the layout of a trial in every archive.
+
+`trial-00017.nxs` holds one NXentry called `trial_00017` (NeXus allows no hyphen in a name), which
+sealing copies as it is. A trial file is therefore a small archive of its own: any NeXus viewer
+shows what is left of a killed run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.archive import hdf5
+from campaign.archive.files import PART, publish, sha256_of
+from campaign.archive.header import SEALED
+from campaign.archive.preview import PREVIEW_POINTS, Preview
+from campaign.errors import ArchiveError, BackendError
+from campaign.trial import ChannelInfo, Ending, Event, Trial, canonical_json
+
+Array = NDArray[np.float64]
+
+TIME_LABEL = "Time"
+_CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
+
+
+def entry_name(trial_number: int) -> str:
+    """Name of a trial's group: `trial_00017` for the trial that is called `trial-00017`."""
+    return f"trial_{trial_number:05d}"
+
+
+@dataclass(frozen=True)
+class FinishedFile:
+    """A trial file that is whole and on the disk."""
+
+    name: str
+    sha256: str
+    bytes: int
+
+
+class TrialFile:
+    """Takes a trial's samples as they come (a `Recorder`); closed, it is whole and on the disk."""
+
+    def __init__(self, folder: Path, trial: Trial) -> None:
+        self._trial = trial
+        self._final = folder / f"{trial.name}{SEALED}"
+        self._part = folder / f"{trial.name}{SEALED}{PART}"
+        self._channels: tuple[ChannelInfo, ...] = ()
+        self._columns: hdf5.SampleColumns | None = None
+        self._preview = Preview()
+        self._events: list[Event] = []
+        try:
+            self._file = h5py.File(self._part, "w", locking=False)
+        except OSError as error:
+            raise ArchiveError(f"{self._part}: cannot be written: {error}") from None
+        self._entry = hdf5.make_group(self._file, entry_name(trial.number), "NXentry")
+
+    def start(self, channels: tuple[ChannelInfo, ...]) -> None:
+        """Announce the channels. The first is the one the default plot shows."""
+        if self._columns is not None:
+            raise BackendError(f"{self._trial.name}: the channels were announced twice")
+        _check_names(self._trial, channels)
+        self._channels = channels
+        data = _plot_group(self._entry, "data", self._trial, channels)
+        attributes = {"time": _time_attributes()} | {c.name: _attributes(c) for c in channels}
+        self._columns = hdf5.SampleColumns(data, attributes)
+
+    def append(self, time: Array, block: Array) -> None:
+        """Add samples: `time` (n,) in s, `block` (channels, n); ArchiveError on a full disk."""
+        if self._columns is None:
+            raise BackendError(f"{self._trial.name}: samples came before the channels' names")
+        if time.ndim != 1 or block.shape != (len(self._channels), len(time)):
+            raise BackendError(
+                f"{self._trial.name}: samples of shape {block.shape} do not fit times of shape "
+                f"{time.shape} and {len(self._channels)} channels"
+            )
+        with self._writing():
+            for chunk in self._columns.append([time, *block]):
+                self._preview.add(chunk[0], chunk[1])
+
+    def event(self, event: Event) -> None:
+        self._events.append(event)
+
+    def close(self, ending: Ending, started: str, ended: str) -> FinishedFile:
+        """Write the rest, put it on the disk and give the file its real name."""
+        with self._writing():
+            self._finish_samples()
+            _write_record(self._entry, self._trial, ending, self._events)
+            hdf5.put_text(self._entry, "title", self._trial.label)
+            hdf5.put_text(self._entry, "entry_identifier", self._trial.name)
+            hdf5.put_text(self._entry, "start_time", started)
+            hdf5.put_text(self._entry, "end_time", ended)
+            write_root(self._file, started, self._entry)
+            self._file.close()
+            digest, size = sha256_of(self._part), self._part.stat().st_size
+            publish(self._part, self._final)
+        return FinishedFile(self._final.name, digest, size)
+
+    def discard(self) -> None:
+        """Leave nothing of it. Never fails: what cannot be removed is no archive by its name."""
+        with contextlib.suppress(OSError, RuntimeError, ValueError):
+            self._file.close()
+        with contextlib.suppress(OSError):
+            self._part.unlink(missing_ok=True)
+
+    def _finish_samples(self) -> None:
+        if self._columns is None:
+            return
+        rest = self._columns.finish()
+        self._preview.add(rest[0], rest[1])
+        hdf5.attach_time(self._entry["data"])
+        shown = "data"
+        if self._columns.length > PREVIEW_POINTS:
+            shown = "preview"
+            _write_preview(self._entry, self._trial, self._channels[0], self._preview)
+        self._entry.attrs["default"] = shown
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """A failure to write leaves no part file behind and says which trial is lost."""
+        try:
+            yield
+        except (OSError, RuntimeError, ValueError) as error:
+            self.discard()
+            raise ArchiveError(
+                f"{self._part}: cannot be written: {error}; this trial is not archived, "
+                "the finished ones are"
+            ) from None
+
+
+def write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
+    """The attributes of a file's root; `shown` is the entry that viewers open first."""
+    from campaign import __version__
+
+    file.attrs["NX_class"] = "NXroot"
+    file.attrs["creator"] = "campaign"
+    file.attrs["creator_version"] = __version__
+    file.attrs["file_time"] = created
+    if shown is not None:
+        file.attrs["default"] = shown.name.lstrip("/")
+
+
+def _write_record(entry: h5py.Group, trial: Trial, ending: Ending, events: list[Event]) -> None:
+    record = hdf5.make_group(entry, "record", "NXcollection")
+    hdf5.put_text(record, "trial", canonical_json(trial.model_dump(mode="json")))
+    hdf5.put_text(record, "test", trial.test)
+    hdf5.put_text(record, "kind", trial.kind)
+    hdf5.put_text(record, "role", trial.role)
+    hdf5.put_text(record, "fingerprint", trial.fingerprint)
+    hdf5.put_integer(record, "seed", trial.seed)
+    hdf5.put_text(record, "outcome", ending.outcome)
+    hdf5.put_text(record, "reason", ending.reason)
+    hdf5.put_text(record, "safe_state", ending.safe_state)
+    told = [{"time": float(event.time), "text": event.text} for event in events]
+    hdf5.put_text(record, "events", canonical_json(told))
+
+
+def _write_preview(entry: h5py.Group, trial: Trial, channel: ChannelInfo, preview: Preview) -> None:
+    group = _plot_group(entry, "preview", trial, (channel,))
+    times, values = preview.points()
+    attributes = {"time": _time_attributes(), channel.name: _attributes(channel)}
+    columns = hdf5.SampleColumns(group, attributes)
+    columns.append([times, values])
+    columns.finish()
+    hdf5.attach_time(group)
+
+
+def _plot_group(
+    entry: h5py.Group, name: str, trial: Trial, channels: tuple[ChannelInfo, ...]
+) -> h5py.Group:
+    group = hdf5.make_group(entry, name, "NXdata")
+    group.attrs["signal"] = channels[0].name
+    if channels[1:]:
+        group.attrs["auxiliary_signals"] = [channel.name for channel in channels[1:]]
+    group.attrs["axes"] = ["time"]
+    group.attrs["time_indices"] = np.array([0], dtype="<i4")
+    hdf5.put_text(group, "title", trial.label)
+    return group
+
+
+def _attributes(channel: ChannelInfo) -> dict[str, object]:
+    return {
+        "units": channel.unit,
+        "long_name": f"{channel.label} ({channel.unit})" if channel.unit else channel.label,
+        "label": channel.label,
+        "display_units": channel.display_unit,
+        "measured": np.int8(channel.measured),
+    }
+
+
+def _time_attributes() -> dict[str, object]:
+    return {"units": "s", "long_name": f"{TIME_LABEL} (s)"}
+
+
+def _check_names(trial: Trial, channels: tuple[ChannelInfo, ...]) -> None:
+    names = [channel.name for channel in channels]
+    if not names:
+        raise BackendError(f"{trial.name}: a recording needs at least one channel")
+    for name in names:
+        if not _CHANNEL_NAME.fullmatch(name) or name == "time" or names.count(name) > 1:
+            raise BackendError(
+                f"{trial.name}: {name!r} cannot name a channel: letters, digits and '_', "
+                "not 'time', and each once"
+            )
