@@ -44,7 +44,10 @@ class Task(Options):
             it is a sine, and starts from rest otherwise.
         compensation: name of a compensation method that the bench has parameters for, or `none`.
         duration: length of the trial (s).
-        window: the part of it that an analysis uses (start, stop) (s).
+        window: the part of it that an analysis uses (start, stop) (s). An experiment that measures
+            several windows in one trial spans them here and derives them from its options.
+        stop_rate: the trial is complete as soon as the relative rate passes this (rad/s); absent:
+            it lasts its whole duration.
         sample_rate: of the recording (Hz).
         start_angle: where the load stands relative to the hull when the trial begins (rad).
     """
@@ -57,6 +60,7 @@ class Task(Options):
     window: tuple[float, float]
     sample_rate: float = Field(gt=0)
     start_angle: float = 0.0
+    stop_rate: float | None = Field(default=None, gt=0)
 
 
 class Trial(Options):

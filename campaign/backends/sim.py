@@ -98,11 +98,15 @@ class SimBackend:
                     load_rate,
                 ]
             )
-            end, ending = _first_violation(bench.limits, time, block)
+            reached = _first_beyond(relative, task.stop_rate)
+            end, ending = _first_violation(bench.limits, time[:reached], block[:, :reached])
             recorder.append(time[:end], block[:, :end])
             if ending is not None:
                 recorder.event(Event(float(time[min(end, len(time) - 1)]), ending.reason))
                 return ending
+            if reached < len(time):
+                recorder.event(Event(float(time[reached]), "the rate that ends the trial was reached"))
+                return Ending(Outcome.COMPLETED)
             if stopped():
                 return Ending(Outcome.INTERRUPTED, "stopped by the operator")
         return Ending(Outcome.COMPLETED)
@@ -114,6 +118,14 @@ class SimBackend:
 
 def _bench(trial: Trial) -> Bench:
     return Bench.model_validate(trial.bench, context={"si": True})
+
+
+def _first_beyond(samples: Array, bound: float | None) -> int:
+    """Index of the first sample beyond `bound` either way; all of them when there is none."""
+    if bound is None:
+        return len(samples)
+    beyond = np.abs(samples) > bound
+    return int(np.argmax(beyond)) if beyond.any() else len(samples)
 
 
 def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[int, Ending | None]:

@@ -15,6 +15,10 @@ import numpy as np
 
 from campaign.identification.least_squares import Array, Fit, Parameter, fit
 
+SMALLEST_SHARE = 0.02
+"""of the breakaway torque that a second interface must carry to be believed: the ramp's own start
+(the load must first be accelerated) bends the curve by less."""
+
 
 @dataclass(frozen=True)
 class Presliding:
@@ -133,7 +137,7 @@ def _fit_window(
             Parameter("stiffness_1", 0.01 * slope, 1e4 * slope, (slope,)),
             Parameter("torque_1", 0.3 * breakaway, 30.0 * breakaway, (0.8 * breakaway,)),
             Parameter("stiffness_2", 0.01 * slope, 1e4 * slope, (first, 5.0 * first)),
-            Parameter("torque_2", 1e-3 * breakaway, 0.5 * breakaway, (0.15 * breakaway,)),
+            Parameter("torque_2", SMALLEST_SHARE * breakaway, 0.5 * breakaway, (0.15 * breakaway,)),
         ],
     )
     return (two if two.bic < one.bic - 10.0 and not two.doubts else one), slope

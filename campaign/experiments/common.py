@@ -1,0 +1,64 @@
+"""What several analyses need: groups of trials, conditions for findings, picks from a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from campaign.experiments.interface import TestData, TrialData
+from campaign.result import Value
+from campaign.trial import canonical_json
+
+METHOD_LABELS = {
+    "none": "no compensation",
+    "static": "static model",
+    "lugre": "LuGre model",
+    "observer": "disturbance observer",
+}
+
+
+def method_label(name: str) -> str:
+    """A compensation as it is called on the page; a bench's own name stands for itself."""
+    return METHOD_LABELS.get(name, name)
+
+
+def grouped(
+    trials: Iterable[TrialData], own: Sequence[str] = ()
+) -> dict[str, tuple[TrialData, ...]]:
+    """Trials by their place in the sweep, in plan order; `own` names what the sweep is not about.
+
+    Repetitions of a place are in one group. The keys are canonical JSON of the point.
+    """
+    groups: dict[str, list[TrialData]] = {}
+    for data in trials:
+        point = {path: v for path, v in data.trial.point.items() if path not in own}
+        groups.setdefault(canonical_json(point), []).append(data)
+    return {key: tuple(group) for key, group in groups.items()}
+
+
+def swept(data: TestData, own: Sequence[str] = ()) -> tuple[str, ...]:
+    """Dotted paths that the test's matrix sweeps, in the order they were written."""
+    paths: dict[str, None] = {}
+    for item in data.trials:
+        paths |= {path: None for path in item.trial.point if path not in own}
+    return tuple(paths)
+
+
+def conditions(data: TrialData, *names: str) -> dict[str, Value]:
+    """Options of the trial by name, and its whole sweep point, for findings and table rows."""
+    options: Mapping[str, object] = data.trial.options
+    found: dict[str, Value] = {}
+    for name, value in [*((n, options.get(n)) for n in names), *data.trial.point.items()]:
+        if value is None or isinstance(value, str | int | float | bool):
+            found[name] = value
+    return found
+
+
+def failures_note(data: TestData) -> tuple[str, ...]:
+    """A sentence when trials are missing from the analysis."""
+    failed = [item for item in data.trials if item.ending.outcome != "completed"]
+    if not failed:
+        return ()
+    return (
+        f"{len(failed)} of {len(data.trials)} trials did not complete and are not analysed; "
+        "the table of failed trials says why.",
+    )

@@ -1,0 +1,311 @@
+"""Stabilization under base motion: how still the load stays in space, by compensation method.
+
+The hull swings with a sinusoidal acceleration, the rate command is zero, and the standard deviation
+of the integrated gyro rate over whole cycles is the stabilization error (sections 5.2 and 5.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pydantic import Field
+
+from campaign.experiments.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table
+from campaign.signals import Sine
+from campaign.trial import Recording, Task, TrialRequest
+from campaign.units import AngularAcceleration, Frequency
+
+TIME = Axis("Time", "s", "s")
+RELATIVE_RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
+ERROR = Axis("Position error", "rad", "mrad")
+SHOWN_CYCLES = 1.5
+"""of the base motion in a time history; more cycles only make the reversals smaller."""
+ZOOM_RATE = 0.02
+"""Half height of the zoom on a reversal, as a share of the largest relative rate."""
+
+
+class StabilizationOptions(Options):
+    """Options of a stabilization test."""
+
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the base motion."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
+    """Amplitude of the base's angular acceleration."""
+    compensation: str = "none"
+    """Compensation method, by its name on the bench; none for none."""
+    cycles: int = Field(default=6, ge=1, le=10_000)
+    """Whole cycles of the base motion that are measured."""
+    settle_cycles: int = Field(default=2, ge=0, le=1_000)
+    """Cycles before them, for the transient to pass."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialRequest]:
+    start = options.settle_cycles / options.frequency
+    stop = start + options.cycles / options.frequency
+    yield TrialRequest(
+        Task(
+            mode="rate",
+            base_acceleration=Sine(amplitude=options.acceleration, frequency=options.frequency),
+            compensation=options.compensation,
+            duration=stop,
+            window=(start, stop),
+            sample_rate=options.sample_rate,
+        ),
+        note=f"{options.cycles} cycles measured after {options.settle_cycles} to settle",
+    )
+
+
+def stabilization_error(recording: Recording, frequency: float) -> float:
+    """Standard deviation (rad) of the pointing error over the whole cycles of `recording`."""
+    samples = recording["pointing_error"]
+    rate = (len(recording.time) - 1) / float(np.ptp(recording.time))
+    whole = int(len(samples) * frequency / rate + 1e-6)
+    count = round(whole * rate / frequency) if whole else len(samples)
+    return float(np.std(samples[:count]))
+
+
+def stuck_share(recording: Recording) -> float:
+    """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate."""
+    threshold = 0.001 * float(np.max(np.abs(recording["base_rate"])))
+    return float(np.mean(np.abs(recording["relative_rate"]) < threshold))
+
+
+def _measure(data: TrialData) -> tuple[float, float, float]:
+    """Error (rad, 1 sigma), largest deviation from the mean (rad), stuck share of one trial."""
+    recording = data.recording().window(*data.trial.task.window)
+    signal = data.trial.task.base_acceleration
+    frequency = signal.frequency if isinstance(signal, Sine) else 1.0 / float(np.ptp(recording.time))
+    position = recording["pointing_error"]
+    peak = float(np.max(np.abs(position - np.mean(position))))
+    return stabilization_error(recording, frequency), peak, stuck_share(recording)
+
+
+def _analyse(data: TestData) -> Result:
+    groups = grouped(data.completed())
+    paths = swept(data)
+    columns = ["compensation", "frequency", "acceleration"]
+    rows, findings = [], []
+    for group in groups.values():
+        measures = np.array([_measure(item) for item in group])
+        error, peak, stuck = measures.mean(axis=0)
+        told = conditions(group[0], *columns)
+        findings.append(Finding("stabilization_error", float(error), "rad", told))
+        spread = float(np.std(measures[:, 0], ddof=1)) if len(group) > 1 else None
+        row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
+        rows.append(row | {"repeats": len(group), "spread": spread})
+    extra = [path for path in paths if path not in columns]
+    table = Table(
+        key="stabilization-error",
+        title="Stabilization error by compensation method",
+        columns=(
+            Column("compensation", "Compensation"),
+            Column("frequency", "Frequency", "Hz", "Hz"),
+            Column("acceleration", "Base acceleration", "rad/s^2", "deg/s^2"),
+            *(Column(path, path) for path in extra),
+            Column("error", "Error (1σ)", "rad", "mrad"),
+            Column("peak", "Largest error", "rad", "mrad"),
+            Column("stuck", "Time stuck", "", "percent"),
+            *(
+                (Column("repeats", "Repeats"), Column("spread", "Spread (1σ)", "rad", "mrad"))
+                if any(row["repeats"] > 1 for row in rows)
+                else ()
+            ),
+        ),
+        rows=tuple(rows),
+        thesis=("5.2", "5.8"),
+        note="The error is the standard deviation of the integrated gyro rate over whole cycles.",
+    )
+    figures = tuple(_figures(data, [group[0] for group in groups.values()], paths, rows))
+    ratios = tuple(_reductions(findings))
+    return Result((table,), figures, tuple(findings) + ratios, failures_note(data))
+
+
+def _reductions(findings: list[Finding]) -> Iterator[Finding]:
+    """Error without compensation over error with each method, where all else is equal."""
+
+    def rest(finding: Finding) -> dict[str, object]:
+        return {k: v for k, v in finding.conditions.items() if k != "compensation"}
+
+    bare = [f for f in findings if f.conditions.get("compensation") == "none"]
+    for finding in findings:
+        for reference in bare:
+            if finding is not reference and rest(finding) == rest(reference) and finding.value > 0:
+                ratio = reference.value / finding.value
+                yield Finding("error_reduction", ratio, "", finding.conditions)
+
+
+def _figures(
+    data: TestData, firsts: list[TrialData], paths: tuple[str, ...], rows: list[dict[str, object]]
+) -> Iterator[Figure]:
+    shown = _one_per_method(firsts)
+    if shown:
+        yield _rate_figure(shown)
+        yield _error_figure(shown)
+        if any(name != "none" for name in shown):
+            yield _torque_figure(shown)
+    numeric = [
+        path
+        for path in paths
+        if path != "compensation"
+        and len({row.get(path) for row in rows if isinstance(row.get(path), int | float)}) > 2
+    ]
+    for path in numeric[:2]:
+        yield _sweep_figure(path, rows)
+
+
+def _one_per_method(trials: list[TrialData]) -> dict[str, TrialData]:
+    """The first trial of each compensation, all at the sweep point of the very first trial."""
+    shown: dict[str, TrialData] = {}
+    for item in trials:
+        reference = next(iter(shown.values()), item)
+        same = all(
+            item.trial.point.get(path) == value
+            for path, value in reference.trial.point.items()
+            if path != "compensation"
+        )
+        if same:
+            shown.setdefault(item.trial.task.compensation, item)
+    return shown
+
+
+def _cut(data: TrialData) -> Recording:
+    """The first cycles of the measuring window, on a time axis that begins with it."""
+    task = data.trial.task
+    signal = task.base_acceleration
+    start, stop = task.window
+    if isinstance(signal, Sine):
+        stop = min(stop, start + SHOWN_CYCLES / signal.frequency)
+    cut = data.recording().window(start, stop)
+    return Recording(cut.time - start, cut.channels, cut.events, cut.ending)
+
+
+def _rate_figure(shown: dict[str, TrialData]) -> Figure:
+    cuts = {name: _cut(item) for name, item in shown.items()}
+    reference = next(iter(cuts.values()))
+    largest = float(np.max(np.abs(reference["base_rate"])))
+    zoom = _reversal(reference)
+    hull = Curve(
+        reference.time, -reference["base_rate"], "held still in space", "reference", "thin"
+    )
+    whole, near = [hull], [hull]
+    for name, cut in cuts.items():
+        curve = Curve(cut.time, cut["relative_rate"], method_label(name), name)
+        whole.append(curve)
+        near.append(curve)
+    zoomed_time = Axis("Time", "s", "s", limits=zoom)
+    zoomed_rate = Axis(
+        RELATIVE_RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
+    )
+    return Figure(
+        key="relative-rate",
+        title="Rate of the load relative to the hull",
+        caption="Where the relative rate passes zero the load sticks to the hull and is carried "
+        "along: the flat part of the zoom on the right. Compensation shortens it.",
+        alt="Relative rate over time for each compensation method, and a zoom on one reversal "
+        "where the uncompensated curve stays at zero the longest.",
+        panels=(
+            Panel(TIME, RELATIVE_RATE, whole, "Base motion"),
+            Panel(zoomed_time, zoomed_rate, near, "At a reversal"),
+        ),
+        thesis=("5.4", "5.18"),
+        across=2,
+    )
+
+
+def _reversal(recording: Recording) -> tuple[float, float]:
+    """Times (s) around a sign change of the base rate, wide enough to show the sticking."""
+    rate = recording["base_rate"]
+    changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
+    span = float(np.ptp(recording.time))
+    middle = recording.time[changes[len(changes) // 2]] if len(changes) else span / 2
+    return float(middle - 0.02 * span), float(middle + 0.05 * span)
+
+
+def _error_figure(shown: dict[str, TrialData]) -> Figure:
+    panels = []
+    for name, item in shown.items():
+        cut = _cut(item)
+        error = cut["pointing_error"] - np.mean(cut["pointing_error"])
+        panels.append(
+            Panel(TIME, ERROR, [Curve(cut.time, error, method_label(name), name)], method_label(name))
+        )
+    return Figure(
+        key="position-error",
+        title="Position error by compensation method",
+        caption="The error jumps at every reversal of the relative rate and is then integrated "
+        "away. The scales differ: each panel shows its method's own error.",
+        alt="Position error over time, one panel per compensation method, each with peaks at the "
+        "reversals.",
+        panels=tuple(panels),
+        thesis=("5.9", "5.23"),
+        across=2,
+    )
+
+
+def _torque_figure(shown: dict[str, TrialData]) -> Figure:
+    torque = Axis("Torque", "N m", "N m")
+    curves = []
+    for name, item in shown.items():
+        cut = _cut(item)
+        if name == "none":
+            if "friction_torque" in cut.channels:
+                curves.append(
+                    Curve(cut.time, cut["friction_torque"], "true friction", "reference", "thin")
+                )
+        else:
+            curves.append(Curve(cut.time, cut["compensation_torque"], method_label(name), name))
+    return Figure(
+        key="compensation-torque",
+        title="Compensation torque",
+        caption="What each method adds to the drive torque, beside the friction that acts without "
+        "compensation (known only to a simulation).",
+        alt="Compensation torque over time for each method, square-like with the sign of the "
+        "relative rate.",
+        panels=(Panel(TIME, torque, curves),),
+        thesis=("5.7",),
+    )
+
+
+def _sweep_figure(path: str, rows: list[dict[str, object]]) -> Figure:
+    methods: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        value, error = row.get(path), row["error"]
+        if isinstance(value, int | float) and isinstance(error, int | float):
+            methods.setdefault(str(row["compensation"]), []).append((float(value), float(error)))
+    curves = []
+    for name, points in methods.items():
+        xy = np.array(sorted(points))
+        curves.append(Curve(xy[:, 0], xy[:, 1], method_label(name), name, "line+points"))
+    axis = {
+        "frequency": Axis("Frequency of the base motion", "Hz", "Hz"),
+        "acceleration": Axis("Base acceleration", "rad/s^2", "deg/s^2"),
+    }.get(path, Axis(path))
+    return Figure(
+        key="error-over-" + "".join(c if c.isalnum() else "-" for c in path.lower()),
+        title=f"Stabilization error over {axis.label.lower() if axis.unit else path}",
+        caption="Error (1σ) of each method along the sweep.",
+        alt=f"Stabilization error over {path}, one curve per compensation method.",
+        panels=(Panel(axis, Axis("Stabilization error (1σ)", "rad", "mrad"), curves),),
+    )
+
+
+EXPERIMENT = Experiment(
+    name="stabilization",
+    summary="stabilization error under sinusoidal base motion (Tables 5.2 and 5.8)",
+    options=StabilizationOptions,
+    trials=_trials,
+    analyse=_analyse,
+)

@@ -1,0 +1,263 @@
+"""How close a commanded motion comes to a bench's limits, before anything moves.
+
+The motion is the commanded one: the load follows its command exactly, and where the hull moves
+under it the relative motion is the difference. Torque and current follow from a rigid body with the
+worst of the true friction. What the loop does beyond its command is watched during the trial.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.physics.bench import Bench
+from campaign.signals import Polyline, Signal, Sine, Zero
+from campaign.trial import Task
+
+Array = NDArray[np.float64]
+Limit = Literal["angle", "rate", "acceleration", "torque", "current", "duration"]
+
+TINY_RATE = 1e-6
+"""rad/s; a jump of a rate command below this is rounding, not a step."""
+POINTS_PER_CYCLE = 64
+"""of a sine added to something else; its extreme is then missed by less than 0.13 %."""
+MOST_CYCLES = 1000
+"""of such a sum that are looked at."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """One limit and what a task comes to, both in `unit` (SI).
+
+    `value` is infinite for the acceleration of a rate command that jumps.
+    """
+
+    limit: Limit
+    value: float
+    bound: float
+    unit: str
+
+    @property
+    def fraction(self) -> float:
+        """Share of the limit that is used; above 1 it is broken."""
+        return self.value / self.bound
+
+    @property
+    def broken(self) -> bool:
+        # A command right at its limit, such as 60 deg/s^2 of 60, must not fail by a rounding.
+        return not self.fraction <= 1 + 1e-9
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Largest magnitudes over a task: relative angle and rate, and acceleration of load and hull.
+
+    Units: rad, rad/s, rad/s^2.
+    """
+
+    angle: float
+    rate: float
+    load_acceleration: float
+    hull_acceleration: float
+
+
+def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
+    """What `task` comes to beside each limit of `bench`.
+
+    In torque mode the motion is not predicted, because friction decides it: the angle counts as
+    the start angle and the rate as zero, and only the trial itself can tell.
+    """
+    extremes = motion(task)
+    if task.mode == "torque":
+        torque = _largest(task.command, task.duration)
+    else:
+        torque = bench.axis.inertia * extremes.load_acceleration
+        torque += worst_friction(bench, extremes.rate)
+    limits = bench.limits
+    acceleration = max(extremes.load_acceleration, extremes.hull_acceleration)
+    return (
+        Margin("angle", extremes.angle, limits.angle, "rad"),
+        Margin("rate", extremes.rate, limits.rate, "rad/s"),
+        Margin("acceleration", acceleration, limits.acceleration, "rad/s^2"),
+        Margin("torque", torque, limits.torque, "N m"),
+        Margin("current", torque / bench.torque_per_current, limits.current, "A"),
+        Margin("duration", task.duration, limits.duration, "s"),
+    )
+
+
+def motion(task: Task) -> Extremes:
+    """The commanded motion of load against hull; of a torque task only what the hull does."""
+    hull_acceleration = _largest(task.base_acceleration, task.duration)
+    if task.mode == "torque":
+        return Extremes(abs(task.start_angle), 0.0, 0.0, hull_acceleration)
+    time = _grid(task)
+    rate, angle = _load_motion(task.command, time)
+    hull_rate, hull_angle = _hull_motion(task.base_acceleration, time)
+    return Extremes(
+        angle=float(np.max(np.abs(task.start_angle + angle - hull_angle))),
+        rate=float(np.max(np.abs(rate - hull_rate))),
+        load_acceleration=_steepest(task.command, task.duration),
+        hull_acceleration=hull_acceleration,
+    )
+
+
+def worst_friction(bench: Bench, rate: float) -> float:
+    """Largest friction torque at the load (N m) of sliding up to `rate` (rad/s); 0 at rest.
+
+    The largest of the curve without its viscous part, which is the static torque where a model has
+    one, plus the viscous part at `rate`. What acts at the motor counts N times.
+    """
+    from campaign.physics.friction import friction_models
+
+    if rate == 0:
+        return 0.0
+    total = 0.0
+    for friction in bench.friction.values():
+        model = friction_models()[friction.model]
+        speed = rate * (bench.gear.ratio if friction.velocity == "motor" else 1.0)
+        speeds = np.concatenate([[1e-12], np.geomspace(1e-6, 1.0, 60)]) * speed
+        viscous = model.viscous(friction)
+        dry = np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds))
+        torque = float(dry) + viscous * speed
+        total += torque * (bench.gear.ratio if friction.side == "motor" else 1.0)
+    return total
+
+
+def _grid(task: Task) -> Array:
+    """Times at which the motion is extreme, or as good as that; shape (n,), increasing."""
+    duration = task.duration
+    signals = (task.command, task.base_acceleration)
+    times = [np.array([0.0, duration])]
+    mixed = not any(isinstance(signal, Zero) for signal in signals)
+    for signal in signals:
+        if isinstance(signal, Sine):
+            times.append(_sine_times(signal, duration, POINTS_PER_CYCLE if mixed else 4))
+        elif isinstance(signal, Polyline):
+            knots = np.asarray(signal.times)
+            times += [knots, _zero_crossings(signal), np.linspace(0.0, duration, 1001)]
+    joined = np.unique(np.concatenate(times))
+    return joined[(joined >= 0) & (joined <= duration)]
+
+
+def _sine_times(sine: Sine, duration: float, per_cycle: int) -> Array:
+    """Times of equal phase, the quarters of the cycle among them."""
+    cycles = min(duration * sine.frequency + 1, 2 if per_cycle == 4 else MOST_CYCLES)
+    steps = np.arange(math.ceil(cycles * per_cycle) + 1)
+    # Times at which 2 pi f t + phase is a multiple of a quarter turn.
+    shift = (-sine.phase / (2 * math.pi)) % (1 / per_cycle)
+    return np.asarray((steps / per_cycle + shift) / sine.frequency)
+
+
+def _zero_crossings(polyline: Polyline) -> Array:
+    """Where the line crosses zero: there its integral is extreme."""
+    time, value = np.asarray(polyline.times), np.asarray(polyline.values)
+    crossing = value[:-1] * value[1:] < 0
+    share = value[:-1][crossing] / (value[:-1] - value[1:])[crossing]
+    return np.asarray(time[:-1][crossing] + share * np.diff(time)[crossing])
+
+
+def _load_motion(command: Signal, time: Array) -> tuple[Array, Array]:
+    """Rate (rad/s) and angle from the start (rad) of a rate command, each shape (n,)."""
+    match command:
+        case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
+            omega = 2 * math.pi * frequency
+            angle = amplitude / omega * (math.cos(phase) - np.cos(omega * time + phase))
+            return command.sample(time), angle
+        case Polyline():
+            return command.sample(time), _integrated(command, time)[0]
+    return np.zeros_like(time), np.zeros_like(time)
+
+
+def _hull_motion(acceleration: Signal, time: Array) -> tuple[Array, Array]:
+    """Rate (rad/s) and angle from the start (rad) of the hull, each shape (n,).
+
+    A sine is a steady oscillation whose rate has zero mean; anything else starts from rest.
+    """
+    match acceleration:
+        case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
+            omega = 2 * math.pi * frequency
+            rate = -amplitude / omega * np.cos(omega * time + phase)
+            angle = -amplitude / omega**2 * (np.sin(omega * time + phase) - math.sin(phase))
+            return rate, angle
+        case Polyline():
+            return _integrated(acceleration, time)
+    return np.zeros_like(time), np.zeros_like(time)
+
+
+def _integrated(polyline: Polyline, time: Array) -> tuple[Array, Array]:
+    """First and second integral from t = 0 at `time`, exact when `time` contains the knots."""
+    step = np.diff(time)
+    begin, end = _after(polyline, time)[:-1], _before(polyline, time)[1:]
+    first = np.concatenate([[0.0], np.cumsum(0.5 * step * (begin + end))])
+    second = np.cumsum(step * first[:-1] + step**2 * (2 * begin + end) / 6)
+    return first, np.concatenate([[0.0], second])
+
+
+def _after(polyline: Polyline, time: Array) -> Array:
+    """Limits from the right: at a jump, the value after it."""
+    return _at(polyline, time, np.searchsorted(polyline.times, time, side="right"))
+
+
+def _before(polyline: Polyline, time: Array) -> Array:
+    """Limits from the left: at a jump, the value before it."""
+    return _at(polyline, time, np.searchsorted(polyline.times, time, side="left"))
+
+
+def _at(polyline: Polyline, time: Array, right: NDArray[np.intp]) -> Array:
+    """Values on the segment that ends at knot `right`; held beyond the ends."""
+    knots, values = np.asarray(polyline.times), np.asarray(polyline.values)
+    high = np.clip(right, 0, len(knots) - 1)
+    low = np.clip(right - 1, 0, len(knots) - 1)
+    span = knots[high] - knots[low]
+    share = np.where(span > 0, (time - knots[low]) / np.where(span > 0, span, 1.0), 0.0)
+    return np.asarray(values[low] + share * (values[high] - values[low]))
+
+
+def _largest(signal: Signal, duration: float) -> float:
+    """Largest magnitude of a signal over [0, duration]."""
+    match signal:
+        case Sine():
+            time = np.append(_sine_times(signal, duration, 4), [0.0, duration])
+            time = time[(time >= 0) & (time <= duration)]
+            return float(np.max(np.abs(signal.sample(time))))
+        case Polyline():
+            knots = np.asarray(signal.times)
+            ends = np.array([0.0, duration])
+            inside = np.asarray(signal.values)[(knots >= 0) & (knots <= duration)]
+            values = np.concatenate([_after(signal, ends[:1]), _before(signal, ends[1:]), inside])
+            return float(np.max(np.abs(values)))
+    return 0.0
+
+
+def _steepest(command: Signal, duration: float) -> float:
+    """Largest acceleration of a rate command (rad/s^2), infinite where it jumps; it starts at 0."""
+    match command:
+        case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
+            if abs(amplitude * math.sin(phase)) > TINY_RATE:
+                return math.inf
+            slope = Sine(
+                amplitude=amplitude * 2 * math.pi * frequency,
+                frequency=frequency,
+                phase=phase + math.pi / 2,
+            )
+            return _largest(slope, duration)
+        case Polyline():
+            return _steepest_line(command, duration)
+    return 0.0
+
+
+def _steepest_line(command: Polyline, duration: float) -> float:
+    knots, values = np.asarray(command.times), np.asarray(command.values)
+    if abs(float(_after(command, np.zeros(1))[0])) > TINY_RATE:
+        return math.inf
+    step, change = np.diff(knots), np.abs(np.diff(values))
+    inside = (knots[1:] > 0) & (knots[:-1] < duration)
+    jumps = inside & (step == 0) & (change > TINY_RATE)
+    if np.any(jumps):
+        return math.inf
+    sloped: Any = inside & (step > 0)
+    return float(np.max(change[sloped] / step[sloped], initial=0.0))
