@@ -50,7 +50,7 @@ from campaign.units import (
     TorqueRate,
 )
 
-STOP_FACTOR = 5.0
+STOP_FACTOR = 4.0
 """Rate that ends the trial, over the rate that counts as sliding: enough to see it slide."""
 
 
@@ -70,8 +70,8 @@ class BreakawayOptions(Options):
     """Where the ramp ends if the load has not moved; above the breakaway torque expected."""
     rest: Time = Field(default=0.5, ge=0)
     """Standstill before the ramp."""
-    sliding_rate: AngularRate = Field(default=0.002, gt=0)
-    """Rate at which the load counts as sliding; the trial ends when it is five times this fast."""
+    sliding_rate: AngularRate = Field(default=0.005, gt=0)
+    """Rate at which the load counts as sliding; the trial ends when it is four times this fast."""
     fit_share: float = Field(default=0.8, gt=0.1, lt=1.0)
     """The presliding curve is fitted up to this share of the breakaway torque."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)

@@ -15,6 +15,8 @@ import numpy as np
 
 from campaign.identification.least_squares import Array, Fit, Parameter, fit
 
+SMOOTHING = 0.1
+"""s; window over which the acceleration is taken: short against a ramp of many seconds."""
 SMALLEST_SHARE = 0.02
 """of the breakaway torque that a second interface must carry to be believed: the ramp's own start
 (the load must first be accelerated) bends the curve by less."""
@@ -56,20 +58,26 @@ class Presliding:
 def breakaway_torque(
     time: Array, rate: Array, torque: Array, inertia: float, threshold: float
 ) -> tuple[float, int]:
-    """Friction torque (N m) when the rate first passes `threshold` (rad/s), and the sample.
+    """Largest friction torque (N m) of a torque ramp, and the sample where sliding began.
 
-    The torque that accelerates the load at that moment is taken off: it is drive, not friction.
+    Friction is the drive torque less what accelerates the load (Eq. 4.1); the acceleration is the
+    slope of the rate over SMOOTHING. Sliding begins where the rate passes `threshold` (rad/s).
     All arrays (n,). Raises ValueError when the load never moved that fast.
     """
+    from scipy.signal import savgol_filter
+
     moving = np.abs(rate) >= threshold
     if not moving.any():
         raise ValueError(
             f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
         )
-    at = int(np.argmax(moving))
-    near = slice(max(at - 25, 0), min(at + 5, len(time)))
-    acceleration = float(np.polyfit(time[near] - time[at], rate[near], 1)[0])
-    return float(np.abs(np.mean(torque[near]) - inertia * acceleration)), at
+    interval = float(np.ptp(time)) / (len(time) - 1)
+    length = max(3, 2 * round(0.5 * SMOOTHING / interval) + 1)
+    if length >= len(time):
+        raise ValueError(f"only {len(time)} samples: too short a recording for a breakaway torque")
+    acceleration = savgol_filter(rate, length, 1, deriv=1, delta=interval)
+    friction = savgol_filter(torque, length, 1) - inertia * acceleration
+    return float(np.max(np.abs(friction))), int(np.argmax(moving))
 
 
 def presliding_curve(angle: Array, values: Mapping[str, float]) -> Array:
