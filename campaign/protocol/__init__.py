@@ -1,0 +1,23 @@
+"""TOML to Protocol to Plan: `load_protocol`, `make_plan`, `check_limits`."""
+
+from __future__ import annotations
+
+from campaign.protocol.limit_check import check_limits
+from campaign.protocol.load import load_protocol
+from campaign.protocol.plan import LimitUse, Plan, PlannedTest, make_plan
+from campaign.protocol.plan_tree import as_tree
+from campaign.protocol.schema import ExperimentKind, Protocol, ProtocolFile, TestEntry
+
+__all__ = [
+    "ExperimentKind",
+    "LimitUse",
+    "Plan",
+    "PlannedTest",
+    "Protocol",
+    "ProtocolFile",
+    "TestEntry",
+    "as_tree",
+    "check_limits",
+    "load_protocol",
+    "make_plan",
+]

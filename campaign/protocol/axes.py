@@ -1,0 +1,126 @@
+"""Validating a matrix: every path must lead somewhere, every value must be valid in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from campaign.errors import Problem
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Origin
+from campaign.protocol.matrix import (
+    LARGEST_PLAN,
+    RANGE_KEYS,
+    Axis,
+    Range,
+    RangeEntry,
+    count_points,
+    make_range,
+)
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import allowed, find_faults, nearest, shown, validate
+from campaign.protocol.schema import Test, TestEntry, replaced
+from campaign.protocol.shapes import Shape
+
+
+def make_axis(
+    path: str, written: Any, origin: Origin, options: type[BaseModel], trees: Mapping[str, Any]
+) -> Axis | list[Problem]:
+    """The axis of one key of a matrix; `trees`: the test's `options` and `bench` without it."""
+    parts = tuple(path.split("."))
+    of_bench = parts[0] == "bench"
+    keys: Keys = parts[1:] if of_bench else parts
+    model, tree = (Bench, trees["bench"]) if of_bench else (options, trees["options"])
+    wrong = _wrong_path(model, tree, keys, "bench." if of_bench else "")
+    if wrong:
+        return [origin.problem((), "key", wrong)]
+    values = _values(written, origin)
+    if not isinstance(values, Range) and values and isinstance(values[0], Problem):
+        return list(values)
+    return Axis(path, keys, of_bench, values, origin, listed=isinstance(written, list))
+
+
+def value_problems(test: Test) -> Iterator[Problem]:
+    """What is wrong with swept values: each is put in its place, the others as they come first.
+
+    Of a range only the ends, which bound the values between them. A fault elsewhere in a bench is
+    the value's doing too, because the bench is valid without it; among options it may be a matter
+    of the whole point, which the plan validates.
+    """
+    options, bench = first_point(test)
+    for axis in test.axes:
+        tree = bench if axis.of_bench else options
+        model: type[BaseModel] = Bench if axis.of_bench else test.experiment.options
+        for index in _to_check(axis):
+            origin = axis.value_origin(index)
+            valid = find_faults(model, replaced(tree, axis.keys, axis.value(index)))
+            for keys, aim, message in valid if isinstance(valid, list) else ():
+                if keys[: len(axis.keys)] == axis.keys:
+                    yield origin.problem(keys[len(axis.keys) :], aim, message)
+                elif axis.of_bench:
+                    elsewhere = ".".join(str(key) for key in keys)
+                    message = f"with this value, {elsewhere}: {message}"
+                    yield origin.problem((), "value", message)
+
+
+def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options and bench as written, with the first value of every axis."""
+    options, bench = dict(test.options), dict(test.bench)
+    for axis in test.axes:
+        if axis.of_bench:
+            bench = replaced(bench, axis.keys, axis.value(0))
+        else:
+            options = replaced(options, axis.keys, axis.value(0))
+    return options, bench
+
+
+def is_large(axes: Sequence[Axis], repeat: int) -> bool:
+    return count_points(axes) * repeat > LARGEST_PLAN
+
+
+def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> str:
+    """Why nothing can be swept at `keys`, or "" when something can."""
+    if not keys:
+        return "a bench as a whole cannot be swept; write one [[test]] for each bench"
+    if not prefix and keys[0] in TestEntry.model_fields:
+        return f"'{keys[0]}' belongs to the whole test and cannot be swept"
+    shape: Shape | None = Shape((model,))
+    for depth, key in enumerate(keys):
+        around = shape.narrowed(tree) if shape is not None else Shape(())
+        names = around.names() or (tuple(tree) if isinstance(tree, Mapping) else ())
+        shape = around.child(key) if key in names else None
+        if shape is None:
+            before = prefix + "".join(f"{part}." for part in keys[:depth])
+            paths = [f"{before}{name}" for name in names] + ([] if prefix else ["bench.…"])
+            slip = nearest(f"{before}{key}", paths)
+            return f"nothing to sweep at '{before}{key}'; {allowed(paths)}{slip}"
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return ""
+
+
+def _values(written: Any, origin: Origin) -> Sequence[Any] | Range:
+    """The values of an axis; a list that begins with a Problem when there are none."""
+    if isinstance(written, list):
+        if not written:
+            return [origin.problem((), "value", "an empty list; name at least one value")]
+        return written
+    if not isinstance(written, Mapping) or not RANGE_KEYS & written.keys():
+        ranges = "{ start, stop, num, spacing } or { start, stop, step }"
+        message = f"{shown(written)} is no sweep; write a list, {ranges}"
+        return [origin.problem((), "value", message)]
+    entry = validate(RangeEntry, written, origin)
+    if isinstance(entry, list):
+        return entry
+    try:
+        return make_range(entry)
+    except ValueError as error:
+        return [origin.problem((), "value", str(error))]
+
+
+def _to_check(axis: Axis) -> Iterator[int]:
+    if axis.listed:
+        yield from range(len(axis))
+    else:
+        yield from sorted({0, len(axis) - 1})

@@ -1,0 +1,180 @@
+"""Reading TOML files that somebody else wrote: any of them may be missing, huge or not TOML."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+from campaign.errors import Problem
+from campaign.protocol.positions import Aim, Keys, Position, Positions
+
+LARGEST_FILE = 4 * 1024 * 1024
+"""bytes; a protocol of hand-written tests has some kilobytes."""
+DEEPEST_NESTING = 32
+"""levels of tables and lists; deeper text only serves to exhaust a parser."""
+
+
+class CannotRead(Exception):
+    """Why a file cannot be read as text, for the user."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One TOML file.
+
+    Attributes:
+        file: as the user named it, for messages.
+        name: among the sources of a protocol, as written there.
+        text: verbatim.
+        tree: its values.
+    """
+
+    file: Path
+    name: str
+    text: str
+    tree: dict[str, Any]
+
+    @cached_property
+    def positions(self) -> Positions:
+        return Positions(self.text)
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
+        """A problem with what stands at `keys`."""
+        return Problem(self.file, *self.positions.find(keys, aim), message)
+
+
+class Origin(Protocol):
+    """Where a tree of values comes from: a place for each of its problems."""
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem: ...
+
+
+@dataclass(frozen=True)
+class Within:
+    """The part of a source that begins at `prefix`."""
+
+    source: Source
+    prefix: Keys = ()
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
+        return self.source.problem((*self.prefix, *keys), aim, message)
+
+
+@dataclass(frozen=True)
+class At:
+    """One place that stands for whatever is wrong with a value put there, e.g. a swept one."""
+
+    source: Source
+    keys: Keys
+    aim: Aim = "value"
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
+        return self.source.problem((*self.keys, *keys), aim if keys else self.aim, message)
+
+
+@dataclass(frozen=True)
+class Overridden:
+    """A value given on the command line."""
+
+    text: str
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
+        return Problem(Path(f"--set {self.text}"), 0, 0, message)
+
+
+@dataclass(frozen=True)
+class Patched:
+    """A tree of which some values come from elsewhere; the latest patch wins."""
+
+    base: Origin
+    patches: Sequence[tuple[Keys, Origin]]
+
+    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
+        for path, origin in reversed(self.patches):
+            if keys[: len(path)] == path:
+                return origin.problem(keys[len(path) :], aim, message)
+        return self.base.problem(keys, aim, message)
+
+
+def read_source(file: Path, name: str) -> Source | list[Problem]:
+    """The TOML file, or what is wrong with its text. Raises CannotRead when there is no text."""
+    text = read_text(file)
+    try:
+        tree = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        return [_syntax_problem(file, text, error)]
+    except RecursionError:
+        return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
+    except ValueError as error:  # a number of thousands of digits
+        return [Problem(file, 0, 0, f"not readable as TOML: {error}")]
+    if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
+        return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
+    source = Source(file, name, text, tree)
+    oversized = [
+        source.problem(keys, "value", "an integer of more than 64 bits")
+        for keys, value in _leaves(tree)
+        if isinstance(value, int) and not -(2**63) <= value < 2**63
+    ]
+    return oversized or source
+
+
+def read_text(file: Path) -> str:
+    """Text of a regular UTF-8 file of a reasonable size. Raises CannotRead."""
+    try:
+        if file.is_dir():
+            raise CannotRead("a folder, not a TOML file")
+        if not file.exists():
+            raise CannotRead("no such file")
+        if not file.is_file():
+            raise CannotRead("not a regular file")
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CannotRead(f"cannot be read: {reason}") from None
+    if len(content) > LARGEST_FILE:
+        raise CannotRead(f"larger than {LARGEST_FILE // 2**20} MiB; a protocol or bench is small")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise CannotRead(f"not UTF-8 text (byte {error.start + 1}, line {line})") from None
+
+
+_AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*\Z")
+
+
+def _syntax_problem(file: Path, text: str, error: tomllib.TOMLDecodeError) -> Problem:
+    """Python 3.14 gives the position in attributes, earlier ones in the message only."""
+    message = _AT.sub("", getattr(error, "msg", str(error)))
+    line, column = getattr(error, "lineno", None), getattr(error, "colno", None)
+    match = _AT.search(str(error))
+    if line is None and match is not None and match[1]:
+        line, column = int(match[1]), int(match[2])
+    if line is None or column is None:
+        last = text.replace("\r\n", "\n").split("\n")
+        line, column = Position(len(last), len(last[-1]) + 1)
+    return Problem(file, line, column, f"not valid TOML: {message[:1].lower()}{message[1:]}")
+
+
+def _leaves(tree: Any) -> Iterator[tuple[Keys, Any]]:
+    """Every value that is no table and no list, without recursion."""
+    stack: list[tuple[Keys, Any]] = [((), tree)]
+    while stack:
+        keys, value = stack.pop()
+        if isinstance(value, dict):
+            items: Iterator[tuple[str | int, Any]] = iter(value.items())
+        elif isinstance(value, list):
+            items = iter(enumerate(value))
+        else:
+            yield keys, value
+            continue
+        if len(keys) > DEEPEST_NESTING:
+            yield keys, None
+            continue
+        stack.extend(((*keys, key), item) for key, item in items)

@@ -1,0 +1,52 @@
+"""Refusing a plan that would break a limit, before anything moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from campaign.errors import LimitError
+from campaign.physics.limits import Margin
+from campaign.protocol.plan import LimitUse, Plan
+from campaign.units import convert
+
+NAMED_TRIALS = 3
+"""of each test and limit; the rest is counted."""
+DISPLAY = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+
+
+def check_limits(plan: Plan) -> None:
+    """Raise LimitError when a trial would break a limit: each test, limit, value and bound."""
+    groups: dict[tuple[str, str], list[LimitUse]] = {}
+    for use in plan.breaches:
+        test = plan.trials[use.trial - 1].test
+        groups.setdefault((test, use.margin.limit), []).append(use)
+    if not groups:
+        return
+    trials = len({use.trial for use in plan.breaches})
+    lines = [f"nothing was moved: {trials} of {len(plan.trials)} trials would break a limit"]
+    lines += [_line(plan, test, uses) for (test, _), uses in groups.items()]
+    raise LimitError("\n".join(lines))
+
+
+def in_display_units(margin: Margin) -> tuple[str, str]:
+    """Value and bound as a reader sees them, e.g. ("91.2 deg", "90 deg")."""
+    unit = DISPLAY.get(margin.unit, margin.unit)
+    value, bound = (convert(x, margin.unit, unit) for x in (margin.value, margin.bound))
+    shown = "infinite (the rate command jumps)" if math.isinf(value) else f"{value:.4g} {unit}"
+    return shown, f"{bound:.4g} {unit}"
+
+
+def _line(plan: Plan, test: str, uses: Sequence[LimitUse]) -> str:
+    worst = max(uses, key=lambda use: use.margin.fraction)
+    value, bound = in_display_units(worst.margin)
+    named = [worst, *(use for use in uses if use is not worst)][:NAMED_TRIALS]
+    names = [f"{plan.trials[use.trial - 1].name} ({_label(plan, use, test)})" for use in named]
+    more = f" and {len(uses) - len(named)} more" if len(uses) > len(named) else ""
+    limit = worst.margin.limit
+    return f"  {test}: {limit} up to {value}, limit {bound}: {', '.join(names)}{more}"
+
+
+def _label(plan: Plan, use: LimitUse, test: str) -> str:
+    label = plan.trials[use.trial - 1].label.removeprefix(test).strip()
+    return f"{label} {in_display_units(use.margin)[0]}".strip()

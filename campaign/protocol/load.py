@@ -1,0 +1,255 @@
+"""From a TOML file to a validated protocol: all that is wrong with it is said at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from campaign.errors import Problem, ProtocolError
+from campaign.physics.bench import Bench
+from campaign.protocol.axes import is_large, make_axis, value_problems
+from campaign.protocol.collect import (
+    Collected,
+    Draft,
+    apply_overrides,
+    collect,
+    sibling,
+    top_level,
+)
+from campaign.protocol.files import CannotRead, Origin, Patched, Source, Within, read_source
+from campaign.protocol.matrix import Axis
+from campaign.protocol.overrides import Override, parse_overrides
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import allowed, nearest, shown, validate
+from campaign.protocol.schema import (
+    ExperimentKind,
+    Protocol,
+    ProtocolFile,
+    Test,
+    TestEntry,
+    replaced,
+    split_entry,
+)
+
+
+def load_protocol(
+    path: Path,
+    experiments: Mapping[str, ExperimentKind],
+    *,
+    overrides: Sequence[str] = (),
+    shipped: Path,
+) -> Protocol:
+    """The protocol at `path` with everything it includes and every bench it names.
+
+    Args:
+        experiments: the kinds of test there are, by name.
+        overrides: `dotted.path=value` as given to `--set`.
+        shipped: folder whose `benches/` holds the benches that go by a bare name.
+
+    Raises ProtocolError with every mistake found in any of the files.
+    """
+    collected = Collected()
+    settings, collected.problems = parse_overrides(overrides)
+    source = collect(path, collected)
+    if source is None:
+        raise _failed(collected)
+    apply_overrides(settings, collected)
+    loader = _Loader(collected, experiments, shipped)
+    tests = loader.tests()
+    tree, origin = top_level(source, settings)
+    top = validate(ProtocolFile, tree, origin)
+    if isinstance(top, list):
+        collected.problems[:0] = top
+        raise _failed(collected)
+    published = loader.published(source, top.published, origin)
+    if not collected.drafts and not collected.problems:
+        message = "no tests; add a [[test]], or include a protocol that has some"
+        collected.problems.append(Problem(path, 1, 1, message))
+    if collected.problems:
+        raise _failed(collected)
+    return Protocol(
+        path=path,
+        title=top.title,
+        description=top.description,
+        operator=top.operator,
+        notes=top.notes,
+        tags=top.tags,
+        published=published,
+        tests=tuple(tests),
+        sources={name: each.text for name, each in collected.sources.items()},
+        overrides=tuple(overrides),
+    )
+
+
+def _failed(collected: Collected) -> ProtocolError:
+    return ProtocolError(list(dict.fromkeys(collected.problems)))
+
+
+@dataclass
+class _Loader:
+    """Validates what was collected; problems go to `collected.problems`."""
+
+    collected: Collected
+    experiments: Mapping[str, ExperimentKind]
+    shipped: Path
+
+    def tests(self) -> list[Test]:
+        first: dict[str, Draft] = {}
+        tests = []
+        for draft in self.collected.drafts:
+            earlier = first.setdefault(draft.name, draft)
+            if draft.name and earlier is not draft:
+                at = earlier.source.positions.find(("test", earlier.index, "name"))
+                there = f"{earlier.source.file}:{at.line}:{at.column}"
+                message = f"a second test called '{draft.name}'; the first is at {there}"
+                self._report(draft.origin.problem(("name",), "value", message))
+            test = self._test(draft)
+            if test is not None:
+                tests.append(test)
+        return tests
+
+    def published(self, source: Source, written: str, origin: Origin) -> str:
+        """Name of the published values: "thesis", "none", or of a source that is read here."""
+        if written in ("thesis", "none"):
+            return written
+        file, name = sibling(source, written)
+        found = self._read(file, name, origin, ("published",), written)
+        return found.name if found is not None else written
+
+    def _report(self, *problems: Problem) -> None:
+        self.collected.problems += problems
+
+    def _test(self, draft: Draft) -> Test | None:
+        common, options = split_entry(draft.tree)
+        entry = validate(TestEntry, common, draft.origin)
+        if isinstance(entry, list):
+            self._report(*entry)
+        experiment = self._experiment(draft, common.get("kind"))
+        bench = self._bench_source(draft, common.get("bench"))
+        if experiment is None:
+            return None
+        tree = _patched(bench.tree, draft.bench_patches) if bench is not None else None
+        patches = [(patch.keys, patch.origin) for patch in draft.bench_patches]
+        bench_origin = Patched(Within(bench), patches) if bench is not None else draft.origin
+        valid = validate(Bench, tree, bench_origin) if tree is not None else None
+        if isinstance(valid, list):
+            self._report(*valid)
+        known = valid.model_dump(mode="json") if isinstance(valid, Bench) else None
+        axes = self._axes(draft, experiment, options, known)
+        self._options(draft, experiment, options, axes)
+        if isinstance(entry, list) or known is None or tree is None or bench is None:
+            return None
+        test = Test(entry, experiment, options, tree, bench.name, axes, draft.origin, bench_origin)
+        self._compensation(test, known)
+        if not is_large(axes, entry.repeat):
+            self._report(*value_problems(test))
+        return test
+
+    def _experiment(self, draft: Draft, kind: Any) -> ExperimentKind | None:
+        if not isinstance(kind, str) or kind in self.experiments:
+            return self.experiments.get(kind) if isinstance(kind, str) else None
+        message = f"unknown kind {shown(kind)}; {allowed(self.experiments)}"
+        message += nearest(kind, self.experiments)
+        self._report(draft.origin.problem(("kind",), "value", message))
+        return None
+
+    def _bench_source(self, draft: Draft, written: Any) -> Source | None:
+        if not isinstance(written, str):
+            return None
+        if "/" in written or "\\" in written or written.endswith(".toml"):
+            file, name = sibling(draft.source, written)
+            return self._read(file, name, draft.origin, ("bench",), written)
+        shipped = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
+        if written in shipped:
+            file = self.shipped / "benches" / f"{written}.toml"
+            return self._read(file, written, draft.origin, ("bench",), written)
+        message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
+        message += nearest(written, shipped) + ", or the path of a .toml file"
+        self._report(draft.origin.problem(("bench",), "value", message))
+        return None
+
+    def _read(
+        self, file: Path, name: str, origin: Origin, keys: Keys, written: str
+    ) -> Source | None:
+        """A further file, read once; a missing one is a problem of the text that names it."""
+        known = self.collected.sources.get(name)
+        if known is not None:
+            return known
+        try:
+            source = read_source(file, name)
+        except CannotRead as error:
+            hint = nearest(file.name, _toml_files(file.parent))
+            message = f"{shown(written)}: {error} (looked for {file}){hint}"
+            self._report(origin.problem(keys, "value", message))
+            return None
+        if not isinstance(source, Source):
+            self._report(*source)
+            return None
+        self.collected.sources[name] = source
+        return source
+
+    def _axes(
+        self, draft: Draft, experiment: ExperimentKind, options: Any, bench: Any
+    ) -> tuple[Axis, ...]:
+        axes = []
+        for path, (written, origin) in draft.axes.items():
+            if path.split(".")[0] == "bench" and bench is None:
+                continue  # the bench must be right before its fields can be swept
+            trees = {"options": options, "bench": bench}
+            axis = make_axis(path, written, origin, experiment.options, trees)
+            if isinstance(axis, list):
+                self._report(*axis)
+                continue
+            if path in options:
+                message = f"'{path}' is swept by the matrix and given here; remove one of the two"
+                self._report(draft.origin.problem((path,), "key", message))
+            axes.append(axis)
+        return tuple(axes)
+
+    def _options(
+        self, draft: Draft, experiment: ExperimentKind, options: Any, axes: tuple[Axis, ...]
+    ) -> None:
+        """Validate the options with the first value of every axis in its place."""
+        tree, patches = dict(options), []
+        for axis in axes:
+            if not axis.of_bench:
+                tree = replaced(tree, axis.keys, axis.value(0))
+                patches.append((axis.keys, axis.value_origin(0)))
+        origin = Patched(draft.origin, patches)
+        valid = validate(experiment.options, tree, origin, also=TestEntry.model_fields)
+        if isinstance(valid, list):
+            self._report(*valid)
+
+    def _compensation(self, test: Test, bench: Mapping[str, Any]) -> None:
+        """An option called `compensation` names a method that the bench has parameters for."""
+        names = ["none", *bench["compensation"]]
+        given: list[tuple[Any, Origin, Keys]]
+        given = [(test.options.get("compensation"), test.origin, ("compensation",))]
+        swept = next((axis for axis in test.axes if axis.path == "compensation"), None)
+        if swept is not None and swept.listed:
+            given = [(swept.value(i), swept.value_origin(i), ()) for i in range(len(swept))]
+        for name, origin, keys in given:
+            if isinstance(name, str) and name not in names:
+                self._report(origin.problem(keys, "value", unknown_compensation(name, names, test)))
+
+
+def unknown_compensation(name: str, names: Sequence[str], test: Test) -> str:
+    """What to say of a compensation that a test's bench has no parameters for."""
+    where = f"the bench '{test.bench_name}'"
+    return f"{shown(name)} is no compensation of {where}; {allowed(names)}{nearest(name, names)}"
+
+
+def _patched(tree: Mapping[str, Any], patches: Sequence[Override]) -> dict[str, Any]:
+    patched = dict(tree)
+    for patch in patches:
+        patched = replaced(patched, patch.keys, patch.value)
+    return patched
+
+
+def _toml_files(folder: Path) -> list[str]:
+    try:
+        return sorted(file.name for file in folder.glob("*.toml"))[:1000]
+    except (OSError, ValueError):
+        return []

@@ -1,0 +1,89 @@
+"""A plan as plain data, for `campaign plan --json`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydantic import JsonValue
+
+from campaign.physics.limits import Margin
+from campaign.protocol.plan import LimitUse, Plan, PlannedTest
+from campaign.trial import Trial
+
+
+def as_tree(plan: Plan) -> dict[str, Any]:
+    """Everything about a plan but the files it came from; JSON-able, SI, stable names."""
+    return {
+        "protocol": plan.name,
+        "title": plan.title,
+        "description": plan.description,
+        "operator": plan.operator,
+        "notes": plan.notes,
+        "tags": list(plan.tags),
+        "published": plan.published,
+        "fingerprint": plan.fingerprint,
+        "seed": plan.seed,
+        "overrides": list(plan.overrides),
+        "only": list(plan.only),
+        "sources": sorted(plan.sources),
+        "duration_s": plan.duration,
+        "samples": plan.samples,
+        "bytes": plan.size,
+        "tests": [_test(test) for test in plan.tests],
+        "trials": [_trial(trial) for trial in plan.trials],
+        "breaches": [_use(use) for use in plan.breaches],
+    }
+
+
+def _test(test: PlannedTest) -> dict[str, Any]:
+    return {
+        "name": test.name,
+        "kind": test.kind,
+        "title": test.title,
+        "description": test.description,
+        "reproduces": list(test.reproduces),
+        "bench": test.bench,
+        "options": test.options,
+        "matrix": {path: list(values) for path, values in test.matrix.items()},
+        "order": test.order,
+        "seed": test.seed,
+        "repeat": test.repeat,
+        "trials": list(test.numbers),
+        "duration_s": test.duration,
+        "limits": [_use(use) for use in test.closest],
+    }
+
+
+def _trial(trial: Trial) -> dict[str, Any]:
+    return {
+        "number": trial.number,
+        "name": trial.name,
+        "test": trial.test,
+        "role": trial.role.value,
+        "point": trial.point,
+        "repeat": trial.repeat,
+        "seed": trial.seed,
+        "duration_s": trial.task.duration,
+        "compensation": trial.task.compensation,
+        "note": trial.note,
+        "fingerprint": trial.fingerprint,
+    }
+
+
+def _use(use: LimitUse) -> dict[str, JsonValue]:
+    margin: Margin = use.margin
+    return {
+        "limit": margin.limit,
+        "trial": use.trial,
+        "value": _finite(margin.value),
+        "bound": margin.bound,
+        "unit": margin.unit,
+        "fraction": _finite(margin.fraction),
+        "broken": margin.broken,
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity; the acceleration of a command that jumps becomes null."""
+    return value if math.isfinite(value) else None

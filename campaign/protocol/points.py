@@ -1,0 +1,119 @@
+"""The points of a test's matrix: options and bench with the swept values, validated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import JsonValue, ValidationError
+
+from campaign.errors import Problem
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Patched
+from campaign.protocol.matrix import Axis, points
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import validate
+from campaign.protocol.schema import Test, replaced
+from campaign.trial import Tree
+
+
+class PointError(Exception):
+    """A point of a matrix at which a test cannot be executed."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = list(problems)
+        super().__init__("; ".join(str(problem) for problem in problems))
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point: swept path to SI value, and what a trial there has; objects beside their trees."""
+
+    values: Mapping[str, JsonValue]
+    options: Options
+    options_tree: Tree
+    bench: Bench
+    bench_tree: Tree
+
+    @property
+    def label(self) -> str:
+        return ", ".join(f"{path} = {value}" for path, value in self.values.items())
+
+
+def points_of(test: Test) -> Iterator[Point]:
+    """Every point of the matrix, first axis slowest. Raises PointError at one that is invalid."""
+    cache = _Cache(test)
+    for indices in points(test.axes):
+        options, options_tree = cache.options(indices)
+        bench, bench_tree = cache.bench(indices)
+        values = {
+            axis.path: _at(bench_tree if axis.of_bench else options_tree, axis.keys)
+            for axis in test.axes
+        }
+        yield Point(values, options, options_tree, bench, bench_tree)
+
+
+@dataclass
+class _Cache:
+    """Options and benches already validated: a sweep of one leaves the other as it is."""
+
+    test: Test
+    known_options: dict[tuple[int, ...], tuple[Options, Tree]] = field(default_factory=dict)
+    known_benches: dict[tuple[int, ...], tuple[Bench, Tree]] = field(default_factory=dict)
+    plain_bench: Tree = field(default_factory=dict)
+
+    def options(self, indices: tuple[int, ...]) -> tuple[Options, Tree]:
+        swept = self._swept(indices, of_bench=False)
+        key = tuple(index for _, index in swept)
+        if key not in self.known_options:
+            tree = dict(self.test.options)
+            for axis, index in swept:
+                tree = replaced(tree, axis.keys, axis.value(index))
+            patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
+            origin = Patched(self.test.origin, patches)
+            valid = validate(self.test.experiment.options, tree, origin)
+            if isinstance(valid, list):
+                raise PointError(valid)
+            self.known_options[key] = (valid, valid.model_dump(mode="json"))
+        return self.known_options[key]
+
+    def bench(self, indices: tuple[int, ...]) -> tuple[Bench, Tree]:
+        swept = self._swept(indices, of_bench=True)
+        key = tuple(index for _, index in swept)
+        if key not in self.known_benches:
+            valid = self._swept_bench(swept)
+            self.known_benches[key] = (valid, valid.model_dump(mode="json"))
+        return self.known_benches[key]
+
+    def _swept_bench(self, swept: Sequence[tuple[Axis, int]]) -> Bench:
+        if not self.plain_bench:
+            valid = Bench.model_validate(self.test.bench)
+            self.plain_bench = valid.model_dump(mode="json")
+        tree: dict[str, Any] = self.plain_bench
+        for axis, index in swept:
+            tree = replaced(tree, axis.keys, axis.value(index))
+        try:
+            # Reading the normalised bench back is twenty times quicker than reading its text.
+            return Bench.model_validate(tree, context={"si": True})
+        except ValidationError:
+            patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
+            raw = dict(self.test.bench)
+            for axis, index in swept:
+                raw = replaced(raw, axis.keys, axis.value(index))
+            again = validate(Bench, raw, Patched(self.test.bench_origin, patches))
+            if isinstance(again, Bench):
+                return again
+            raise PointError(again) from None
+
+    def _swept(self, indices: tuple[int, ...], *, of_bench: bool) -> list[tuple[Axis, int]]:
+        pairs = zip(self.test.axes, indices, strict=True)
+        return [(axis, index) for axis, index in pairs if axis.of_bench is of_bench]
+
+
+def _at(tree: Any, keys: Keys) -> JsonValue:
+    for key in keys:
+        tree = tree[key]
+    found: JsonValue = tree
+    return found

@@ -1,0 +1,208 @@
+"""From what pydantic finds wrong to what a user can put right.
+
+A message says what stands there, what is allowed, and the nearest valid name for a typo.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from campaign.errors import Problem
+from campaign.protocol.files import Origin
+from campaign.protocol.positions import Aim, Keys
+from campaign.protocol.shapes import Shape, from_location, shape_at
+
+Model = TypeVar("Model", bound=BaseModel)
+Fault = tuple[Keys, Aim, str]
+"""A mistake in a tree of values: where, what to point at, and the message."""
+
+
+def validate(
+    model: type[Model], tree: Mapping[str, Any], origin: Origin, also: Collection[str] = ()
+) -> Model | list[Problem]:
+    """`tree` as a `model`, or everything wrong with it. `also`: further names to suggest."""
+    valid = find_faults(model, tree, also)
+    return [origin.problem(*fault) for fault in valid] if isinstance(valid, list) else valid
+
+
+def find_faults(
+    model: type[Model], tree: Mapping[str, Any], also: Collection[str] = ()
+) -> Model | list[Fault]:
+    """`tree` as a `model`, or where it is wrong, before anybody knows where it came from."""
+    faults = list(_loose_values(model, tree))
+    try:
+        valid = model.model_validate(dict(tree))
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        faults += (_fault(model, tree, one, also) for one in details)
+    else:
+        if not faults:
+            return valid
+    return _once_per_place(faults)
+
+
+def nearest(word: object, names: Iterable[str]) -> str:
+    """What to append to a message when `word` looks like a slip for one of `names`."""
+    known = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.6)
+    return f"; did you mean {known[close[0]]!r}?" if close else ""
+
+
+def allowed(names: Iterable[str]) -> str:
+    """`allowed are a, b, c`."""
+    listed = list(names)
+    return f"allowed are {', '.join(listed)}" if listed else "nothing is allowed here"
+
+
+def shown(value: Any) -> str:
+    """A value as it would stand in TOML, short."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"'{value}'" if len(value) <= 60 else f"'{value[:57]}...'"
+    return str(value)[:60]
+
+
+def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collection[str]) -> Fault:
+    keys, shape = from_location(model, detail["loc"])
+    match detail["type"]:
+        case "extra_forbidden":
+            around = shape_at(model, tree, keys[:-1]) if len(keys) > 1 else Shape((model,))
+            value = _value_at(tree, keys[:-1])
+            names = around.narrowed(value).names() if around is not None else ()
+            names = (*names, *also) if len(keys) == 1 else names
+            here = f"unknown key {shown(keys[-1])}"
+            return keys, "key", f"{here}; {allowed(names)}{nearest(keys[-1], names)}"
+        case "missing":
+            return keys[:-1], "value", f"{shown(keys[-1])} is missing{_expected(shape)}"
+        case "union_tag_not_found":
+            field = detail["ctx"]["discriminator"].strip("'")
+            tags = allowed(shape.tags() if shape is not None else ())
+            return keys, "value", f"'{field}' is missing; {tags}"
+        case "union_tag_invalid":
+            return _wrong_tag(keys, shape, tree, detail["ctx"])
+        case _:
+            return keys, "value", _wrong_value(shape, detail)
+
+
+def _wrong_tag(keys: Keys, shape: Shape | None, tree: Any, context: Mapping[str, Any]) -> Fault:
+    """An unknown model, method or form; a compensation's method may be implied by its name."""
+    field, tag = context["discriminator"].strip("'"), context["tag"]
+    tags = [str(name) for name in shape.tags()] if shape is not None else []
+    message = f"unknown {field} {shown(tag)}; {allowed(tags)}{nearest(tag, tags)}"
+    value = _value_at(tree, keys)
+    if isinstance(value, Mapping) and field not in value:
+        return keys, "key", f"{message}, or say which with '{field} = ...'"
+    return (*keys, field), "value", message
+
+
+_WANTED = {
+    "string_type": "text in quotes",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+}
+_COMPARED = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+
+
+def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    here = shown(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"{here} is not a finite number"
+    if kind == "quantity":
+        return str(detail["msg"])
+    if kind == "literal_error":
+        names = _literals(context["expected"])
+        return f"{here} is not allowed here; {allowed(names)}{nearest(value, names)}"
+    if kind in _COMPARED:
+        limit, words = _COMPARED[kind]
+        quantity = shape.quantity if shape is not None else None
+        unit = f" {quantity.si}" if quantity else ""
+        return f"{here}{unit} is out of range; it must be {words} {context[limit]:g}{unit}"
+    if kind in _WANTED:
+        wanted = _WANTED[kind]
+        if shape is not None and shape.quantity and "number" in wanted:
+            wanted = f"a {shape.quantity.name} as text, such as {shape.quantity.example}"
+        if wanted == "a list" and isinstance(value, Mapping):
+            return f"{here} is not a list; write [[{detail['loc'][-1]}]] for each of its tables"
+        return f"{here} is not {wanted}"
+    message = str(detail["msg"]).removeprefix("Value error, ").replace("Input should", "it should")
+    return f"{here}: {message}" if not isinstance(value, Mapping) else message
+
+
+def _expected(shape: Shape | None) -> str:
+    if shape is None:
+        return ""
+    if shape.quantity is not None:
+        return f": a {shape.quantity.name} such as {shape.quantity.example}; {shape.meaning}"
+    return f": {shape.meaning}" if shape.meaning else ""
+
+
+def _literals(expected: str) -> list[str]:
+    """pydantic writes `'a', 'b' or 'c'`."""
+    return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
+
+
+def _loose_values(model: type[BaseModel], tree: Any) -> Iterator[Fault]:
+    """Values that pydantic would quietly convert: text or true where a number stands."""
+    stack: list[tuple[Keys, Shape | None, Any]] = [((), Shape((model,)), tree)]
+    while stack:
+        keys, shape, value = stack.pop()
+        if shape is None:
+            continue
+        if isinstance(value, Mapping | list):
+            narrow = shape.narrowed(value)
+            items = value.items() if isinstance(value, Mapping) else enumerate(value)
+            stack += [((*keys, key), narrow.child(key), item) for key, item in items]
+        elif shape.members and all(member in (int, float) for member in shape.members):
+            is_text = isinstance(value, str) and shape.quantity is None
+            if is_text or isinstance(value, bool):
+                kind = "float_type" if float in shape.members else "int_type"
+                detail: ErrorDetails = {"type": kind, "loc": (), "msg": "", "input": value}
+                yield keys, "value", _wrong_value(shape, detail)
+        elif shape.members == (bool,) and not isinstance(value, bool):
+            yield keys, "value", f"{shown(value)} is not true or false"
+
+
+def _value_at(tree: Any, keys: Keys) -> Any:
+    for key in keys:
+        try:
+            tree = tree[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return tree
+
+
+def _once_per_place(faults: Iterable[Fault]) -> list[Fault]:
+    """One message per place, in the order found; the members of a union complain one by one."""
+    first: dict[tuple[Keys, Aim, str], Fault] = {}
+    for keys, aim, message in faults:
+        # Two fields missing in one table are two problems at one place.
+        distinct = message if " is missing" in message else ""
+        first.setdefault((keys, aim, distinct), (keys, aim, message))
+    return list(first.values())

@@ -1,0 +1,153 @@
+"""What a protocol file may contain, and what a loaded protocol is.
+
+The options of a test depend on its kind, so they are validated by the experiment and only named
+here by exclusion: every key of a test that is not a field of `TestEntry`.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Origin
+from campaign.protocol.matrix import Axis
+from campaign.protocol.positions import Keys
+from campaign.trial import TrialRequest
+
+Slug = Annotated[str, Field(pattern=r"^[a-z0-9]+([-_][a-z0-9]+)*$", max_length=60)]
+
+
+class ExperimentKind(typing.Protocol):
+    """What this room needs of an experiment; see `campaign.experiments.interface`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def options(self) -> type[Options]: ...
+
+    @property
+    def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
+
+
+class TestEntry(Options):
+    """One `[[test]]`, without the options of its kind."""
+
+    __test__ = False  # not a test of pytest's
+    model_config = ConfigDict(extra="ignore")
+
+    name: Slug
+    """What the test is called; lower-case letters, digits, - and _; unique over all includes."""
+    kind: str
+    """The experiment, one of `campaign kinds`."""
+    bench: str
+    """Path of a bench, relative to this file, or the bare name of a shipped one."""
+    title: str = ""
+    """Heading of the test in the report."""
+    description: str = ""
+    """What the test is for, in a sentence or two."""
+    reproduces: tuple[str, ...] = ()
+    """Published tables, figures and claims it speaks to: "5.2", "figure 5.4", "text 5.2.2.2"."""
+    matrix: dict[str, Any] = {}
+    """What is swept: dotted path to a list or a range."""
+    repeat: int = Field(default=1, ge=1)
+    """How often the whole matrix is executed."""
+    order: Literal["as written", "shuffled"] = "as written"
+    """Order of the measurements within each repetition."""
+    seed: int | None = Field(default=None, ge=0, lt=2**63)
+    """Of everything random in the test; drawn and recorded when absent."""
+
+
+class ProtocolFile(Options):
+    """The top level of a protocol file."""
+
+    title: str = ""
+    """Heading of the report."""
+    description: str = ""
+    """What the protocol is for."""
+    operator: str = ""
+    """Who is responsible for the run."""
+    notes: str = ""
+    """Anything worth keeping with the run."""
+    tags: tuple[str, ...] = ()
+    """Words to find the run by."""
+    include: tuple[str, ...] = ()
+    """Paths of protocols, relative to this file, whose tests come before this file's."""
+    published: str = "thesis"
+    """Published values to compare with: a path relative to this file, "none" or "thesis"."""
+    test: tuple[dict[str, Any], ...] = ()
+    """The tests, each under `[[test]]`."""
+
+
+@dataclass(frozen=True)
+class Test:
+    """A validated test; its values are still as written, so that a sweep can replace them.
+
+    Attributes:
+        entry: the keys every test has.
+        options: the options of its kind as written, unswept.
+        bench: the bench as written, unswept.
+        bench_name: of its source.
+        axes: the matrix, first key slowest.
+        origin, bench_origin: where they stand, for problems found later.
+    """
+
+    __test__ = False
+
+    entry: TestEntry
+    experiment: ExperimentKind
+    options: Mapping[str, Any]
+    bench: Mapping[str, Any]
+    bench_name: str
+    axes: tuple[Axis, ...]
+    origin: Origin
+    bench_origin: Origin
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """A validated protocol with all it includes.
+
+    Attributes:
+        path: of the file, as the user named it.
+        published: "thesis", "none", or the name of a source.
+        sources: verbatim text of every protocol, bench and published file, by its name as written.
+        overrides: what `--set` was given.
+    """
+
+    path: Path
+    title: str
+    description: str
+    operator: str
+    notes: str
+    tags: tuple[str, ...]
+    published: str
+    tests: tuple[Test, ...]
+    sources: Mapping[str, str]
+    overrides: tuple[str, ...] = ()
+
+
+def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The keys of a `[[test]]` that every test has, and the options of its kind."""
+    common = {key: value for key, value in tree.items() if key in TestEntry.model_fields}
+    options = {key: value for key, value in tree.items() if key not in common}
+    return common, options
+
+
+def replaced(tree: Mapping[str, Any], keys: Keys, value: Any) -> dict[str, Any]:
+    """A copy of nested tables with `value` at `keys`; absent tables on the way are made."""
+    copy = dict(tree)
+    key = str(keys[0])
+    if len(keys) == 1:
+        copy[key] = value
+    else:
+        below = copy.get(key)
+        copy[key] = replaced(below if isinstance(below, Mapping) else {}, keys[1:], value)
+    return copy

@@ -1,0 +1,148 @@
+"""What may stand where: walking pydantic models along a path of keys.
+
+pydantic's error locations contain tags of unions that no file contains, and name no alternatives;
+both follow from the declared types.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from campaign.protocol.positions import Keys
+from campaign.units import Quantity
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The type declared for a value.
+
+    Attributes:
+        members: the types it may have, None left out.
+        discriminator: the field that tells models apart, or "".
+        quantity: the physical quantity it is, if it is one.
+        meaning: what the field's documentation says.
+    """
+
+    members: tuple[Any, ...]
+    discriminator: str = ""
+    quantity: Quantity | None = None
+    meaning: str = ""
+
+    def models(self) -> tuple[type[BaseModel], ...]:
+        return tuple(m for m in self.members if isinstance(m, type) and issubclass(m, BaseModel))
+
+    def tags(self) -> tuple[str, ...]:
+        """The allowed values of the discriminator."""
+        return tuple(tag for model in self.models() for tag in _tags(model, self.discriminator))
+
+    def tagged(self, tag: object) -> Shape:
+        """This shape with the union narrowed to the member that pydantic labels `tag`."""
+        chosen = [
+            member
+            for member in self.models()
+            if tag in _tags(member, self.discriminator) or tag == member.__name__
+        ]
+        return Shape(tuple(chosen))
+
+    def narrowed(self, value: Any) -> Shape:
+        """This shape with a discriminated union narrowed by what `value` says."""
+        if len(self.members) > 1 and self.discriminator and isinstance(value, Mapping):
+            return self.tagged(value.get(self.discriminator))
+        return self
+
+    def child(self, key: str | int) -> Shape | None:
+        """The shape of the value under `key`, or None when nothing is declared for it."""
+        for member in self.members:
+            if isinstance(member, type) and issubclass(member, BaseModel):
+                field = member.model_fields.get(str(key))
+                if field is not None:
+                    return _of_field(field)
+                continue
+            arguments = get_args(member)
+            if get_origin(member) in (dict, Mapping) and len(arguments) == 2:
+                return shape_of(arguments[1])
+            if get_origin(member) in (tuple, list, Sequence) and arguments:
+                return shape_of(arguments[0])
+        return None
+
+    def names(self) -> tuple[str, ...]:
+        """The fields that may stand here, in the order they were declared."""
+        return tuple(dict.fromkeys(name for model in self.models() for name in model.model_fields))
+
+
+def shape_of(annotation: Any) -> Shape:
+    """The shape of a type, `Annotated` and optional ones included."""
+    metadata: list[Any] = []
+    while get_origin(annotation) is Annotated:
+        annotation, *more = get_args(annotation)
+        metadata += more
+    members = (annotation,)
+    if get_origin(annotation) in (Union, UnionType):
+        members = tuple(m for m in get_args(annotation) if m is not NoneType)
+    discriminator = next(
+        (m.discriminator for m in metadata if isinstance(m, FieldInfo) and m.discriminator), ""
+    )
+    shape = Shape(
+        members,
+        discriminator if isinstance(discriminator, str) else "",
+        next((m for m in metadata if isinstance(m, Quantity)), None),
+    )
+    if len(members) == 1 and get_origin(members[0]) is Annotated:
+        inner = shape_of(members[0])
+        return Shape(
+            inner.members,
+            shape.discriminator or inner.discriminator,
+            shape.quantity or inner.quantity,
+        )
+    return shape
+
+
+def from_location(
+    root: type[BaseModel], location: Sequence[str | int]
+) -> tuple[Keys, Shape | None]:
+    """The path in the file that a pydantic location means, and what is declared there."""
+    keys: Keys = ()
+    shape: Shape | None = Shape((root,))
+    for part in location:
+        if shape is not None and len(shape.members) > 1:
+            shape = shape.tagged(part)
+            continue
+        keys = (*keys, part)
+        shape = shape.child(part) if shape is not None else None
+    return keys, shape
+
+
+def shape_at(root: type[BaseModel], tree: Any, keys: Keys) -> Shape | None:
+    """What is declared at `keys` of a tree of values; unions are told apart by the values."""
+    shape: Shape | None = Shape((root,))
+    for key in keys:
+        if shape is None:
+            return None
+        shape = shape.narrowed(tree).child(key)
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return shape
+
+
+def _of_field(field: FieldInfo) -> Shape:
+    shape = shape_of(field.annotation)
+    discriminator = field.discriminator if isinstance(field.discriminator, str) else ""
+    quantity = next((m for m in field.metadata if isinstance(m, Quantity)), None)
+    return Shape(
+        shape.members,
+        discriminator or shape.discriminator,
+        quantity or shape.quantity,
+        " ".join((field.description or "").split()),
+    )
+
+
+def _tags(model: type[BaseModel], discriminator: str) -> tuple[Any, ...]:
+    field = model.model_fields.get(discriminator)
+    if field is None or get_origin(field.annotation) is not Literal:
+        return ()
+    return get_args(field.annotation)
