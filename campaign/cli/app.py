@@ -154,7 +154,7 @@ def report(
     """Write report.html, its tables and its figures, from an archive alone."""
     from campaign.cli.report import report_run
 
-    report_run(run, results, output, templates, open_it=open_it)
+    typer.echo(report_run(run, results, output, templates, open_it=open_it))
 
 
 @app.command("list")

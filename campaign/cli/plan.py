@@ -1,0 +1,77 @@
+"""`campaign plan`: what `campaign run` would do, as a page of text or as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from datetime import UTC, datetime
+from pathlib import Path
+
+from campaign.archive import new_run_name
+from campaign.cli.output import bytes_text, print_line, print_note, print_table
+from campaign.cli.prepare import Prepared, Request, prepare
+from campaign.execution.display import clock
+from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
+from campaign.protocol.limit_check import in_display_units
+from campaign.trial import Role
+
+NOTES = 5
+"""of a test that are shown; the others are in the JSON."""
+
+
+def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
+    """Show the plan. Raises LimitError, after showing it, when it would break a limit."""
+    prepared = prepare(request)
+    prepared.open_backend()  # refuses what it cannot execute; it is not connected
+    if as_json:
+        tree = {**as_tree(prepared.plan), "backend": prepared.kind.name}
+        print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        _print(prepared, results)
+    check_limits(prepared.plan)
+
+
+def _print(prepared: Prepared, results: Path) -> None:
+    plan = prepared.plan
+    if plan.title:
+        print_line(plan.title)
+        print_line()
+    headings = ("test", "kind", "bench", "trials", "bench time", "closest limits")
+    print_table(headings, [_row(test) for test in plan.tests])
+    for test in plan.tests:
+        _print_details(plan, test)
+    archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
+    print_line(
+        f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
+        f"{prepared.kind.name}; would write {archive}, at most {bytes_text(plan.size)}"
+    )
+    unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
+    if unseeded:
+        print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+
+
+def _row(test: PlannedTest) -> tuple[str, ...]:
+    closest = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)[:2]
+    limits = ", ".join(f"{use.margin.limit} {use.margin.fraction:.0%}" for use in closest)
+    trials = str(len(test.numbers))
+    return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
+
+
+def _print_details(plan: Plan, test: PlannedTest) -> None:
+    """How close the test comes to every limit, and what its trials are noted with."""
+    trials = [plan.trials[number - 1] for number in test.numbers]
+    print_line(f"{test.name}{f': {test.title}' if test.title else ''}")
+    warm_ups = sum(trial.role is Role.WARM_UP for trial in trials)
+    if warm_ups:
+        print_line(f"  {warm_ups} of the trials warm up and are not analysed")
+    for use in sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True):
+        value, bound = in_display_units(use.margin)
+        broken = "  BROKEN" if use.margin.broken else ""
+        share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
+        print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
+    notes = Counter(trial.note for trial in trials if trial.note)
+    for note, count in notes.most_common(NOTES):
+        print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")
+    if len(notes) > NOTES:
+        print_line(f"  and {len(notes) - NOTES} more notes; --json has them all")
+    print_line()

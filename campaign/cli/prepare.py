@@ -1,0 +1,113 @@
+"""From what was typed to a plan and a backend: everything that happens before anything moves."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from campaign.backends import backends
+from campaign.backends.interface import Backend, BackendKind
+from campaign.errors import UsageError
+from campaign.experiments import experiments
+from campaign.options import Options
+from campaign.protocol import Plan, load_protocol, make_plan
+from campaign.protocol.overrides import parse_overrides
+from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
+
+
+@dataclass(frozen=True)
+class Request:
+    """What `plan` and `run` have in common, as typed."""
+
+    protocol: str
+    only: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
+    backend: str = "sim"
+    allow_large: bool = False
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A plan and the backend that is to execute it, not yet connected."""
+
+    path: Path
+    plan: Plan
+    kind: BackendKind
+    options: Options
+
+    def open_backend(self) -> Backend:
+        """A backend that accepts every trial of the plan. Raises UsageError when it does not."""
+        backend = self.kind.open(self.options)
+        for trial in self.plan.trials:
+            why = backend.refuses(trial)
+            if why:
+                raise UsageError(
+                    f"the backend {self.kind.name!r} cannot execute {trial.name} "
+                    f"({trial.label}): {why}"
+                )
+        return backend
+
+
+def prepare(request: Request) -> Prepared:
+    """Load, validate and expand. Raises ProtocolError or UsageError."""
+    path = find_protocol(request.protocol)
+    kind = find_backend(request.backend)
+    ours = tuple(text for text in request.changes if _is_backend_setting(text))
+    theirs = tuple(text for text in request.changes if text not in ours)
+    options = backend_options(kind, ours)
+    protocol = load_protocol(path, experiments(), overrides=theirs, shipped=protocols_folder())
+    plan = make_plan(protocol, only=request.only, allow_large=request.allow_large)
+    return Prepared(path, plan, kind, options)
+
+
+def find_protocol(text: str) -> Path:
+    """The file of that name, else the shipped protocol of that name."""
+    path = Path(text)
+    if path.exists():
+        return path
+    shipped = shipped_protocol(text.removesuffix(".toml"))
+    if shipped is not None and path.name == text:
+        return shipped
+    names = shipped_protocols()
+    close = difflib.get_close_matches(path.stem, names, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(names)}"
+    raise UsageError(f"{text}: there is no such file, and no shipped protocol of that name; {hint}")
+
+
+def find_backend(name: str) -> BackendKind:
+    """The backend of that name. Raises UsageError naming those there are."""
+    kinds = backends()
+    if name not in kinds:
+        raise UsageError(f"there is no backend {name!r}; there are {', '.join(kinds)}")
+    return kinds[name]
+
+
+def backend_options(kind: BackendKind, changes: tuple[str, ...]) -> Options:
+    """The backend's options with every `backend.OPTION=VALUE` in its place."""
+    overrides, problems = parse_overrides(changes)
+    if problems:
+        raise UsageError("\n".join(str(problem) for problem in problems))
+    tree: dict[str, Any] = {}
+    for override in overrides:
+        table = tree
+        for key in override.keys[1:-1]:
+            table = table.setdefault(str(key), {})
+        table[str(override.keys[-1])] = override.value
+    try:
+        return kind.options.model_validate(tree)
+    except ValidationError as error:
+        raise UsageError(
+            "\n".join(
+                f"--set backend.{'.'.join(str(key) for key in each['loc'])}: {each['msg']}; "
+                f"`campaign kinds {kind.name}` lists the options"
+                for each in error.errors(include_url=False)
+            )
+        ) from None
+
+
+def _is_backend_setting(text: str) -> bool:
+    return text.lstrip().startswith("backend.")
