@@ -1,0 +1,130 @@
+"""From an archived run to results: each test's analysis, and what it brings to the scoreboard."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from campaign.archive import ArchivedTrial, RunReader
+from campaign.experiments.interface import Experiment, TestData, bench_of
+from campaign.physics.bench import Bench
+from campaign.report.published import Published, published_values
+from campaign.report.scoreboard import Evidence
+from campaign.result import Result
+from campaign.trial import Outcome, Tree
+
+
+@dataclass(frozen=True)
+class AnalysedTest:
+    """One test of a run with what its analysis found.
+
+    Attributes:
+        title: heading on the page.
+        reproduces: published tables it stands for.
+        options: normalised (SI), before the sweep.
+        trials: the executed ones, in plan order, failed ones included.
+        experiment, bench: None when this program does not know the kind, or nothing was executed.
+        problem: why there is no result, in one line; empty when there is one.
+    """
+
+    name: str
+    kind: str
+    title: str
+    description: str
+    reproduces: tuple[str, ...]
+    options: Tree
+    trials: tuple[ArchivedTrial, ...]
+    experiment: Experiment | None
+    bench: Bench | None
+    result: Result
+    problem: str = ""
+
+    @property
+    def failed(self) -> tuple[ArchivedTrial, ...]:
+        return tuple(t for t in self.trials if t.ending.outcome is not Outcome.COMPLETED)
+
+    def evidence(self) -> Evidence:
+        """What it brings to the scoreboard.
+
+        A table may ask whether a number is from a simulation or from hardware: here that is
+        whether the bench's controller is continuous, or sampled as a real one is.
+        """
+        bench = self.bench
+        domain = {} if bench is None else {"domain": domain_of(bench)}
+        return Evidence(
+            self.name,
+            self.reproduces,
+            self.result.findings,
+            given=bench.given if bench else (),
+            fitted=bench.fitted if bench else (),
+            known=domain,
+        )
+
+
+def analyse_run(run: RunReader, experiments: Mapping[str, Experiment]) -> tuple[AnalysedTest, ...]:
+    """Analyse every test of a run, in the protocol's order; a failing analysis is one problem."""
+    return tuple(_analyse(run, test, experiments) for test in run.header.tests)
+
+
+def published_of(run: RunReader) -> Published:
+    """The published values that the run's protocol compares with."""
+    chosen = run.header.normalised.get("published", "thesis")
+    if chosen == "none":
+        return {}
+    if not isinstance(chosen, str) or chosen not in run.header.sources:
+        return published_values()
+    return published_values(run.header.sources[chosen], chosen)
+
+
+def domain_of(bench: Bench) -> str:
+    """`simulation` for a continuous loop, `hardware` for a sampled one."""
+    return "simulation" if bench.controller.sample_rate is None else "hardware"
+
+
+def one_line(error: BaseException) -> str:
+    """An error without its traceback."""
+    lines = str(error).strip().splitlines()
+    text = lines[0] if lines else "no message"
+    return f"{type(error).__name__}: {text}"[:300]
+
+
+def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) -> AnalysedTest:
+    name, kind = str(test.get("name", "")), str(test.get("kind", ""))
+    options, reproduces = test.get("options"), test.get("reproduces")
+    trials = tuple(trial for trial in run.trials if trial.trial.test == name)
+    experiment = experiments.get(kind)
+    data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
+    result, problem = _result(data, experiment)
+    return AnalysedTest(
+        name=name,
+        kind=kind,
+        title=str(test.get("title") or "") or name,
+        description=str(test.get("description") or ""),
+        reproduces=tuple(str(r) for r in reproduces)
+        if isinstance(reproduces, list | tuple)
+        else (),
+        options=data.options,
+        trials=trials,
+        experiment=experiment,
+        bench=_bench(trials),
+        result=result,
+        problem=problem,
+    )
+
+
+def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]:
+    if experiment is None:
+        return Result(), f"no experiment is called {data.kind!r} here; install what provides it"
+    if not data.trials:
+        return Result(), "none of its trials was executed"
+    try:
+        return experiment.analyse(data), ""
+    except Exception as error:  # noqa: BLE001 (one bad analysis must not cost the other tests)
+        return Result(), f"the analysis failed: {one_line(error)}"
+
+
+def _bench(trials: tuple[ArchivedTrial, ...]) -> Bench | None:
+    try:
+        return bench_of(trials[0].trial) if trials else None
+    except ValueError:
+        return None

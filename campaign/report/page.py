@@ -1,0 +1,342 @@
+"""What the templates are given: plain, numbered, ordered data, nothing left to decide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from campaign.options import Options
+from campaign.report import tables
+from campaign.report.analysis import AnalysedTest, one_line
+from campaign.report.figures import draw, inline, pretty_unit
+from campaign.report.names import Names, figure_name
+from campaign.report.overview import cell_name, draw_overview
+from campaign.report.palette import STATUS
+from campaign.report.published import Cell, Published, PublishedTable
+from campaign.report.scoreboard import Line, Scoreboard, Status, to_csv
+from campaign.result import Figure, Table
+from campaign.trial import canonical_json
+from campaign.units import Quantity, convert
+
+LINKED = 300_000
+"""Characters of a CSV file up to which the page carries it; a longer one is only a file."""
+LISTED = 12
+"""Most values of a sweep that are written out."""
+SIGNS = {"o": "●", "D": "◆", "s": "■", "P": "✚", "v": "▼", "X": "✖", "x": "✕"}
+
+
+@dataclass(frozen=True)
+class ShownFigure:
+    """A figure on the page. `svg` is markup that is safe to write as it stands."""
+
+    number: int
+    anchor: str
+    title: str
+    caption: str
+    svg: str
+    file: str
+    published: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Download:
+    """A CSV file: its name in the folder, and where the page's link leads."""
+
+    file: str
+    href: str
+
+
+@dataclass(frozen=True)
+class ShownTable:
+    """A numbered table of a test."""
+
+    number: int
+    anchor: str
+    title: str
+    note: str
+    published: tuple[str, ...]
+    content: tables.ShownTable
+    download: Download
+
+
+@dataclass(frozen=True)
+class ShownLine:
+    """A published cell beside what the run found, as text."""
+
+    table: str
+    name: str
+    unit: str
+    published: str
+    reproduced: str
+    deviation: str
+    status: str
+    css: str
+    sign: str
+    agrees: bool | None
+    notes: tuple[str, ...]
+    test: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A published table beside what the run found."""
+
+    number: int
+    anchor: str
+    heading: str
+    title: str
+    source: str
+    lines: tuple[ShownLine, ...]
+    missing: tuple[str, ...]
+    download: Download
+
+
+@dataclass(frozen=True)
+class Section:
+    """One test on the page."""
+
+    anchor: str
+    test: AnalysedTest
+    conditions: tuple[tuple[str, str], ...]
+    figures: tuple[ShownFigure, ...]
+    tables: tuple[ShownTable, ...]
+    comparisons: tuple[Comparison, ...]
+    problems: tuple[str, ...]
+
+
+@dataclass
+class Folder:
+    """What the report's folder will contain, collected while the page is laid out."""
+
+    files: dict[str, str] = field(default_factory=dict)
+    table_names: Names = field(default_factory=Names)
+    figure_names: Names = field(default_factory=Names)
+    figures: int = 0
+    tables: int = 0
+
+    def table(self, text: str, *candidates: str) -> Download:
+        """Add a CSV file and say where its link leads."""
+        file = f"tables/{self.table_names.unique(*candidates)}.csv"
+        self.files[file] = text
+        return Download(file, tables.data_link(text) if len(text) <= LINKED else file)
+
+    def figure(
+        self, svg: str, title: str, caption: str, alt: str, published: tuple[str, ...], *names: str
+    ) -> ShownFigure:
+        """Add an SVG file and the numbered figure that shows it."""
+        from markupsafe import Markup
+
+        name = self.figure_names.unique(*names)
+        self.files[f"figures/{name}.svg"] = svg
+        self.figures += 1
+        anchor = f"figure-{self.figures}"
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        return ShownFigure(
+            self.figures, anchor, title, caption, markup, f"figures/{name}.svg", published
+        )
+
+    def next_table(self) -> int:
+        self.tables += 1
+        return self.tables
+
+
+def lay_out(
+    tests: Sequence[AnalysedTest], scoreboard: Scoreboard, published: Published, folder: Folder
+) -> tuple[Section, ...]:
+    """Sections in the protocol's order; each published table stands with its first test."""
+    spoken: set[str] = set()
+    sections = []
+    for number, test in enumerate(tests, start=1):
+        mine = [n for n in published if n in test.reproduces and n not in spoken]
+        spoken.update(mine)
+        sections.append(_section(number, test, scoreboard, [published[n] for n in mine], folder))
+    return tuple(sections)
+
+
+def overview(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
+    """The picture on top of the page."""
+    svg = draw_overview(scoreboard)
+    if svg is None:
+        return None
+    return folder.figure(
+        svg,
+        "Deviation from the published values",
+        "One sign per published number: how far the reproduced value is from it, and what the"
+        " comparison is worth. The axis is linear up to ±1 % and logarithmic beyond.",
+        tables.agreement(scoreboard),
+        (),
+        "scoreboard",
+    )
+
+
+def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
+    """`tables/scoreboard.csv`."""
+    return folder.table(to_csv(scoreboard.lines), "scoreboard")
+
+
+def shown_line(line: Line) -> ShownLine:
+    """A line of the scoreboard as text."""
+    cell, look = line.cell, STATUS[line.status]
+    claim = {"near": "≈ ", "at most": "≤ ", "at least": "≥ "}.get(cell.relation, "")
+    return ShownLine(
+        table=cell.table,
+        name=cell_name(line),
+        unit=pretty_unit(cell.unit),
+        published=claim + cell.printed.replace("-", "−"),
+        reproduced=tables.number(line.reproduced),
+        deviation=tables.percent(line.deviation),
+        status=str(line.status),
+        css=look.name,
+        sign=SIGNS[look.marker],
+        agrees=line.agrees,
+        notes=tuple(note for note in (cell.reason, *cell.notes) if note),
+        test=line.test,
+    )
+
+
+def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
+    """Status, its CSS name, its sign and how many lines have it; those that occur."""
+    counts = {s: sum(line.status is s for line in scoreboard.lines) for s in Status}
+    return tuple(
+        (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], count)
+        for status, count in counts.items()
+        if count
+    )
+
+
+def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], str], ...]:
+    """Per table and reason: the cells where the document contradicts itself."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for line in scoreboard.lines:
+        if line.status is Status.INCONSISTENT:
+            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line))
+    return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())
+
+
+def _section(
+    number: int,
+    test: AnalysedTest,
+    scoreboard: Scoreboard,
+    published: Sequence[PublishedTable],
+    folder: Folder,
+) -> Section:
+    problems = [test.problem] if test.problem else []
+    figures = [
+        shown
+        for figure in test.result.figures
+        if (shown := _attempt(problems, figure.key, lambda f=figure: _figure(test, f, folder)))  # type: ignore[misc]
+    ]
+    shown_tables = [
+        shown
+        for table in test.result.tables
+        if (shown := _attempt(problems, table.key, lambda t=table: _table(test, t, folder)))  # type: ignore[misc]
+    ]
+    return Section(
+        anchor=f"test-{number}",
+        test=test,
+        conditions=tuple(_conditions(test)),
+        figures=tuple(figures),
+        tables=tuple(shown_tables),
+        comparisons=tuple(
+            _comparison(table, scoreboard, folder) for table in published if table.cells
+        ),
+        problems=tuple(problems),
+    )
+
+
+def _attempt(problems: list[str], key: str, make: Callable[[], Any]) -> Any:
+    try:
+        return make()
+    except Exception as error:  # noqa: BLE001 (one bad figure must not cost the report)
+        problems.append(f"{key} cannot be shown: {one_line(error)}")
+        return None
+
+
+def _figure(test: AnalysedTest, figure: Figure, folder: Folder) -> ShownFigure:
+    return folder.figure(
+        draw(figure),
+        figure.title,
+        figure.caption,
+        figure.alt or figure.caption,
+        figure.thesis,
+        *figure_name(figure.thesis, test.name, figure.key),
+    )
+
+
+def _table(test: AnalysedTest, table: Table, folder: Folder) -> ShownTable:
+    content, text = tables.show(table), tables.table_csv(table)
+    download = folder.table(text, f"{test.name}-{table.key}")
+    number = folder.next_table()
+    return ShownTable(
+        number, f"table-{number}", table.title, table.note, table.thesis, content, download
+    )
+
+
+def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -> Comparison:
+    lines = scoreboard.of_table(table.name)
+    number = folder.next_table()
+    return Comparison(
+        number=number,
+        anchor=f"table-{number}",
+        heading=table.heading,
+        title=table.title,
+        source=table.source,
+        lines=tuple(shown_line(line) for line in lines),
+        missing=tuple(_cell_place(cell) for cell in scoreboard.missing if cell.table == table.name),
+        download=folder.table(tables.published_csv(lines), table.slug),
+    )
+
+
+def _cell_place(cell: Cell) -> str:
+    return f"{cell.row} · {cell.column}"
+
+
+def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
+    """Kind, bench, options and sweep, in words and display units."""
+    yield "Experiment", test.kind
+    if test.bench:
+        yield (
+            "Bench",
+            test.bench.name + (f": {test.bench.description}" if test.bench.description else ""),
+        )
+    count = f"{len(test.trials)} executed"
+    yield "Trials", count + (f", {len(test.failed)} not completed" if test.failed else "")
+    points: dict[str, dict[str, Any]] = {}
+    for trial in test.trials:
+        for path, value in trial.trial.point.items():
+            points.setdefault(path, {})[canonical_json(value)] = value
+    for path, value in test.options.items():
+        if path not in points:
+            yield _label(path), _with_unit(test, path, [value])
+    for path, values in points.items():
+        yield f"{_label(path)} (swept)", _with_unit(test, path, list(values.values()))
+
+
+def _label(path: str) -> str:
+    return path.replace("_", " ")
+
+
+def _with_unit(test: AnalysedTest, path: str, values: Sequence[Any]) -> str:
+    quantity = _quantity(test.experiment.options if test.experiment else None, path)
+    shown = [_plain(value, quantity) for value in values]
+    text = ", ".join(shown[:LISTED])
+    if len(shown) > LISTED:
+        text = f"{len(shown)} values from {shown[0]} to {shown[-1]}"
+    return f"{text} {pretty_unit(quantity.display)}" if quantity else text
+
+
+def _plain(value: Any, quantity: Quantity | None) -> str:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value if isinstance(value, str) else canonical_json(value)[:200]
+    return tables.number(convert(value, quantity.si, quantity.display) if quantity else value, 6)
+
+
+def _quantity(options: type[Options] | None, path: str) -> Quantity | None:
+    info = options.model_fields.get(path) if options else None
+    return next((m for m in info.metadata if isinstance(m, Quantity)), None) if info else None
+
+
+def anchors(sections: Sequence[Section]) -> Mapping[str, str]:
+    """Test name to the anchor of its section."""
+    return {section.test.name: section.anchor for section in sections}

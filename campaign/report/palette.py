@@ -1,0 +1,110 @@
+"""Colours, dashes and marks: one look per series, told apart by colour-blind eyes and in grey.
+
+Each colour has a light page's and a dark page's value; both reach the 3:1 contrast that WCAG 2.1
+(1.4.11) asks of graphics, and text colours the 4.5:1 of 1.4.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from campaign.report.scoreboard import Status
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a series is drawn.
+
+    Attributes:
+        name: of its CSS variable on the page.
+        light, dark: colour on the light and on the dark page.
+        dash: on and off lengths in line widths; empty for a solid line.
+        marker: matplotlib's sign for it.
+    """
+
+    name: str
+    light: str
+    dark: str
+    dash: tuple[float, ...]
+    marker: str
+
+
+PAPER = Look("paper", "#ffffff", "#191c20", (), "")
+INK = Look("ink", "#1c1f23", "#e6e8ea", (), "")
+MUTED = Look("muted", "#5b626a", "#a3abb3", (), "")
+HAIRLINE = Look("hairline", "#d9dde1", "#383e45", (), "")
+"""Grid lines and table rules: they carry no information of their own."""
+
+_BLUE = ("#0067b0", "#5cb3f2")
+_ORANGE = ("#c9540a", "#ff9a56")
+_GREEN = ("#0b7a5c", "#3fd0a2")
+_GREY = ("#4c5158", "#c3c8ce")
+_RED = ("#b3202c", "#ff8087")
+_PURPLE = ("#8a3f9c", "#d69be6")
+_OLIVE = ("#7a6a00", "#d9c84a")
+_CYAN = ("#0b7a8c", "#54cfe0")
+_PINK = ("#b8347c", "#f58fc4")
+
+SERIES = {
+    "none": Look("s-none", *_GREY, (), "o"),
+    "static": Look("s-static", *_ORANGE, (5.0, 1.6), "s"),
+    "lugre": Look("s-lugre", *_BLUE, (), "^"),
+    "observer": Look("s-observer", *_GREEN, (5.0, 1.4, 1.2, 1.4), "D"),
+    "measured": Look("s-measured", *_GREY, (), "o"),
+    "fit": Look("s-fit", *_RED, (), "v"),
+    "reference": Look("s-reference", MUTED.light, MUTED.dark, (1.2, 1.6), "x"),
+}
+"""The series the program itself draws: the same look in every figure of every report."""
+
+OTHERS = (
+    Look("s-other-1", *_BLUE, (), "o"),
+    Look("s-other-2", *_ORANGE, (5.0, 1.6), "s"),
+    Look("s-other-3", *_GREEN, (5.0, 1.4, 1.2, 1.4), "D"),
+    Look("s-other-4", *_PURPLE, (2.4, 1.4), "^"),
+    Look("s-other-5", *_OLIVE, (8.0, 2.0), "v"),
+    Look("s-other-6", *_CYAN, (1.2, 1.6), "P"),
+    Look("s-other-7", *_PINK, (5.0, 1.2, 1.2, 1.2, 1.2, 1.2), "X"),
+    Look("s-other-8", *_RED, (3.5, 1.0), "d"),
+)
+"""For any other series, in the order a figure first names them."""
+
+STATUS = {
+    Status.SIMULATED: Look("st-simulated", *_BLUE, (), "o"),
+    Status.PREDICTED: Look("st-predicted", *_GREEN, (), "D"),
+    Status.RECOVERED: Look("st-recovered", *_CYAN, (), "s"),
+    Status.RECOMPUTED: Look("st-recomputed", *_PURPLE, (), "P"),
+    Status.CALIBRATED: Look("st-calibrated", *_OLIVE, (), "v"),
+    Status.INCONSISTENT: Look("st-inconsistent", *_RED, (), "X"),
+    Status.NOT_REPRODUCIBLE: Look("st-not-reproducible", *_GREY, (), "x"),
+}
+"""Colour and sign of each status, on the scoreboard and beside every number."""
+
+
+def looks(series: Iterable[str]) -> dict[str, Look]:
+    """A look for each series of one figure, in the order they appear in it."""
+    chosen: dict[str, Look] = {}
+    others = 0
+    for name in series:
+        if name not in chosen:
+            chosen[name] = SERIES.get(name) or OTHERS[others % len(OTHERS)]
+            others += name not in SERIES
+    return chosen
+
+
+def variables() -> dict[str, tuple[str, str]]:
+    """CSS variable to its colour on the light and on the dark page, sorted."""
+    all_looks = (PAPER, INK, MUTED, HAIRLINE, *SERIES.values(), *OTHERS, *STATUS.values())
+    return {look.name: (look.light, look.dark) for look in sorted(all_looks, key=lambda a: a.name)}
+
+
+def contrast(first: str, second: str) -> float:
+    """WCAG 2.1 contrast ratio of two `#rrggbb` colours, 1 to 21."""
+    low, high = sorted((_luminance(first), _luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    channels = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

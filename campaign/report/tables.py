@@ -1,0 +1,170 @@
+"""Tables in a reader's units: few digits on the page, all of them in the CSV file."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from campaign.report.figures import pretty_unit
+from campaign.report.scoreboard import Line, Scoreboard
+from campaign.result import Column, Table, Value
+from campaign.units import convert
+
+ROWS = 300
+"""Most rows on the page; the CSV file has them all."""
+
+
+@dataclass(frozen=True)
+class ShownCell:
+    """A cell on the page: its text and whether it is a number (those stand right-aligned)."""
+
+    text: str
+    number: bool
+
+
+@dataclass(frozen=True)
+class ShownTable:
+    """A table as the page shows it; `left_out` rows are in the CSV file only."""
+
+    headers: tuple[str, ...]
+    rows: tuple[tuple[ShownCell, ...], ...]
+    left_out: int = 0
+
+
+def show(table: Table) -> ShownTable:
+    """The first `ROWS` rows, rounded to four significant digits, in display units."""
+    rows = tuple(
+        tuple(_shown_cell(_displayed(row.get(c.name), c)) for c in table.columns)
+        for row in table.rows[:ROWS]
+    )
+    headers = tuple(
+        f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
+        for column in table.columns
+    )
+    return ShownTable(headers, rows, max(0, len(table.rows) - ROWS))
+
+
+def table_csv(table: Table) -> str:
+    """All rows, unrounded, in display units that the header names (`error_mrad`)."""
+    headers = [_csv_name(column) for column in table.columns]
+    rows = ([_exact(_displayed(row.get(c.name), c)) for c in table.columns] for row in table.rows)
+    return _csv(headers, rows)
+
+
+def published_csv(lines: Sequence[Line]) -> str:
+    """One published table: every cell with what was reproduced, unrounded, and the reason."""
+    headers = ("row", "column", "unit", "published", "reproduced", "deviation_percent", "status")
+    rows = (
+        (
+            line.cell.row,
+            line.cell.column,
+            line.cell.unit,
+            _exact(line.cell.value),
+            _exact(line.reproduced),
+            _exact(line.deviation),
+            str(line.status),
+            line.cell.reason,
+            line.test,
+        )
+        for line in lines
+    )
+    return _csv((*headers, "reason", "test"), rows)
+
+
+def data_link(text: str) -> str:
+    """A CSV text as a `data:` address, for a download that needs no second file."""
+    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(text.encode()).decode("ascii")
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number for people: at most `digits` significant ones, no exponent where none is needed."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    short = float(f"{value:.{digits}g}")
+    exact = math.isclose(short, value, rel_tol=1e-12)
+    if not 1e-5 <= abs(short) < 10.0 ** (digits + 3):
+        mantissa, exponent = f"{short:.{digits - 1}e}".split("e")
+        return _minus(f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}")
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(short))))
+    text = f"{short:.{decimals}f}"
+    return _minus(text.rstrip("0").rstrip(".") if exact and "." in text else text)
+
+
+def percent(value: float | None) -> str:
+    """A deviation for people: signed, two significant digits, at least one decimal below 10 %."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if abs(value) < 0.005:
+        return "0.00 %"
+    decimals = 2 if abs(value) < 1 else 1 if abs(value) < 100 else 0
+    return _minus(f"{value:+.{decimals}f} %")
+
+
+def agreement(scoreboard: Scoreboard) -> str:
+    """One sentence on the whole scoreboard."""
+    compared = [abs(line.deviation) for line in scoreboard.lines if line.deviation is not None]
+    agreeing = sum(line.agrees is True for line in scoreboard.lines)
+    if not compared:
+        return "No published number was measured in this run."
+    middle = sorted(compared)[len(compared) // 2]
+    return (
+        f"{len(compared)} published numbers compared: half of them deviate by less than"
+        f" {middle:.2g} %, the worst by {max(compared):.2g} %;"
+        f" {agreeing} agree to the printed digit or meet the claim."
+    )
+
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−")
+
+
+def _unit(column: Column) -> str:
+    return column.display or column.unit
+
+
+def _displayed(value: Value, column: Column) -> Value:
+    if isinstance(value, int | float) and not isinstance(value, bool) and column.display:
+        return float(convert(float(value), column.unit, column.display))
+    return value
+
+
+def _shown_cell(value: Value) -> ShownCell:
+    if isinstance(value, bool):
+        return ShownCell("yes" if value else "no", number=False)
+    if isinstance(value, int):
+        return ShownCell(_minus(str(value)), number=True)
+    if isinstance(value, float):
+        return ShownCell(number(value), number=True)
+    return ShownCell("–" if value is None else str(value), number=False)
+
+
+def _csv_name(column: Column) -> str:
+    unit = _unit(column).replace("%", "percent").replace("^", "").replace("/", " per ")
+    words = re.findall(r"\w+", f"{column.name} {unit}")
+    return "_".join(words)
+
+
+def _exact(value: Value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headers)
+    writer.writerows(rows)
+    return text.getvalue()
