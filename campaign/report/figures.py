@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from campaign.report.decimate import POINTS, decimate
 from campaign.report.palette import HAIRLINE, INK, MUTED, PAPER, Look, looks, variables
+from campaign.report.text import number, pretty_unit
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.units import factor
 
@@ -224,8 +225,8 @@ def _draw_curve(
         return
     x, y = decimate(x, y, points)
     line: dict[str, Any] = {"color": look.light, "label": label, "linewidth": 1.4}
-    if look.dash:
-        line["dashes"] = look.dash
+    if look.dash:  # above the solid lines, which then show through the gaps
+        line |= {"dashes": look.dash, "zorder": 2.1}
     if curve.style == "thin":
         line |= {"linewidth": 0.6, "alpha": 0.75}
     if curve.style == "line+points":
@@ -269,7 +270,7 @@ def _draw_mark(ax: Axes, mark: Mark, scale_x: float, scale_y: float) -> None:
 
 
 def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
-    from matplotlib.ticker import LogFormatter
+    from matplotlib.ticker import FuncFormatter
 
     ax.set_xlabel(axis_label(panel.x))
     ax.set_ylabel(axis_label(panel.y))
@@ -281,20 +282,28 @@ def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
             set_limits(axis.limits[0] * scale, axis.limits[1] * scale)
     for drawn in (ax.xaxis, ax.yaxis):
         if drawn.get_scale() == "log":
-            drawn.set_major_formatter(LogFormatter())
-            drawn.set_minor_formatter(LogFormatter(minor_thresholds=(1.2, 0.5)))
+            low, high = drawn.get_view_interval()
+            short = 0 < low < high < 20 * low
+            drawn.set_major_formatter(FuncFormatter(_plain_tick))
+            drawn.set_minor_formatter(FuncFormatter(_twos_and_fives if short else _no_tick))
+
+
+def _plain_tick(value: float, position: int | None) -> str:
+    return number(value)
+
+
+def _twos_and_fives(value: float, position: int | None) -> str:
+    return number(value) if f"{value:e}"[0] in "25" else ""
+
+
+def _no_tick(value: float, position: int | None) -> str:
+    return ""
 
 
 def axis_label(axis: Axis) -> str:
     """`label (unit)` in the unit of the page."""
     unit = axis.display or axis.unit
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label
-
-
-def pretty_unit(unit: str) -> str:
-    """A unit as people read it: `deg/s²`, `N·m`, `%`."""
-    shown = unit.replace("percent", "%").replace("^2", "²").replace("^3", "³").replace("ohm", "Ω")
-    return re.sub(r"(?<=\w) (?=\w)", "·", shown).replace("deg", "°" if unit == "deg" else "deg")
 
 
 def _scale(axis: Axis) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from campaign.report.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS
+from campaign.report.published import Cell
 from campaign.report.scoreboard import Line, Scoreboard
 
 if TYPE_CHECKING:
@@ -43,10 +44,15 @@ def draw_overview(scoreboard: Scoreboard) -> str | None:
         return to_svg(sheet)
 
 
-def cell_name(line: Line) -> str:
-    """A cell within its table, as short as it can be said."""
-    row, column = line.cell.row, line.cell.column
-    return row if column in (line.cell.quantity, "value") else f"{row} · {column}"
+def cell_name(cell: Cell) -> str:
+    """A cell within its table in words, as short as it can be said."""
+    parts = (cell.row, cell.column)
+    told = [part for part in parts if part not in (cell.quantity, "value")] or [cell.row]
+    if cell.symbol and cell.quantity in parts:
+        told.insert(parts.index(cell.quantity), cell.symbol)
+    elif cell.symbol:
+        told[0] = f"{told[0]} {cell.symbol}"
+    return " · ".join(part.replace("_", " ") for part in told)
 
 
 def _draw_table(
@@ -71,7 +77,7 @@ def _draw_table(
             linestyle="none",
         )
         if named:
-            ax.text(-0.015, y, cell_name(line), fontsize=7.5, color=MUTED.light, **text)
+            ax.text(-0.015, y, cell_name(line.cell), fontsize=7.5, color=MUTED.light, **text)
 
 
 def _draw_axis(ax: Axes, lines: list[Line]) -> None:

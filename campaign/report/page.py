@@ -9,12 +9,13 @@ from typing import Any
 from campaign.options import Options
 from campaign.report import tables
 from campaign.report.analysis import AnalysedTest, one_line
-from campaign.report.figures import draw, inline, pretty_unit
+from campaign.report.figures import draw, inline
 from campaign.report.names import Names, figure_name
 from campaign.report.overview import cell_name, draw_overview
 from campaign.report.palette import STATUS
-from campaign.report.published import Cell, Published, PublishedTable
+from campaign.report.published import Published, PublishedTable
 from campaign.report.scoreboard import Line, Scoreboard, Status, to_csv
+from campaign.report.text import minus, number, percent, pretty_unit
 from campaign.result import Figure, Table
 from campaign.trial import canonical_json
 from campaign.units import Quantity, convert
@@ -147,10 +148,10 @@ def lay_out(
     """Sections in the protocol's order; each published table stands with its first test."""
     spoken: set[str] = set()
     sections = []
-    for number, test in enumerate(tests, start=1):
+    for place, test in enumerate(tests, start=1):
         mine = [n for n in published if n in test.reproduces and n not in spoken]
         spoken.update(mine)
-        sections.append(_section(number, test, scoreboard, [published[n] for n in mine], folder))
+        sections.append(_section(place, test, scoreboard, [published[n] for n in mine], folder))
     return tuple(sections)
 
 
@@ -181,11 +182,11 @@ def shown_line(line: Line) -> ShownLine:
     claim = {"near": "≈ ", "at most": "≤ ", "at least": "≥ "}.get(cell.relation, "")
     return ShownLine(
         table=cell.table,
-        name=cell_name(line),
+        name=cell_name(line.cell),
         unit=pretty_unit(cell.unit),
-        published=claim + cell.printed.replace("-", "−"),
-        reproduced=tables.number(line.reproduced),
-        deviation=tables.percent(line.deviation),
+        published=claim + minus(cell.printed),
+        reproduced=number(line.reproduced, decimals=cell.decimals or 0),
+        deviation=percent(line.deviation),
         status=str(line.status),
         css=look.name,
         sign=SIGNS[look.marker],
@@ -210,18 +211,19 @@ def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], 
     found: dict[tuple[str, str], list[str]] = {}
     for line in scoreboard.lines:
         if line.status is Status.INCONSISTENT:
-            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line))
+            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
     return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())
 
 
 def _section(
-    number: int,
+    place: int,
     test: AnalysedTest,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
     folder: Folder,
 ) -> Section:
     problems = [test.problem] if test.problem else []
+    comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
     figures = [
         shown
         for figure in test.result.figures
@@ -233,14 +235,12 @@ def _section(
         if (shown := _attempt(problems, table.key, lambda t=table: _table(test, t, folder)))  # type: ignore[misc]
     ]
     return Section(
-        anchor=f"test-{number}",
+        anchor=f"test-{place}",
         test=test,
         conditions=tuple(_conditions(test)),
         figures=tuple(figures),
         tables=tuple(shown_tables),
-        comparisons=tuple(
-            _comparison(table, scoreboard, folder) for table in published if table.cells
-        ),
+        comparisons=tuple(comparisons),
         problems=tuple(problems),
     )
 
@@ -267,29 +267,25 @@ def _figure(test: AnalysedTest, figure: Figure, folder: Folder) -> ShownFigure:
 def _table(test: AnalysedTest, table: Table, folder: Folder) -> ShownTable:
     content, text = tables.show(table), tables.table_csv(table)
     download = folder.table(text, f"{test.name}-{table.key}")
-    number = folder.next_table()
+    place = folder.next_table()
     return ShownTable(
-        number, f"table-{number}", table.title, table.note, table.thesis, content, download
+        place, f"table-{place}", table.title, table.note, table.thesis, content, download
     )
 
 
 def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -> Comparison:
     lines = scoreboard.of_table(table.name)
-    number = folder.next_table()
+    place = folder.next_table()
     return Comparison(
-        number=number,
-        anchor=f"table-{number}",
+        number=place,
+        anchor=f"table-{place}",
         heading=table.heading,
         title=table.title,
         source=table.source,
         lines=tuple(shown_line(line) for line in lines),
-        missing=tuple(_cell_place(cell) for cell in scoreboard.missing if cell.table == table.name),
+        missing=tuple(cell_name(cell) for cell in scoreboard.missing if cell.table == table.name),
         download=folder.table(tables.published_csv(lines), table.slug),
     )
-
-
-def _cell_place(cell: Cell) -> str:
-    return f"{cell.row} · {cell.column}"
 
 
 def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
@@ -329,7 +325,7 @@ def _with_unit(test: AnalysedTest, path: str, values: Sequence[Any]) -> str:
 def _plain(value: Any, quantity: Quantity | None) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value if isinstance(value, str) else canonical_json(value)[:200]
-    return tables.number(convert(value, quantity.si, quantity.display) if quantity else value, 6)
+    return number(convert(value, quantity.si, quantity.display) if quantity else value, 6)
 
 
 def _quantity(options: type[Options] | None, path: str) -> Quantity | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, Self, TypeVar
@@ -152,6 +152,7 @@ class Cell:
         decimals: printed digits after the point, None when unknown.
         status: `inconsistent`, `not reproducible` or None; `reason` says why.
         notes: what else to know about it.
+        symbol: the document's sign for its row, or for its column.
     """
 
     table: str
@@ -166,6 +167,7 @@ class Cell:
     status: Verdict | None = None
     reason: str = ""
     notes: tuple[str, ...] = ()
+    symbol: str = ""
 
     @property
     def path(self) -> str:
@@ -187,7 +189,6 @@ class PublishedTable:
     domain: str
     source: str
     cells: tuple[Cell, ...]
-    symbols: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def heading(self) -> str:
@@ -244,10 +245,7 @@ def _table(table: TableOptions, source: str) -> PublishedTable:
         for column, value in zip(table.column_names, values, strict=True)
         if value is not None
     )
-    symbols = {
-        name: part.symbol for name, part in (table.row | table.column).items() if part.symbol
-    }
-    return PublishedTable(table.name, table.title, table.domain, source, cells, symbols)
+    return PublishedTable(table.name, table.title, table.domain, source, cells)
 
 
 def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
@@ -280,6 +278,7 @@ def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
         status=verdict.status if verdict else None,
         reason=verdict.reason if verdict else "",
         notes=tuple(mark.reason for mark in marks if mark.status is None),
+        symbol=parts[1].symbol or parts[2].symbol,
     )
 
 

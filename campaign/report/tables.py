@@ -5,13 +5,12 @@ from __future__ import annotations
 import base64
 import csv
 import io
-import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from campaign.report.figures import pretty_unit
-from campaign.report.scoreboard import Line, Scoreboard
+from campaign.report.scoreboard import Line, Scoreboard, Status
+from campaign.report.text import minus, number, pretty_unit
 from campaign.result import Column, Table, Value
 from campaign.units import convert
 
@@ -81,51 +80,18 @@ def data_link(text: str) -> str:
     return "data:text/csv;charset=utf-8;base64," + base64.b64encode(text.encode()).decode("ascii")
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """A number for people: at most `digits` significant ones, no exponent where none is needed."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    if value == 0:
-        return "0"
-    short = float(f"{value:.{digits}g}")
-    exact = math.isclose(short, value, rel_tol=1e-12)
-    if not 1e-5 <= abs(short) < 10.0 ** (digits + 3):
-        mantissa, exponent = f"{short:.{digits - 1}e}".split("e")
-        return _minus(f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}")
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(short))))
-    text = f"{short:.{decimals}f}"
-    return _minus(text.rstrip("0").rstrip(".") if exact and "." in text else text)
-
-
-def percent(value: float | None) -> str:
-    """A deviation for people: signed, two significant digits, at least one decimal below 10 %."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    if abs(value) < 0.005:
-        return "0.00 %"
-    decimals = 2 if abs(value) < 1 else 1 if abs(value) < 100 else 0
-    return _minus(f"{value:+.{decimals}f} %")
-
-
 def agreement(scoreboard: Scoreboard) -> str:
     """One sentence on the whole scoreboard."""
-    compared = [abs(line.deviation) for line in scoreboard.lines if line.deviation is not None]
-    agreeing = sum(line.agrees is True for line in scoreboard.lines)
+    lines = [line for line in scoreboard.lines if line.status is not Status.INCONSISTENT]
+    compared = sorted(abs(line.deviation) for line in lines if line.deviation is not None)
     if not compared:
         return "No published number was measured in this run."
-    middle = sorted(compared)[len(compared) // 2]
+    agreeing = sum(line.agrees is True for line in lines)
     return (
-        f"{len(compared)} published numbers compared: half of them deviate by less than"
-        f" {middle:.2g} %, the worst by {max(compared):.2g} %;"
+        f"{len(compared)} published numbers compared: the median deviation is"
+        f" {compared[len(compared) // 2]:.2g} %, the worst {compared[-1]:.2g} %;"
         f" {agreeing} agree to the printed digit or meet the claim."
     )
-
-
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
 
 
 def _unit(column: Column) -> str:
@@ -142,7 +108,7 @@ def _shown_cell(value: Value) -> ShownCell:
     if isinstance(value, bool):
         return ShownCell("yes" if value else "no", number=False)
     if isinstance(value, int):
-        return ShownCell(_minus(str(value)), number=True)
+        return ShownCell(minus(str(value)), number=True)
     if isinstance(value, float):
         return ShownCell(number(value), number=True)
     return ShownCell("–" if value is None else str(value), number=False)
