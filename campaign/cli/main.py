@@ -9,7 +9,7 @@ import traceback
 
 from campaign.cli.app import app
 from campaign.cli.output import print_note
-from campaign.errors import CampaignError, ExitCode
+from campaign.errors import CampaignError, ExitCode, ProtocolError
 
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
 DEBUG = "CAMPAIGN_DEBUG"
@@ -19,6 +19,9 @@ def main() -> None:
     """Run the command line and exit with its documented code."""
     try:
         app(prog_name="campaign")
+    except ProtocolError as error:  # as it is: editors jump to file:line:column
+        _explain_in_debug()
+        _leave(str(error), error.exit_code)
     except CampaignError as error:
         _explain_in_debug()
         _leave(f"campaign: {error}", error.exit_code)

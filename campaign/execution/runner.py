@@ -115,18 +115,21 @@ def _safe_afterwards(backend: Backend, ended: _Ended, folder: Path) -> Iterator[
     try:
         yield
     except KeyboardInterrupt:
-        _make_safe(backend, ended)
+        _make_safe(backend, ended, folder)
         raise _aborted(ended, folder) from None
     except BaseException:
-        _make_safe(backend, ended)
+        _make_safe(backend, ended, folder)
         raise
     else:
-        _make_safe(backend, ended)
+        _make_safe(backend, ended, folder)
 
 
-def _make_safe(backend: Backend, ended: _Ended) -> None:
+def _make_safe(backend: Backend, ended: _Ended, folder: Path) -> None:
     try:
         ended.safe_state = backend.make_safe()
+    except KeyboardInterrupt:
+        ended.unsafe = "making the bench safe was interrupted"
+        raise _aborted(ended, folder) from None
     except Exception as error:  # noqa: BLE001 - nothing may hide that the bench is not safe
         ended.unsafe = f"making the bench safe failed: {_describe(error)}"
     else:

@@ -46,7 +46,8 @@ class StopSwitch:
             yield self
         finally:
             for number, handler in before.items():
-                signal.signal(number, handler)
+                if handler is not None:  # None: not set from Python, and not ours to put back
+                    signal.signal(number, handler)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self():

@@ -183,6 +183,16 @@ def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
     assert bench.archive.sealed is None
 
 
+def test_a_stop_while_the_bench_is_made_safe_is_not_taken_for_safe():
+    def interrupted() -> SafeState:
+        raise KeyboardInterrupt
+
+    bench = Bench(1, FakeBackend(rest=interrupted))
+    with pytest.raises(AbortedError, match="safe state NOT confirmed") as aborted:
+        bench.run()
+    assert aborted.value.exit_code is ExitCode.NOT_SAFE
+
+
 def test_parallel_trials_run_at_the_same_time_and_all_are_archived():
     together = threading.Barrier(2, timeout=10)
 

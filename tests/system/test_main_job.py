@@ -1,0 +1,137 @@
+"""A protocol runs, is archived, and becomes a report: from an empty folder, as a user would."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.system.user import SEA, campaign, write
+
+
+@pytest.fixture(scope="module")
+def quickstart(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A folder in which the shipped quick start has run, and the archive."""
+    folder = tmp_path_factory.mktemp("quickstart")
+    done = campaign(folder, "run", "quickstart", "--report")
+    assert done.out.count("\n") == 1, "standard output has the archive's path and nothing else"
+    return folder, folder / done.last_line
+
+
+def test_a_run_leaves_one_sealed_archive_and_a_report_where_documented(quickstart):
+    folder, archive = quickstart
+    report = archive.with_name(f"{archive.stem}-report")
+    assert archive.parent == folder / "results"
+    assert {path.name for path in archive.parent.iterdir()} == {archive.name, report.name}
+    assert (report / "report.html").is_file()
+    assert list((report / "tables").glob("*.csv"))
+    assert list((report / "figures").glob("*.svg"))
+
+
+def test_the_scoreboard_reproduces_the_published_stabilization_error(quickstart):
+    _, archive = quickstart
+    path = archive.with_name(f"{archive.stem}-report") / "tables" / "scoreboard.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert list(lines[0]) == [
+        *("table", "row", "column", "unit", "published", "reproduced"),
+        *("deviation_percent", "status"),
+    ]
+    none = [line for line in lines if (line["table"], line["row"]) == ("5.2", "none")]
+    assert [float(line["published"]) for line in none] == [0.4844]
+    assert float(none[0]["reproduced"]) == pytest.approx(0.48841, rel=0.01)
+
+
+def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart, tmp_path: Path):
+    _, archive = quickstart
+    copy = Path(shutil.copy(archive, tmp_path))
+    campaign(tmp_path, "report", copy.name, "--output", "page")
+    first = archive.with_name(f"{archive.stem}-report")
+    for file in sorted(path for path in first.rglob("*") if path.is_file()):
+        same = tmp_path / "page" / file.relative_to(first)
+        assert same.read_bytes() == file.read_bytes(), file.name
+
+
+def test_report_takes_the_newest_run_when_none_is_named(tmp_path: Path):
+    write(tmp_path, SEA)
+    campaign(tmp_path, "run", "protocol.toml", "--only", "sea")
+    newest = campaign(tmp_path, "run", "protocol.toml").last_line
+    page = campaign(tmp_path, "report").last_line
+    assert page == str(Path(newest).with_suffix("")) + "-report/report.html"
+
+
+def test_own_templates_win_only_when_asked_for(quickstart, tmp_path: Path):
+    _, archive = quickstart
+    (tmp_path / "templates").mkdir()
+    write(tmp_path / "templates", "own page of {{ run.name }}\n", "report.html")
+    campaign(tmp_path, "report", str(archive), "--output", "packaged")
+    campaign(tmp_path, "report", str(archive), "--output", "own", "--templates", "templates")
+    assert "own page" not in (tmp_path / "packaged" / "report.html").read_text(encoding="utf-8")
+    own = (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
+    assert own.strip() == f"own page of {archive.stem}"
+
+
+def test_list_and_show_say_what_ran(quickstart):
+    folder, archive = quickstart
+    heading, line = campaign(folder, "list").out.splitlines()
+    shown = dict(zip(heading.split("\t"), line.split("\t"), strict=True))
+    assert shown["run"] == archive.stem
+    assert (shown["status"], shown["failed"], shown["protocol"]) == ("complete", "0", "quickstart")
+    unique_beginning = archive.stem[:8]
+    show = campaign(folder, "show", unique_beginning).out
+    assert archive.stem in show
+    for test in ("velocity-map", "breakaway", "stabilization"):
+        assert test in show
+
+
+def test_the_plan_executes_nothing_and_is_what_runs(tmp_path: Path):
+    write(
+        tmp_path, SEA + '\n[[test]]\nname = "other"\nkind = "stabilization"\nbench = "simulink"\n'
+    )
+    plan = json.loads(campaign(tmp_path, "plan", "protocol.toml", "--json", "--only", "sea").out)
+    assert [path.name for path in tmp_path.iterdir()] == ["protocol.toml"]
+    assert [trial["compensation"] for trial in plan["trials"]] == ["none", "lugre"]
+    assert plan["duration_s"] == pytest.approx(2 * 2 / 0.24)  # two trials of two cycles at 0.24 Hz
+    text = campaign(tmp_path, "plan", "protocol.toml").out
+    assert "3 trials" in text
+    assert "of the rate limit" in text
+    run = campaign(tmp_path, "run", "protocol.toml", "--only", "sea")
+    assert run.err.splitlines()[-1].startswith("complete: 2 trials done")
+
+
+def test_set_changes_a_test_and_the_archive_says_so(tmp_path: Path):
+    write(tmp_path, SEA)
+    change = 'sea.frequency="0.5 Hz"'
+    plan = json.loads(campaign(tmp_path, "plan", "protocol.toml", "--json", "--set", change).out)
+    assert plan["duration_s"] == pytest.approx(2 * 2 / 0.5)
+    run = campaign(tmp_path, "run", "protocol.toml", "--set", change, "--workers", "1").last_line
+    assert change in campaign(tmp_path, "show", run).out
+
+
+def test_init_gives_a_folder_to_start_from_and_never_overwrites(tmp_path: Path):
+    campaign(tmp_path, "init", "lab")
+    assert (tmp_path / "lab" / "protocols" / "benches" / "simulink.toml").is_file()
+    assert (tmp_path / "lab" / "templates" / "report.html").is_file()
+    lab = tmp_path / "lab"
+    campaign(lab, "plan", "protocols/quickstart.toml")
+    write(lab / "protocols", "# mine\n", "quickstart.toml")
+    refused = campaign(tmp_path, "init", "lab", code=2)
+    assert "nothing was written" in refused.err
+    assert (lab / "protocols" / "quickstart.toml").read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_kinds_show_unit_default_and_meaning(tmp_path: Path):
+    kinds = campaign(tmp_path, "kinds").out
+    names = ("stabilization", "velocity_map", "breakaway", "lugre", "stribeck", "observer", "sim")
+    assert {line.split("\t")[1] for line in kinds.splitlines()} >= set(names)
+    options = campaign(tmp_path, "kinds", "stabilization").out.splitlines()
+    frequency = next(line.split("\t") for line in options if line.startswith("frequency\t"))
+    assert frequency[1:3] == ["Hz", "0.24 Hz"]
+    assert frequency[3]
+
+
+def test_python_m_and_version(tmp_path: Path):
+    assert campaign(tmp_path, "--version").out.startswith("campaign 0.")
