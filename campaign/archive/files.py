@@ -5,13 +5,19 @@ from __future__ import annotations
 import hashlib
 import os
 from pathlib import Path
+from typing import BinaryIO
 
 PART = ".part"
 """Ending of a file that is still being written. No reader takes such a file for an archive."""
 
-TRAILER = b"\ncampaign-sha256 %s\n"
-TRAILER_LENGTH = len(TRAILER) - 2 + 64
 _BLOCK = 1 << 20
+
+
+def why(error: Exception) -> str:
+    """What went wrong, in a line: HDF5 tells a page about a full disk."""
+    if isinstance(error, OSError) and error.errno:
+        return os.strerror(error.errno)
+    return " ".join(str(error).split())[:300] or type(error).__name__
 
 
 def sync_file(path: Path) -> None:
@@ -45,42 +51,25 @@ def write_atomically(path: Path, content: str) -> None:
     publish(part, path)
 
 
-def sha256_of(path: Path, length: int | None = None) -> str:
-    """SHA-256 of a file, or of its first `length` bytes, in flat memory."""
+def sha256_of(path: Path, blank: tuple[int, int] = (0, 0)) -> str:
+    """SHA-256 of a file in flat memory.
+
+    Args:
+        path: the file.
+        blank: offset and length of bytes that count as `0` digits: where the hash itself stands.
+    """
+    offset, length = blank
     digest = hashlib.sha256()
-    left = path.stat().st_size if length is None else length
     with path.open("rb") as file:
-        while left > 0 and (block := file.read(min(_BLOCK, left))):
-            digest.update(block)
-            left -= len(block)
+        _digest(file, digest, offset)
+        digest.update(b"0" * len(file.read(length)))
+        _digest(file, digest, None)
     return digest.hexdigest()
 
 
-def append_trailer(path: Path) -> None:
-    """Append the hash of everything before it: HDF5 ignores what follows its own end.
-
-    The hash then travels with the file, and any later change of any byte is found.
-    """
-    digest = sha256_of(path)
-    with path.open("ab") as file:
-        file.write(TRAILER % digest.encode("ascii"))
-
-
-def trailer_stands(path: Path) -> bool:
-    """Whether the file ends the way a sealed file does: a cut-off one does not (costs nothing)."""
-    before, after = TRAILER.split(b"%s")
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - TRAILER_LENGTH))
-        trailer = file.read()
-    return trailer.startswith(before) and trailer.endswith(after)
-
-
-def trailer_holds(path: Path) -> bool:
-    """Whether the file is byte for byte what was sealed."""
-    length = path.stat().st_size - TRAILER_LENGTH
-    if length < 0:
-        return False
-    with path.open("rb") as file:
-        file.seek(length)
-        trailer = file.read()
-    return trailer == TRAILER % sha256_of(path, length).encode("ascii")
+def _digest(file: BinaryIO, digest: hashlib._Hash, length: int | None) -> None:
+    """Feed the next `length` bytes, or all that are left."""
+    left = length
+    while block := file.read(_BLOCK if left is None else min(_BLOCK, left)):
+        digest.update(block)
+        left = None if left is None else left - len(block)

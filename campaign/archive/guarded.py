@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.archive.files import why
 from campaign.archive.hdf5 import CHECKSUM, SAMPLE
 from campaign.errors import ArchiveError
 
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 _MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
 _LARGEST_CHUNK = 1 << 22  # samples
+_CHECKED_AT_ONCE = 1 << 18  # samples
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 
 # What h5py raises on damage is not documented, and is of every kind.
@@ -52,8 +54,7 @@ def guarded(path: Path, place: str = "") -> Iterator[None]:
         raise
     except _DAMAGE as error:
         where = f"{path}: {place}" if place else str(path)
-        text = " ".join(str(error).split())[:300] or type(error).__name__
-        raise ArchiveError(f"{where}: cannot be read: {text}") from None
+        raise ArchiveError(f"{where}: cannot be read: {why(error)}") from None
 
 
 @contextlib.contextmanager
@@ -96,6 +97,18 @@ def text_at(parent: h5py.Group, name: str) -> str:
     return raw.decode("utf-8")
 
 
+def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
+    """The file's own hash, and the offset and length of the place where it stands."""
+    *groups, name = path.split("/")
+    for group in groups:
+        parent = _own(parent, group)
+    dataset = _dataset_at(parent, name)
+    offset = dataset.id.get_offset()
+    if dataset.shape != () or dataset.dtype != np.dtype("S64") or offset is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a hash")
+    return bytes(dataset[()]).decode("ascii", "replace"), (offset, 64)
+
+
 def integer_at(parent: h5py.Group, name: str) -> int:
     """A whole number."""
     dataset = _dataset_at(parent, name)
@@ -133,7 +146,7 @@ def read_samples(dataset: h5py.Dataset) -> Array:
 def check_samples(dataset: h5py.Dataset) -> None:
     """Read through a sample dataset in flat memory; ArchiveError when its checksum fails."""
     digest = hashlib.sha256()
-    step = dataset.chunks[0] * max(1, _LARGEST_CHUNK // dataset.chunks[0])
+    step = dataset.chunks[0] * max(1, _CHECKED_AT_ONCE // dataset.chunks[0])
     for start in range(0, dataset.shape[0], step):
         digest.update(np.ascontiguousarray(dataset[start : start + step]).data)
     _compare(dataset, digest.hexdigest())

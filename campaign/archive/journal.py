@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from campaign.archive.files import why
 from campaign.archive.header import RunStatus
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, SafeState, canonical_json
@@ -96,7 +97,7 @@ class Journal:
                 os.fsync(self._descriptor)
             except OSError as error:
                 os.ftruncate(self._descriptor, before)
-                raise ArchiveError(f"{self._path}: cannot be written: {error}") from None
+                raise ArchiveError(f"{self._path}: cannot be written: {why(error)}") from None
 
     def close(self) -> None:
         with self._lock:

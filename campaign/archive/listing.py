@@ -123,9 +123,8 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
 
 def _summarise_file(path: Path, size: int) -> RunSummary:
     from campaign.archive import guarded
-    from campaign.archive.reader import check_trailer, read_provenance
+    from campaign.archive.reader import read_provenance
 
-    check_trailer(path)
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         run = guarded.group_at(file, "run", "NXentry")
         header = read_provenance(path, run)

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from campaign.archive.files import PART, sha256_of, trailer_holds, trailer_stands
+from campaign.archive.files import PART, sha256_of
 from campaign.archive.header import PARTIAL, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, read_journal
 from campaign.archive.run_folder import (
@@ -107,7 +107,13 @@ class RunReader:
 
     def unchanged(self) -> bool:
         """Whether every byte of the sealed file is as it was written (reads it all)."""
-        return self.sealed and trailer_holds(self.path)
+        from campaign.archive import guarded
+
+        if not self.sealed:
+            return False
+        with guarded.open_file(self.path) as file:
+            digest, place = guarded.digest_at(file, "run/outcome/file_sha256")
+        return digest == sha256_of(self.path, place)
 
     def problems(self) -> list[str]:
         """What in the samples is damaged (reads them all, in flat memory); empty when sound."""
@@ -123,23 +129,11 @@ def open_run(path: Path) -> RunReader:
         return _open_folder(path)
     if path.suffix == PART:
         raise ArchiveError(f"{path}: was never finished; what was is in the run's folder")
-    check_trailer(path)
     return read_sealed(path)
 
 
-def check_trailer(path: Path) -> None:
-    """ArchiveError when the file does not end the way a sealed one does. Reads only its end."""
-    from campaign.archive import guarded
-
-    with guarded.open_file(path), guarded.guarded(path):
-        if not trailer_stands(path):
-            raise ArchiveError(
-                f"{path}: is HDF5 but not a whole archive: its end is missing or was changed"
-            )
-
-
 def read_sealed(path: Path) -> RunReader:
-    """Read a sealed file's structure, whatever its name; its trailer is not looked at."""
+    """Read a sealed file, whatever its name; its hash is not looked at (`RunReader.unchanged`)."""
     from campaign.archive import guarded
     from campaign.archive.trial_reading import read_trials
 

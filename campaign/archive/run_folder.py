@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from campaign.archive.files import why
 from campaign.archive.header import FORMAT, PlannedTrial, RunHeader
 from campaign.errors import ArchiveError
 
@@ -54,7 +55,7 @@ def first_line(error: Exception) -> str:
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]
         return f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
-    return " ".join(str(error).split())[:300] or type(error).__name__
+    return why(error)
 
 
 def _read(path: Path) -> str:

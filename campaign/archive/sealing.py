@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 
 from campaign.archive import hdf5
-from campaign.archive.files import PART, append_trailer, publish, sha256_of, sync_folder
+from campaign.archive.files import PART, publish, sha256_of, sync_folder, why
 from campaign.archive.header import FORMAT, SEALED, RunHeader
 from campaign.archive.journal import JOURNAL, RunEnded, Story, TrialFinished, read_journal
 from campaign.archive.reader import read_sealed
@@ -29,15 +29,15 @@ def seal_folder(folder: Path) -> Path:
     sealed = folder.with_suffix(SEALED)
     part = sealed.with_name(sealed.name + PART)
     try:
-        _write(folder, part)
+        place = _write(folder, part)
         _verify(part)
-        append_trailer(part)
+        _put_hash(part, place)
         publish(part, sealed)
     except (OSError, RuntimeError, ValueError, ArchiveError) as error:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
         raise ArchiveError(
-            f"{sealed}: could not be sealed: {error}; every finished trial is in {folder}"
+            f"{sealed}: could not be sealed: {why(error)}; every finished trial is in {folder}"
         ) from None
     with contextlib.suppress(OSError):  # a remnant does no harm: the sealed file goes first
         shutil.rmtree(folder)
@@ -45,7 +45,8 @@ def seal_folder(folder: Path) -> Path:
     return sealed
 
 
-def _write(folder: Path, part: Path) -> None:
+def _write(folder: Path, part: Path) -> tuple[int, int]:
+    """Write the file; returns where in it its hash belongs."""
     header = read_header(folder)
     story = read_journal(folder / JOURNAL)
     if story.ended is None:
@@ -55,6 +56,19 @@ def _write(folder: Path, part: Path) -> None:
         for finished in story.finished.values():
             _copy_trial(folder, finished, file)
         write_root(file, header.created, _shown(file, folder, story))
+        return hdf5.blank_digest(file["run/outcome"], "file_sha256")
+
+
+def _put_hash(part: Path, place: tuple[int, int]) -> None:
+    """Put the hash of the whole file into the file.
+
+    It counts its own place as zeros, so it travels with the file, survives a viewer that opens the
+    file for writing and changes nothing, and finds any byte that is not as it was sealed.
+    """
+    digest = sha256_of(part, place)
+    with part.open("r+b") as file:
+        file.seek(place[0])
+        file.write(digest.encode("ascii"))
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.archive import hdf5
-from campaign.archive.files import PART, publish, sha256_of
+from campaign.archive.files import PART, publish, sha256_of, why
 from campaign.archive.header import SEALED
 from campaign.archive.preview import PREVIEW_POINTS, Preview
 from campaign.errors import ArchiveError, BackendError
@@ -58,7 +58,7 @@ class TrialFile:
         try:
             self._file = h5py.File(self._part, "w", locking=False)
         except OSError as error:
-            raise ArchiveError(f"{self._part}: cannot be written: {error}") from None
+            raise ArchiveError(f"{self._part}: cannot be written: {why(error)}") from None
         self._entry = hdf5.make_group(self._file, entry_name(trial.number), "NXentry")
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
@@ -129,7 +129,7 @@ class TrialFile:
         except (OSError, RuntimeError, ValueError) as error:
             self.discard()
             raise ArchiveError(
-                f"{self._part}: cannot be written: {error}; this trial is not archived, "
+                f"{self._part}: cannot be written: {why(error)}; this trial is not archived, "
                 "the finished ones are"
             ) from None
 

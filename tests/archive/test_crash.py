@@ -1,0 +1,224 @@
+"""Nothing reported finished is lost, and nothing half-written looks whole."""
+
+import errno
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
+from campaign.archive.journal import JOURNAL
+from campaign.errors import ArchiveError, UsageError
+from campaign.trial import Ending, Outcome
+
+# Writes trials without end or, with "seal", a few and then one file; says what it finished.
+CHILD = """
+import importlib.util, sys
+from pathlib import Path
+spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
+kit = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(kit)
+from campaign.archive import RunStatus, RunWriter
+trials = [kit.make_trial(number) for number in range(1, 400)]
+writer = RunWriter.create(Path(sys.argv[2]), kit.make_header(), trials)
+print("created", flush=True)
+for trial in trials[: int(sys.argv[3])]:
+    kit.write_trial(writer, trial, 200 * trial.number)
+    print("finished", trial.number, flush=True)
+print("sealing", flush=True)
+writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+print("sealed", flush=True)
+"""
+
+
+def start(results: Path, trials: int, **options) -> subprocess.Popen:
+    kit = Path(__file__).with_name("conftest.py")
+    command = [sys.executable, "-c", CHILD, str(kit), str(results), str(trials)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
+
+
+def check_whole(results: Path, kit, reported: list[int]) -> None:
+    """Every run that opens holds all that was reported, whole; a part file never opens."""
+    for part in results.rglob("*.part"):
+        with pytest.raises(ArchiveError):
+            open_run(part)
+    run = open_run(find_run(results))
+    kept = {archived.trial.number: archived for archived in run.trials}
+    assert set(reported) <= set(kept)
+    for number, archived in kept.items():
+        times, block = kit.samples(200 * number, number)
+        recording = archived.recording()
+        assert recording.time.tobytes() == times.tobytes()
+        assert recording["friction_torque"].tobytes() == block[1].tobytes()
+    if run.sealed:
+        assert run.unchanged()
+
+
+@pytest.mark.parametrize("attempt", range(6))
+def test_a_kill_at_any_moment_loses_no_finished_trial(tmp_path, kit, attempt):
+    child = start(tmp_path, trials=399)
+    assert child.stdout.readline() == "created\n"
+    time.sleep(random.Random(attempt).uniform(0, 0.5))
+    child.kill()
+    said = child.communicate()[0].split("\n")[:-1]
+    check_whole(tmp_path, kit, [int(line.split()[1]) for line in said if "finished" in line])
+    summary = list_runs(tmp_path)[0]
+    assert (summary.status, summary.problem) == (RunStatus.INCOMPLETE, "")
+
+
+@pytest.mark.parametrize("attempt", range(4))
+def test_a_kill_while_sealing_leaves_the_folder_or_the_file(tmp_path, kit, attempt):
+    child = start(tmp_path, trials=25)
+    while child.stdout.readline() != "sealing\n":
+        pass
+    time.sleep(random.Random(attempt).uniform(0, 0.15))
+    child.kill()
+    child.communicate()
+    check_whole(tmp_path, kit, list(range(1, 26)))
+    assert len(list_runs(tmp_path)) == 1
+
+
+def limit_file_size() -> None:
+    """From now on no file grows beyond 200 kB: writes fail as they do on a full disk."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+
+def test_a_file_that_cannot_grow_fails_the_seal_and_keeps_the_trials(tmp_path, kit):
+    child = start(tmp_path, 25, preexec_fn=limit_file_size, stderr=subprocess.PIPE)
+    said, errors = child.communicate()
+    assert "finished 25" in said
+    assert "sealed" not in said.split("\n")
+    last = errors.strip().split("\n")[-1]
+    assert "ArchiveError" in last
+    assert "File too large; every finished trial is in" in last
+    assert not list(tmp_path.glob("*.nxs*"))
+    check_whole(tmp_path, kit, list(range(1, 26)))
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 1 MB, where the machine lets us have one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(disk)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no file system of our own can be mounted")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_full_disk_loses_the_running_trial_only(small_disk, kit):
+    writer = RunWriter.create(small_disk / "results", kit.header(), [kit.trial(1), kit.trial(2)])
+    kit.record(writer, kit.trial(1), 3000)
+    recorder = writer.begin(kit.trial(2))
+    recorder.start(kit.CHANNELS)
+    noise = np.random.default_rng(5).normal(size=(2, 500_000))
+    with pytest.raises(ArchiveError, match="No space left on device"):
+        recorder.append(np.arange(500_000) / 1000.0, noise)
+    assert not list(writer.folder.glob("*.part"))
+    run = open_run(writer.folder)
+    assert [archived.trial.number for archived in run.trials] == [1]
+    assert len(run.trials[0].recording().time) == 3000
+    path = writer.seal(RunStatus.FAULT, "the disk is full", ended=kit.ENDED)
+    assert open_run(path).status is RunStatus.FAULT
+
+
+def test_a_journal_line_that_cannot_be_written_leaves_no_trace(tmp_path, kit, monkeypatch):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1), kit.trial(2)])
+    before = (writer.folder / JOURNAL).read_bytes()
+    real = os.write
+
+    def half_of_it(descriptor, data):
+        real(descriptor, data[:10])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", half_of_it)
+    with pytest.raises(ArchiveError, match="No space left on device"):
+        kit.record(writer, kit.trial(1), 10)
+    monkeypatch.undo()
+    assert (writer.folder / JOURNAL).read_bytes() == before
+    kit.record(writer, kit.trial(2), 10)
+    run = open_run(writer.seal(RunStatus.FAULT, "disk full", ended=kit.ENDED))
+    assert [archived.trial.number for archived in run.trials] == [2]
+
+
+def test_a_trial_file_that_changed_is_not_sealed(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    kit.record(writer, kit.trial(1), 100)
+    path = writer.folder / "trial-00001.nxs"
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ArchiveError, match=r"trial-00001\.nxs: is not what the journal says"):
+        writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    assert writer.folder.is_dir()
+    assert not list(tmp_path.glob("*.nxs*"))
+
+
+def test_a_sealed_run_wins_over_the_remnant_of_its_folder(tmp_path, kit):
+    path = kit.run(tmp_path)
+    (tmp_path / f"{path.stem}.partial").mkdir()
+    assert find_run(tmp_path) == path
+    assert [run.problem for run in list_runs(tmp_path)] == [""]
+
+
+def test_a_results_folder_under_a_file_is_bad_usage(tmp_path, kit):
+    (tmp_path / "file").write_text("not a folder")
+    for results in (tmp_path / "file", tmp_path / "file" / "results"):
+        with pytest.raises(UsageError, match="--results"):
+            RunWriter.create(results, kit.header(), [])
+
+
+def test_no_run_is_written_over_another(tmp_path, kit):
+    RunWriter.create(tmp_path, kit.header(), [])
+    with pytest.raises(UsageError, match="already"):
+        RunWriter.create(tmp_path, kit.header(), [])
+    kit.run(tmp_path, name="another")
+    with pytest.raises(UsageError, match="already"):
+        RunWriter.create(tmp_path, kit.header("another"), [])
+
+
+def test_a_results_folder_taken_away_is_an_archive_error(tmp_path, kit):
+    import shutil
+
+    writer = RunWriter.create(tmp_path / "results", kit.header(), [kit.trial(1)])
+    shutil.rmtree(tmp_path / "results")
+    with pytest.raises(ArchiveError):
+        kit.record(writer, kit.trial(1), 10)
+
+
+def test_several_threads_write_at_once(tmp_path, kit):
+    trials = [kit.trial(number) for number in range(1, 9)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    barrier = threading.Barrier(4)
+
+    def work(mine):
+        recorders = [writer.begin(trial) for trial in mine]
+        barrier.wait()
+        for recorder, trial in zip(recorders, mine, strict=True):
+            recorder.start(kit.CHANNELS)
+            times, block = kit.samples(40_000, trial.number)
+            for start_index in range(0, 40_000, 3000):
+                cut = slice(start_index, start_index + 3000)
+                recorder.append(times[cut], block[:, cut])
+            recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+
+    threads = [threading.Thread(target=work, args=(trials[n::4],)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    run = open_run(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED))
+    assert [archived.trial for archived in run.trials] == trials
+    for archived in run.trials:
+        expected = kit.samples(40_000, archived.trial.number)[1]
+        assert archived.recording()["load_rate"].tobytes() == expected[0].tobytes()

@@ -1,0 +1,110 @@
+"""Naming, listing and finding runs."""
+
+import subprocess
+import sys
+from datetime import UTC, datetime
+
+import pytest
+from pydantic import ValidationError
+
+from campaign.archive import (
+    RunHeader,
+    RunStatus,
+    RunWriter,
+    find_run,
+    list_runs,
+    new_run_name,
+    open_run,
+)
+from campaign.archive.journal import read_journal
+from campaign.errors import ArchiveError, UsageError
+
+NOW = datetime(2026, 11, 21, 9, 36, 58, tzinfo=UTC)
+
+
+def test_names_are_sortable_and_unique(tmp_path, kit):
+    assert new_run_name(tmp_path / "none", "quickstart", NOW) == "2026-11-21T09-36-58-quickstart"
+    names = []
+    for _ in range(3):
+        names.append(new_run_name(tmp_path, "quickstart", NOW))
+        RunWriter.create(tmp_path, kit.header(names[-1]), [])
+    assert names[1:] == [f"{names[0]}-2", f"{names[0]}-3"]
+    assert new_run_name(tmp_path, "my test/ö", NOW) == "2026-11-21T09-36-58-my-test"
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", ".hidden", "a\nb", "x" * 300])
+def test_a_run_cannot_have_a_name_that_is_no_file_name(kit, name):
+    with pytest.raises(ValidationError):
+        kit.header(name)
+
+
+@pytest.mark.parametrize("created", ["yesterday", "2026-11-21T09:36:58"])
+def test_a_timestamp_has_a_time_zone(created):
+    with pytest.raises(ValidationError):
+        RunHeader(name="x", created=created)
+
+
+@pytest.fixture
+def results(tmp_path, kit):
+    for name in ("2026-11-21T09-00-00-map", "2026-11-22T09-00-00-map", "mine"):
+        kit.run(tmp_path, [10, None], name=name)
+    return tmp_path
+
+
+def test_a_list_tells_how_each_run_went(results, kit):
+    writer = RunWriter.create(results, kit.header("2026-11-23T09-00-00-map"), [kit.trial(1)])
+    kit.record(writer, kit.trial(1), 10)
+    (results / "2026-11-22T09-00-00-map-report").mkdir()
+    listed = list_runs(results)
+    assert [run.name for run in listed] == [
+        "mine",
+        "2026-11-21T09-00-00-map",
+        "2026-11-22T09-00-00-map",
+        "2026-11-23T09-00-00-map",
+    ]
+    assert (listed[1].status, listed[1].trials, listed[1].failed) == ("failed trials", 2, 1)
+    assert (listed[3].status, listed[3].trials, listed[3].planned) == (RunStatus.INCOMPLETE, 1, 1)
+    assert listed[1].bytes == listed[1].path.stat().st_size
+    assert (listed[1].protocol, listed[1].created) == ("tiny", kit.CREATED)
+
+
+def test_a_run_is_found_by_path_name_or_beginning(results, monkeypatch):
+    expected = results / "2026-11-21T09-00-00-map.nxs"
+    for name in (str(expected), str(results / expected.stem), expected.name, expected.stem):
+        assert find_run(results, name) == expected
+    assert find_run(results, "2026-11-21") == expected
+    assert find_run(results) == results / "2026-11-22T09-00-00-map.nxs"
+    monkeypatch.chdir(results)
+    assert open_run(find_run(results, "mine.nxs")).name == "mine"
+
+
+def test_what_cannot_be_found_names_what_there_is(results):
+    with pytest.raises(UsageError, match=r"begins several runs: 2026-11-21.*, 2026-11-22"):
+        find_run(results, "2026")
+    with pytest.raises(UsageError, match="no run 'map'; there are mine, 2026-11-21"):
+        find_run(results, "map")
+    with pytest.raises(UsageError, match="there are no runs"):
+        find_run(results / "none")
+
+
+def test_a_torn_last_line_was_never_reported(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    kit.record(writer, kit.trial(1), 10)
+    path = writer.folder / "journal.jsonl"
+    whole = path.read_bytes()
+    for tail in (b'{"event":"run en', b'{"event":"trial fin\n', b"\0" * 40, b"\0\0\n"):
+        path.write_bytes(whole + tail)
+        story = read_journal(path)
+        assert (list(story.finished), story.ended) == ([1], None)
+        assert story.text.encode() == whole
+    path.write_bytes(whole.replace(b"run started", b"run sta?ted"))
+    with pytest.raises(ArchiveError, match=r"journal\.jsonl:1: is not a line"):
+        read_journal(path)
+    path.write_bytes(b"")
+    with pytest.raises(ArchiveError, match="does not begin"):
+        read_journal(path)
+
+
+def test_importing_the_archive_does_not_import_hdf5():
+    code = "import sys, campaign.archive; sys.exit('h5py' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

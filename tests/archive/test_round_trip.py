@@ -1,0 +1,180 @@
+"""What goes into an archive comes out of it, to the bit, for us and for everybody else."""
+
+import shutil
+import subprocess
+import time
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.hdf5 import CHUNK
+from campaign.archive.preview import PREVIEW_POINTS
+from campaign.trial import Ending, Outcome, Role, SafeState
+
+
+def equal_bits(a, b):
+    return np.asarray(a, "<f8").tobytes() == np.asarray(b, "<f8").tobytes()
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 7])
+def test_a_recording_comes_back_to_the_bit(tmp_path, kit, count):
+    run = open_run(kit.run(tmp_path, [count], block=999))
+    recording = run.trials[0].recording()
+    times, block = kit.samples(count, 1)
+    assert equal_bits(recording.time, times)
+    assert list(recording.channels) == ["load_rate", "friction_torque"]
+    for info, row in zip(kit.CHANNELS, block, strict=True):
+        channel = recording.channels[info.name]
+        assert equal_bits(channel.samples, row)
+        described = info.with_samples(channel.samples)
+        assert (channel.unit, channel.label) == (described.unit, described.label)
+        assert (channel.display_unit, channel.measured) == (info.display_unit, info.measured)
+    assert [(e.time, e.text) for e in recording.events] == [(0.25, "the load breaks away ↗")]
+    assert recording.ending == Ending(Outcome.COMPLETED)
+
+
+def test_the_header_and_the_trials_come_back(tmp_path, kit):
+    run = open_run(kit.run(tmp_path, [20, None, 30]))
+    assert run.header == kit.header().model_copy(update={"trials": 3})
+    assert [archived.trial for archived in run.trials] == [kit.trial(n) for n in (1, 2, 3)]
+    assert (run.status, run.reason) == (RunStatus.FAILED_TRIALS, "no power")
+    assert run.safe_state is SafeState.CONFIRMED
+    assert (run.ended, run.trials[0].started) == ("2026-11-21T09:40:00Z", kit.STARTED)
+    assert [planned.label for planned in run.plan] == [kit.trial(n).label for n in (1, 2, 3)]
+    assert run.plan[0].role is Role.MEASUREMENT
+    assert run.trials_of("map") == run.trials
+    assert run.trials_of("another") == ()
+
+
+def test_a_trial_that_recorded_nothing_is_kept_with_its_reason(tmp_path, kit):
+    run = open_run(kit.run(tmp_path, [None]))
+    assert run.trials[0].ending == Ending(Outcome.FAULT, "no power")
+    assert run.trials[0].recording().channels == {}
+    assert len(run.trials[0].recording().time) == 0
+
+
+def test_nothing_but_the_file_is_left_when_it_is_sealed(tmp_path, kit):
+    path = kit.run(tmp_path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_unfinished_run_opens_with_what_was_finished(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1), kit.trial(2)])
+    kit.record(writer, kit.trial(1), 40)
+    writer.begin(kit.trial(2)).start(kit.CHANNELS)
+    run = open_run(writer.folder)
+    assert run.status is RunStatus.INCOMPLETE
+    assert run.safe_state is SafeState.NOT_CONFIRMED
+    assert [archived.trial.number for archived in run.trials] == [1]
+    assert len(run.plan) == 2
+    assert equal_bits(run.trials[0].recording().time, kit.samples(40)[0])
+
+
+def test_an_interrupted_run_is_sealed_without_its_open_trial(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1), kit.trial(2)])
+    kit.record(writer, kit.trial(1), 40)
+    writer.begin(kit.trial(2)).start(kit.CHANNELS)
+    path = writer.seal(
+        RunStatus.INTERRUPTED, "Ctrl-C", SafeState.NOT_CONFIRMED, ended="2026-11-21T09:40:00Z"
+    )
+    run = open_run(path)
+    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "Ctrl-C")
+    assert run.safe_state is SafeState.NOT_CONFIRMED
+    assert [archived.trial.number for archived in run.trials] == [1]
+    assert '"event":"trial abandoned"' in run.journal
+
+
+def test_equal_runs_make_equal_bytes_at_any_time_and_in_any_blocks(tmp_path, kit):
+    first = kit.run(tmp_path / "a", [50, 2 * CHUNK + 3], block=1000)
+    time.sleep(1.1)  # HDF5 notes times in whole seconds, where it notes them
+    second = kit.run(tmp_path / "b", [50, 2 * CHUNK + 3], block=4321)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_the_file_knows_whether_it_was_changed(sealed):
+    assert open_run(sealed).unchanged()
+    with h5py.File(sealed, "r+"):
+        pass  # a viewer that opens for writing and writes nothing
+    assert open_run(sealed).unchanged()
+    content = bytearray(sealed.read_bytes())
+    content[-1] ^= 1
+    sealed.write_bytes(content)
+    assert not open_run(sealed).unchanged()
+
+
+def test_the_default_plot_is_found_by_following_the_file(sealed):
+    with h5py.File(sealed) as file:
+        entry = file[file.attrs["default"]]
+        data = entry[entry.attrs["default"]]
+        signal = data[data.attrs["signal"]]
+        axis = data[data.attrs["axes"][0]]
+        assert entry.name == "/trial_00001"
+        assert (signal.attrs["units"], signal.attrs["display_units"]) == ("rad/s", "deg/s")
+        assert signal.attrs["long_name"] == "Load rate (rad/s)"
+        assert axis.attrs["units"] == "s"
+        assert signal.dims[0][0] == axis
+        for name in data.attrs["auxiliary_signals"]:
+            assert data[name].dims[0][0] == axis
+            assert data[name].shape == axis.shape
+
+
+def test_the_root_opens_on_the_first_completed_trial(tmp_path, kit):
+    with h5py.File(kit.run(tmp_path, [None, 30, 40])) as file:
+        assert file.attrs["default"] == "trial_00002"
+
+
+def test_sources_lie_in_the_file_verbatim(sealed, kit):
+    with h5py.File(sealed) as file:
+        notes = [file["run"][name] for name in file["run"] if name.startswith("source")]
+        found = {n["file_name"][()].decode(): n["data"][()].decode() for n in notes}
+        assert found == kit.header().sources
+        assert {note["type"][()] for note in notes} == {b"application/toml"}
+
+
+def test_chunks_are_what_zlib_and_a_shuffle_undo(tmp_path, kit):
+    """Read the raw chunks without HDF5's filters, as the format's description says."""
+    path = kit.run(tmp_path, [CHUNK + 5])
+    with h5py.File(path) as file:
+        dataset = file["trial_00001/data/load_rate"]
+        parts = []
+        for start in (0, CHUNK):
+            mask, packed = dataset.id.read_direct_chunk((start,))
+            assert mask == 0
+            plain = np.frombuffer(zlib.decompress(packed), np.uint8)
+            parts.append(plain.reshape(8, -1).T.tobytes())
+        samples = np.frombuffer(b"".join(parts), "<f8")[: CHUNK + 5]
+    assert equal_bits(samples, kit.samples(CHUNK + 5)[1][0])
+
+
+def test_a_long_recording_opens_on_a_preview_that_misses_no_peak(tmp_path, kit):
+    count = 5 * CHUNK
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    recorder = writer.begin(kit.trial(1))
+    recorder.start(kit.CHANNELS)
+    times = np.arange(count) / 1000.0
+    block = np.zeros((2, count))
+    block[0, [12_345, 70_001]] = [9.0, -7.0]
+    recorder.append(times, block)
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    with h5py.File(path) as file:
+        entry = file["trial_00001"]
+        assert entry.attrs["default"] == "preview"
+        shown, at = entry["preview/load_rate"][:], entry["preview/time"][:]
+        assert entry["preview/load_rate"].dims[0][0] == entry["preview/time"]
+        assert len(entry["data/load_rate"]) == count
+    assert 2 < len(at) <= PREVIEW_POINTS
+    assert np.all(np.diff(at) >= 0)
+    assert (shown.max(), at[shown.argmax()]) == (9.0, 12.345)
+    assert (shown.min(), at[shown.argmin()]) == (-7.0, 70.001)
+
+
+@pytest.mark.skipif(shutil.which("h5dump") is None, reason="h5dump is not installed")
+def test_h5dump_reads_every_dataset(sealed):
+    dumped = subprocess.run(["h5dump", sealed], capture_output=True, text=True, check=False)
+    assert dumped.returncode == 0
+    assert dumped.stderr == ""
+    assert dumped.stdout.count('DATASET "load_rate"') == 2

@@ -1,0 +1,122 @@
+"""Streaming in flat memory, previews, and what a backend may not hand over."""
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from campaign.archive import RunWriter
+from campaign.archive.hdf5 import CHUNK, SampleColumns, pack
+from campaign.archive.preview import Preview
+from campaign.errors import BackendError
+from campaign.trial import ChannelInfo
+
+
+def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        columns = SampleColumns(file, {"time": {}, "x": {}, "y": {}})
+        assert columns.buffered_bytes == 3 * CHUNK * 8
+        rows = [np.zeros(5000)] * 3
+        for _ in range(40):
+            columns.append(rows)
+            assert columns.buffered_bytes == 3 * CHUNK * 8
+            # All but the chunk that fills is in the file already.
+            assert columns.length - (len(file["x"]) if "x" in file else 0) <= CHUNK
+        columns.finish()
+        assert len(file["x"]) == columns.length == 200_000
+
+
+def test_the_preview_keeps_within_its_points_however_long_the_recording():
+    preview = Preview(points=100)
+    for block in range(50):
+        time = np.arange(block * 64, (block + 1) * 64, dtype=float)
+        preview.add(time, np.sin(time))
+        assert len(preview.points()[0]) <= 100
+
+
+@given(
+    values=st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=700),
+    points=st.sampled_from([8, 20, 100]),
+)
+@settings(max_examples=60, deadline=None)
+def test_the_preview_holds_the_extremes_at_their_times(values, points):
+    samples = np.array(values)
+    times = np.arange(len(samples)) * 0.5
+    preview = Preview(points)
+    for start in range(0, len(samples), 64):
+        preview.add(times[start : start + 64], samples[start : start + 64])
+    at, shown = preview.points()
+    assert len(at) <= points
+    assert np.all(np.diff(at) >= 0)
+    for time, value in zip(at, shown, strict=True):
+        assert np.array_equal(samples[int(time * 2)], value, equal_nan=True)
+    if not np.all(np.isnan(samples)):
+        assert np.nanmax(shown) == np.nanmax(samples)
+        assert np.nanmin(shown) == np.nanmin(samples)
+
+
+@given(st.lists(st.floats(width=64), min_size=1, max_size=300))
+@settings(max_examples=60, deadline=None)
+def test_hdf5s_own_filters_undo_our_chunks(values):
+    samples = np.array(values)
+    with h5py.File("x.h5", "w", driver="core", backing_store=False) as file:
+        made = {"shape": samples.shape, "chunks": samples.shape, "dtype": "<f8"}
+        dataset = file.create_dataset("x", shuffle=True, compression="gzip", **made)
+        dataset.id.write_direct_chunk((0,), pack(samples))
+        assert dataset[:].tobytes() == samples.tobytes()
+
+
+def test_every_dataset_carries_its_checksum(sealed):
+    without = []
+
+    def check(name, item):
+        if isinstance(item, h5py.Dataset) and "sha256" not in item.attrs:
+            without.append(name)
+
+    with h5py.File(sealed) as file:
+        file.visititems(check)
+    assert without == ["run/outcome/file_sha256"]
+
+
+def test_sealing_copies_chunks_as_they_are(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    kit.record(writer, kit.trial(1), CHUNK + 10)
+    name = "trial_00001/data/load_rate"
+    with h5py.File(writer.folder / "trial-00001.nxs") as file:
+        before = [file[name].id.read_direct_chunk((start,)) for start in (0, CHUNK)]
+    with h5py.File(writer.seal("complete", ended=kit.ENDED)) as file:
+        after = [file[name].id.read_direct_chunk((start,)) for start in (0, CHUNK)]
+    assert before == after
+
+
+@pytest.fixture
+def recorder(tmp_path, kit):
+    return RunWriter.create(tmp_path, kit.header(), [kit.trial(1)]).begin(kit.trial(1))
+
+
+def test_samples_that_do_not_fit_the_channels_are_a_backend_fault(recorder, kit):
+    with pytest.raises(BackendError, match="before the channels"):
+        recorder.append(np.zeros(3), np.zeros((2, 3)))
+    recorder.start(kit.CHANNELS)
+    for times, block in ((3, (3, 3)), (3, (2, 4)), ((3, 1), (2, 3))):
+        with pytest.raises(BackendError, match="do not fit"):
+            recorder.append(np.zeros(times), np.zeros(block))
+    with pytest.raises(BackendError, match="announced twice"):
+        recorder.start(kit.CHANNELS)
+
+
+@pytest.mark.parametrize("names", [(), ("time",), ("a", "a"), ("a b",), ("../a",), ("",), ("a/b",)])
+def test_channels_need_names_that_nexus_allows(recorder, names):
+    channels = tuple(ChannelInfo(name, "rad", "Label", "deg") for name in names)
+    with pytest.raises(BackendError, match="channel"):
+        recorder.start(channels)
+
+
+def test_an_abandoned_trial_leaves_a_line_and_no_file(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    recorder = writer.begin(kit.trial(1))
+    recorder.start(kit.CHANNELS)
+    recorder.abandon(kit.ENDED, "the cable came off")
+    assert not list(writer.folder.glob("trial-*"))
+    assert "the cable came off" in (writer.folder / "journal.jsonl").read_text()
