@@ -51,6 +51,7 @@ def value_problems(test: Test) -> Iterator[Problem]:
     """
     options, bench = first_point(test)
     for axis in test.axes:
+        yield from _repeated(axis)
         tree = bench if axis.of_bench else options
         model: type[BaseModel] = Bench if axis.of_bench else test.experiment.options
         for index in _to_check(axis):
@@ -65,6 +66,17 @@ def value_problems(test: Test) -> Iterator[Problem]:
                     yield origin.problem((), "value", message)
 
 
+def _repeated(axis: Axis) -> Iterator[Problem]:
+    """Equal values would make trials that nothing tells apart, not even their seed."""
+    seen: set[str] = set()
+    for index in range(len(axis)) if axis.listed else ():
+        value = repr(axis.value(index))
+        if value in seen:
+            message = f"{shown(axis.value(index))} stands there twice; to repeat, use 'repeat'"
+            yield axis.value_origin(index).problem((), "value", message)
+        seen.add(value)
+
+
 def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
     """Options and bench as written, with the first value of every axis."""
     options, bench = dict(test.options), dict(test.bench)
@@ -77,6 +89,7 @@ def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def is_large(axes: Sequence[Axis], repeat: int) -> bool:
+    """Whether a matrix alone makes a plan too large; the values are then not looked at."""
     return count_points(axes) * repeat > LARGEST_PLAN
 
 
@@ -92,6 +105,9 @@ def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> s
         names = around.names() or (tuple(tree) if isinstance(tree, Mapping) else ())
         shape = around.child(key) if key in names else None
         if shape is None:
+            if not names:
+                whole = ".".join(str(part) for part in keys[:depth])
+                return f"nothing to sweep at '{prefix}{whole}.{key}': '{whole}' has no parts"
             before = prefix + "".join(f"{part}." for part in keys[:depth])
             paths = [f"{before}{name}" for name in names] + ([] if prefix else ["bench.…"])
             slip = nearest(f"{before}{key}", paths)

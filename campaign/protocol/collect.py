@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from campaign.errors import Problem
-from campaign.protocol.files import CannotRead, Origin, Patched, Source, Within, read_source
+from campaign.protocol.files import Origin, Patched, Source, UnreadableError, Within, read_source
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
@@ -76,7 +76,7 @@ def collect(path: Path, collected: Collected) -> Source | None:
     """Read the protocol at `path` and its includes into `collected`; the main file's source."""
     try:
         return _collect(path, path.name, (), collected)
-    except CannotRead as error:
+    except UnreadableError as error:
         collected.problems.append(Problem(path, 0, 0, str(error)))
         return None
 
@@ -171,7 +171,7 @@ def _include(
         return refuse(f"more than {MOST_FILES} files in all")
     try:
         _collect(file, name, chain, collected)
-    except CannotRead as error:
+    except UnreadableError as error:
         refuse(f"{error} (looked for {file})")
 
 

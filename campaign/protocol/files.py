@@ -19,7 +19,7 @@ DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
 
 
-class CannotRead(Exception):
+class UnreadableError(Exception):
     """Why a file cannot be read as text, for the user."""
 
 
@@ -102,7 +102,7 @@ class Patched:
 
 
 def read_source(file: Path, name: str) -> Source | list[Problem]:
-    """The TOML file, or what is wrong with its text. Raises CannotRead when there is no text."""
+    """The TOML file, or what is wrong with its text; UnreadableError when there is no text."""
     text = read_text(file)
     try:
         tree = tomllib.loads(text)
@@ -124,26 +124,28 @@ def read_source(file: Path, name: str) -> Source | list[Problem]:
 
 
 def read_text(file: Path) -> str:
-    """Text of a regular UTF-8 file of a reasonable size. Raises CannotRead."""
+    """Text of a regular UTF-8 file of a reasonable size. Raises UnreadableError."""
     try:
         if file.is_dir():
-            raise CannotRead("a folder, not a TOML file")
+            raise UnreadableError("a folder, not a TOML file")
         if not file.exists():
-            raise CannotRead("no such file")
+            raise UnreadableError("no such file")
         if not file.is_file():
-            raise CannotRead("not a regular file")
+            raise UnreadableError("not a regular file")
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
-        raise CannotRead(f"cannot be read: {reason}") from None
+        raise UnreadableError(f"cannot be read: {reason}") from None
     if len(content) > LARGEST_FILE:
-        raise CannotRead(f"larger than {LARGEST_FILE // 2**20} MiB; a protocol or bench is small")
+        raise UnreadableError(
+            f"larger than {LARGEST_FILE // 2**20} MiB; a protocol or bench is small"
+        )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        raise CannotRead(f"not UTF-8 text (byte {error.start + 1}, line {line})") from None
+        raise UnreadableError(f"not UTF-8 text (byte {error.start + 1}, line {line})") from None
 
 
 _AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*\Z")

@@ -18,7 +18,7 @@ from campaign.protocol.collect import (
     sibling,
     top_level,
 )
-from campaign.protocol.files import CannotRead, Origin, Patched, Source, Within, read_source
+from campaign.protocol.files import Origin, Patched, Source, UnreadableError, Within, read_source
 from campaign.protocol.matrix import Axis
 from campaign.protocol.overrides import Override, parse_overrides
 from campaign.protocol.positions import Keys
@@ -179,7 +179,7 @@ class _Loader:
             return known
         try:
             source = read_source(file, name)
-        except CannotRead as error:
+        except UnreadableError as error:
             hint = nearest(file.name, _toml_files(file.parent))
             message = f"{shown(written)}: {error} (looked for {file}){hint}"
             self._report(origin.problem(keys, "value", message))

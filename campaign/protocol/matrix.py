@@ -153,25 +153,25 @@ def flatten(matrix: Mapping[str, Any], prefix: Keys = ()) -> Iterator[tuple[str,
 
 def make_range(entry: RangeEntry) -> Range:
     """The range, or ValueError with a message for the user. Nothing is expanded."""
-    if (entry.num is None) == (entry.step is None):
-        raise ValueError("a range has either 'num' or 'step' besides 'start' and 'stop'")
     start, unit = _number(entry.start, "start")
     stop, stop_unit = _number(entry.stop, "stop")
     if unit != stop_unit:
         raise ValueError(f"'start' and 'stop' are in different units: '{unit}' and '{stop_unit}'")
-    if entry.step is not None:
-        return _stepped(entry, start, stop, unit)
-    assert entry.num is not None
+    if entry.step is not None and entry.num is None:
+        return _stepped(entry, entry.step, start, stop, unit)
+    if entry.num is None or entry.step is not None:
+        raise ValueError("a range has either 'num' or 'step' besides 'start' and 'stop'")
     if entry.spacing == "log" and not (start * stop > 0):
         raise ValueError("a log range needs 'start' and 'stop' of one sign, neither zero")
     return Range(start, stop, entry.num, unit, spacing=entry.spacing)
 
 
-def _stepped(entry: RangeEntry, start: float, stop: float, unit: str) -> Range:
-    assert entry.step is not None
+def _stepped(
+    entry: RangeEntry, written: str | float, start: float, stop: float, unit: str
+) -> Range:
     if entry.spacing == "log":
         raise ValueError("a log range needs 'num', not 'step'")
-    step, step_unit = _number(entry.step, "step")
+    step, step_unit = _number(written, "step")
     if step_unit != unit:
         raise ValueError(f"'start' and 'step' are in different units: '{unit}' and '{step_unit}'")
     if step == 0 or (stop - start) * step < 0:

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
-import random
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from campaign.errors import Problem, ProtocolError, UsageError
-from campaign.physics.bench import Bench
 from campaign.physics.limits import Margin, margins
 from campaign.protocol.axes import is_large, value_problems
-from campaign.protocol.load import unknown_compensation
-from campaign.protocol.matrix import LARGEST_PLAN, count_points
-from campaign.protocol.points import Point, PointError, points_of
+from campaign.protocol.expand import Expanded, expand, samples_of, seed_of, size_problem
+from campaign.protocol.matrix import count_points
+from campaign.protocol.points import PointError, points_of
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import Protocol, Test
-from campaign.trial import Role, Task, Trial, TrialRequest, Tree, canonical_json
+from campaign.trial import Task, Tree, Trial, canonical_json
 
-LARGEST_RECORDING = 200_000_000
-"""samples of one trial; more fills a disk, and is a slip of units."""
 CHANNELS = 8
 """a backend records, besides the time; for the estimate of what would be written."""
 
@@ -104,7 +99,7 @@ class Plan:
     @property
     def samples(self) -> int:
         """Samples of all trials, per channel."""
-        return sum(_samples(trial.task) for trial in self.trials)
+        return sum(samples_of(trial.task) for trial in self.trials)
 
     @property
     def size(self) -> int:
@@ -140,14 +135,14 @@ def make_plan(
     uses: list[LimitUse] = []
     for test in chosen:
         try:
-            draft = _draft_trials(test, _test_seed(test, master), len(trials), allow_large)
+            expanded = expand(test, seed_of(test, master), len(trials), allow_large)
         except PointError as error:
             problems += error.problems
             continue
-        own = [LimitUse(t.number, margin) for t, margin in _all_margins(draft)]
-        planned.append(_planned(test, draft, own, master))
+        own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
+        planned.append(_planned(test, expanded, own, master))
         uses += own
-        trials += draft.trials
+        trials += expanded.trials
     if problems:
         raise ProtocolError(list(dict.fromkeys(problems)))
     normalised: Tree = {"tests": [_normalised(t, master) for t in protocol.tests]}
@@ -171,100 +166,16 @@ def make_plan(
     )
 
 
-@dataclass(frozen=True)
-class _Draft:
-    """The trials of one test in order of execution, each with its bench as an object."""
-
-    trials: tuple[Trial, ...]
-    benches: tuple[Bench, ...]
-
-
-@dataclass(frozen=True)
-class _Place:
-    """One trial before it is numbered."""
-
-    point: Point
-    request: TrialRequest
-    index: int  # among the requests of its point
-    repeat: int
-
-
-def _draft_trials(test: Test, seed: int, before: int, allow_large: bool) -> _Draft:
-    places: list[_Place] = []
-    points = list(points_of(test))
-    for repeat, point in itertools.product(range(1, test.entry.repeat + 1), points):
-        for index, request in enumerate(_requests(test, point)):
-            places.append(_Place(point, request, index, repeat))
-            if len(places) + before > LARGEST_PLAN and not allow_large:
-                raise PointError([_size_problem(test, "the plan has")])
-    ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
-    numbers = itertools.count(before + 1)
-    trials = tuple(_trial(test, place, next(numbers), seed) for place in ordered)
-    return _Draft(trials, tuple(place.point.bench for place in ordered))
-
-
-def _requests(test: Test, point: Point) -> Iterator[TrialRequest]:
-    """What the experiment asks for at a point, checked for what only a plan can see."""
-    names = ["none", *point.bench.compensation]
-    where = f" at {point.label}" if point.values else ""
-    try:
-        for request in test.experiment.trials(point.options, point.bench):
-            name = request.task.compensation
-            if name not in names:
-                raise ValueError(unknown_compensation(name, names, test))
-            if _samples(request.task) > LARGEST_RECORDING:
-                raise ValueError(
-                    f"a trial of {_samples(request.task):.3g} samples; at most "
-                    f"{LARGEST_RECORDING:.3g} are allowed: lower sample_rate or the duration"
-                )
-            yield request
-    except (ValueError, ArithmeticError) as error:
-        message = f"test '{test.entry.name}'{where}: {_first_line(error)}"
-        raise PointError([test.origin.problem((), "value", message)]) from None
-
-
-def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
-    """Each repetition is a block: its warm-ups first, then its measurements in random order."""
-    shuffler = random.Random(seed)
-    ordered: list[_Place] = []
-    for _, group in itertools.groupby(places, key=lambda place: place.repeat):
-        block = list(group)
-        measured = [p for p in block if p.request.role is not Role.WARM_UP]
-        shuffler.shuffle(measured)
-        ordered += [p for p in block if p.request.role is Role.WARM_UP] + measured
-    return ordered
-
-
-def _trial(test: Test, place: _Place, number: int, seed: int) -> Trial:
-    # All parts are validated; constructing without validation shares one bench tree among the
-    # trials of a point, where validation would copy it for each of up to 100 000.
-    request = place.request
-    swept = {**place.point.values, **request.point}
-    return Trial.model_construct(
-        number=number,
-        test=test.entry.name,
-        kind=test.entry.kind,
-        role=request.role,
-        point=swept,
-        options=place.point.options_tree,
-        repeat=place.repeat,
-        seed=_hash_seed(seed, place.point.values, place.index, place.repeat),
-        bench=place.point.bench_tree,
-        task=request.task,
-        note=request.note,
-    )
-
-
-def _all_margins(draft: _Draft) -> Iterator[tuple[Trial, Margin]]:
+def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
     known: dict[tuple[int, Task], tuple[Margin, ...]] = {}
-    for trial, bench in zip(draft.trials, draft.benches, strict=True):
+    for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
         key = (id(bench), trial.task)
         if key not in known:
             known[key] = margins(bench, trial.task)
         yield from ((trial, margin) for margin in known[key])
 
 
-def _planned(test: Test, draft: _Draft, uses: Sequence[LimitUse], master: int) -> PlannedTest:
+def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: int) -> PlannedTest:
     closest: dict[str, LimitUse] = {}
     for use in uses:
         best = closest.get(use.margin.limit)
@@ -272,7 +183,7 @@ def _planned(test: Test, draft: _Draft, uses: Sequence[LimitUse], master: int) -
             closest[use.margin.limit] = use
     first = next(iter(points_of(test)))
     matrix: dict[str, dict[str, Any]] = {axis.path: {} for axis in test.axes}
-    for trial in draft.trials:
+    for trial in expanded.trials:
         for path, values in matrix.items():
             values.setdefault(canonical_json(trial.point[path]), trial.point[path])
     entry = test.entry
@@ -286,11 +197,11 @@ def _planned(test: Test, draft: _Draft, uses: Sequence[LimitUse], master: int) -
         options=first.options_tree,
         matrix={path: tuple(values.values()) for path, values in matrix.items()},
         order=entry.order,
-        seed=_test_seed(test, master),
+        seed=seed_of(test, master),
         repeat=entry.repeat,
-        numbers=tuple(trial.number for trial in draft.trials),
+        numbers=tuple(trial.number for trial in expanded.trials),
         closest=tuple(closest.values()),
-        duration=sum(trial.task.duration for trial in draft.trials),
+        duration=sum(trial.task.duration for trial in expanded.trials),
     )
 
 
@@ -306,7 +217,7 @@ def _normalised(test: Test, master: int) -> Tree:
         "matrix": [[path, values] for path, values in swept.items()],
         "repeat": test.entry.repeat,
         "order": test.entry.order,
-        "seed": _test_seed(test, master),
+        "seed": seed_of(test, master),
     }
 
 
@@ -325,32 +236,5 @@ def _too_large(test: Test, allow_large: bool) -> list[Problem]:
         return []
     if not allow_large:
         trials = count_points(test.axes) * test.entry.repeat
-        return [_size_problem(test, f"test '{test.entry.name}' alone has {trials}, the plan")]
+        return [size_problem(test, f"test '{test.entry.name}' alone has {trials}, the plan")]
     return list(value_problems(test))  # loading left them out
-
-
-def _size_problem(test: Test, what: str) -> Problem:
-    message = f"{what} over {LARGEST_PLAN} trials; sweep less, or allow large plans explicitly"
-    keys = ("matrix",) if test.axes else ("repeat",)
-    return test.origin.problem(keys, "key", message)
-
-
-def _test_seed(test: Test, master: int) -> int:
-    given = test.entry.seed
-    return given if given is not None else _hash_seed(master, test.entry.name)
-
-
-def _hash_seed(*place: Any) -> int:
-    """63 bits that depend on nothing but a trial's place in its test."""
-    digest = hashlib.sha256(canonical_json(place).encode()).digest()
-    return int.from_bytes(digest[:8], "big") >> 1
-
-
-def _samples(task: Task) -> int:
-    return max(1, int(task.duration * task.sample_rate))
-
-
-def _first_line(error: Exception) -> str:
-    lines = str(error).strip().splitlines() or [type(error).__name__]
-    # pydantic's messages have a headline, a field and a sentence; all three are needed.
-    return " ".join(line.strip() for line in lines[:3])

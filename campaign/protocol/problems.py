@@ -73,6 +73,11 @@ def shown(value: Any) -> str:
     return str(value)[:60]
 
 
+def _a(noun: str) -> str:
+    """The noun with its article."""
+    return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
+
+
 def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collection[str]) -> Fault:
     keys, shape = from_location(model, detail["loc"])
     match detail["type"]:
@@ -147,7 +152,7 @@ def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
     if kind in _WANTED:
         wanted = _WANTED[kind]
         if shape is not None and shape.quantity and "number" in wanted:
-            wanted = f"a {shape.quantity.name} as text, such as {shape.quantity.example}"
+            wanted = f"{_a(shape.quantity.name)} as text, such as {shape.quantity.example}"
         if wanted == "a list" and isinstance(value, Mapping):
             return f"{here} is not a list; write [[{detail['loc'][-1]}]] for each of its tables"
         return f"{here} is not {wanted}"
@@ -159,12 +164,12 @@ def _expected(shape: Shape | None) -> str:
     if shape is None:
         return ""
     if shape.quantity is not None:
-        return f": a {shape.quantity.name} such as {shape.quantity.example}; {shape.meaning}"
+        return f": {_a(shape.quantity.name)} such as {shape.quantity.example}; {shape.meaning}"
     return f": {shape.meaning}" if shape.meaning else ""
 
 
 def _literals(expected: str) -> list[str]:
-    """pydantic writes `'a', 'b' or 'c'`."""
+    """As pydantic writes `'a', 'b' or 'c'`."""
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 

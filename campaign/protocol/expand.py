@@ -1,0 +1,141 @@
+"""From a test to its trials: every point, every repetition, in order, each with its own seed."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from campaign.errors import Problem
+from campaign.physics.bench import Bench
+from campaign.protocol.load import unknown_compensation
+from campaign.protocol.matrix import LARGEST_PLAN
+from campaign.protocol.points import Point, PointError, points_of
+from campaign.protocol.schema import Test
+from campaign.trial import Role, Task, Trial, TrialRequest, canonical_json
+
+LARGEST_RECORDING = 200_000_000
+"""samples of one trial; more fills a disk, and is a slip of units."""
+
+
+@dataclass(frozen=True)
+class Expanded:
+    """The trials of one test in order of execution, each with its bench as an object."""
+
+    trials: tuple[Trial, ...]
+    benches: tuple[Bench, ...]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """One trial before it is numbered."""
+
+    point: Point
+    request: TrialRequest
+    index: int  # among the requests of its point
+    repeat: int
+
+
+def expand(test: Test, seed: int, before: int, allow_large: bool) -> Expanded:
+    """The trials of `test`, numbered from `before` + 1. Raises PointError."""
+    places: list[_Place] = []
+    points = list(points_of(test))
+    for repeat, point in itertools.product(range(1, test.entry.repeat + 1), points):
+        for index, request in enumerate(_requests(test, point)):
+            places.append(_Place(point, request, index, repeat))
+            if len(places) + before > LARGEST_PLAN and not allow_large:
+                raise PointError([size_problem(test, "the plan has")])
+    ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
+    numbers = itertools.count(before + 1)
+    trials = tuple(_trial(test, place, next(numbers), seed) for place in ordered)
+    return Expanded(trials, tuple(place.point.bench for place in ordered))
+
+
+def _requests(test: Test, point: Point) -> Iterator[TrialRequest]:
+    """What the experiment asks for at a point, checked for what only a plan can see."""
+    names = ["none", *point.bench.compensation]
+    where = f" at {point.label}" if point.values else ""
+    try:
+        for request in test.experiment.trials(point.options, point.bench):
+            name = request.task.compensation
+            if name not in names:
+                raise ValueError(unknown_compensation(name, names, test))
+            if samples_of(request.task) > LARGEST_RECORDING:
+                raise ValueError(
+                    f"a trial of {samples_of(request.task):.3g} samples; at most "
+                    f"{LARGEST_RECORDING:.3g} are allowed: lower sample_rate or the duration"
+                )
+            yield request
+    except (ValueError, ArithmeticError) as error:
+        message = f"test '{test.entry.name}'{where}: {_first_line(error)}"
+        raise PointError([test.origin.problem((), "value", message)]) from None
+
+
+def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
+    """Each repetition is a block: its warm-ups first, then its measurements in random order.
+
+    The order is that of hashes, which no version of a library can change.
+    """
+
+    def hashed(place: _Place) -> int:
+        return _hash("order", seed, place.point.values, place.index, place.repeat)
+
+    ordered: list[_Place] = []
+    for _, group in itertools.groupby(places, key=lambda place: place.repeat):
+        block = list(group)
+        ordered += [p for p in block if p.request.role is Role.WARM_UP]
+        measured = [p for p in block if p.request.role is not Role.WARM_UP]
+        ordered += sorted(measured, key=hashed)
+    return ordered
+
+
+def _trial(test: Test, place: _Place, number: int, seed: int) -> Trial:
+    # All parts are validated; constructing without validation shares one bench tree among the
+    # trials of a point, where validation would copy it for each of up to 100 000.
+    request = place.request
+    swept = {**place.point.values, **request.point}
+    return Trial.model_construct(
+        number=number,
+        test=test.entry.name,
+        kind=test.entry.kind,
+        role=request.role,
+        point=swept,
+        options=place.point.options_tree,
+        repeat=place.repeat,
+        seed=_hash(seed, place.point.values, place.index, place.repeat),
+        bench=place.point.bench_tree,
+        task=request.task,
+        note=request.note,
+    )
+
+
+def size_problem(test: Test, what: str) -> Problem:
+    """The problem of a plan with too many trials, at what multiplies them in `test`."""
+    message = f"{what} over {LARGEST_PLAN} trials; sweep less, or allow large plans explicitly"
+    keys = ("matrix",) if test.axes else ("repeat",)
+    return test.origin.problem(keys, "key", message)
+
+
+def seed_of(test: Test, master: int) -> int:
+    """The test's own seed, or one drawn from the plan's that no other test changes."""
+    given = test.entry.seed
+    return given if given is not None else _hash(master, test.entry.name)
+
+
+def _hash(*place: Any) -> int:
+    """63 bits that depend on nothing but a trial's place in its test."""
+    digest = hashlib.sha256(canonical_json(place).encode()).digest()
+    return int.from_bytes(digest[:8], "big") >> 1
+
+
+def samples_of(task: Task) -> int:
+    """Samples per channel."""
+    return max(1, int(task.duration * task.sample_rate))
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    # pydantic's messages have a headline, a field and a sentence; all three are needed.
+    return " ".join(line.strip() for line in lines[:3])

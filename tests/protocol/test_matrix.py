@@ -1,0 +1,148 @@
+"""What a matrix expands to."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from campaign.errors import ProtocolError
+from campaign.protocol import make_plan
+
+TEST = '[[test]]\nname = "t"\nkind = "swing"\nbench = "simulink"\n'
+GOOD = TEST + 'frequency = "0.5 Hz"\n'
+
+
+def swept(desk, matrix: str, path: str, test: str = GOOD) -> list[object]:
+    plan = make_plan(desk.load(test + matrix))
+    return [trial.point[path] for trial in plan.trials]
+
+
+@pytest.mark.parametrize(
+    ("written", "values"),
+    [
+        ("[3, 1, 2]", [3, 1, 2]),
+        ("{ start = 0, stop = 1, num = 5 }", [0, 0.25, 0.5, 0.75, 1]),
+        ("{ start = 1, stop = 0, num = 3 }", [1, 0.5, 0]),
+        ("{ start = 2, stop = 9, num = 1 }", [2]),
+        ("{ start = 1, stop = 100, num = 3, spacing = 'log' }", [1, 10, 100]),
+        ("{ start = 0.1, stop = 0.5, step = 0.1 }", [0.1, 0.2, 0.3, 0.4, 0.5]),
+        ("{ start = 0, stop = 1, step = 0.3 }", [0, 0.3, 0.6, 0.9]),
+        ("{ start = 3, stop = 1, step = -1 }", [3, 2, 1]),
+        ("{ start = 2, stop = 2, step = 1 }", [2]),
+    ],
+)
+def test_bare_values(desk, written: str, values: list[float]) -> None:
+    assert swept(desk, f"matrix = {{ gain = {written} }}\n", "gain") == values
+
+
+def test_integers_of_a_range_stay_integers(desk) -> None:
+    values = swept(desk, "matrix = { cycles = { start = 1, stop = 4, step = 1 } }\n", "cycles")
+    assert values == [1, 2, 3, 4]
+    assert all(type(value) is int for value in values)
+
+
+def test_a_range_with_a_unit_is_converted(desk) -> None:
+    matrix = 'matrix = { acceleration = { start = "0 deg/s^2", stop = "90 deg/s^2", num = 4 } }\n'
+    with pytest.raises(ProtocolError, match="greater than 0"):
+        desk.load(GOOD + matrix)
+    values = swept(desk, matrix.replace('"0 deg', '"60 deg'), "acceleration")
+    assert values == pytest.approx([math.radians(x) for x in (60, 70, 80, 90)], rel=1e-11)
+
+
+def test_a_required_option_may_come_from_the_matrix_alone(desk) -> None:
+    values = swept(desk, 'matrix = { frequency = ["1 Hz", "200 mHz"] }\n', "frequency", TEST)
+    assert values == pytest.approx([1.0, 0.2])
+
+
+def test_first_key_is_slowest(desk) -> None:
+    plan = make_plan(desk.load(GOOD + 'matrix = { cycles = [1, 2], style = ["slow", "fast"] }\n'))
+    points = [(trial.point["cycles"], trial.point["style"]) for trial in plan.trials]
+    assert points == [(1, "slow"), (1, "fast"), (2, "slow"), (2, "fast")]
+    assert [trial.number for trial in plan.trials] == [1, 2, 3, 4]
+    assert [trial.options["style"] for trial in plan.trials] == ["slow", "fast", "slow", "fast"]
+    assert [trial.task.duration for trial in plan.trials] == [2.0, 2.0, 4.0, 4.0]
+
+
+def test_a_repetition_is_the_whole_matrix_once_more(desk) -> None:
+    plan = make_plan(desk.load(GOOD + "repeat = 2\nmatrix = { cycles = [1, 2] }\n"))
+    found = [(trial.repeat, trial.point["cycles"]) for trial in plan.trials]
+    assert found == [(1, 1), (1, 2), (2, 1), (2, 2)]
+
+
+BENCH_PATHS = [
+    ('"bench.axis.inertia" = ["40 kg m^2"]', ("axis", "inertia"), 40.0),
+    ('bench.axis.inertia = ["40 kg m^2"]', ("axis", "inertia"), 40.0),
+    ('"bench.gear.ratio" = [100]', ("gear", "ratio"), 100.0),
+    (
+        '"bench.friction.load.coulomb_torque" = ["30 N m"]',
+        ("friction", "load", "coulomb_torque"),
+        30.0,
+    ),
+    # Fields that the bench file leaves to their defaults.
+    ('"bench.controller.delay" = ["2 ms"]', ("controller", "delay"), 0.002),
+    ('"bench.sensors.gyro.noise" = ["1 mrad/s"]', ("sensors", "gyro", "noise"), 0.001),
+    # Through two unions and two tables of free names.
+    (
+        '"bench.compensation.lugre.friction.load.static_torque" = ["33 N m"]',
+        ("compensation", "lugre", "friction", "load", "static_torque"),
+        33.0,
+    ),
+]
+
+
+@pytest.mark.parametrize(("matrix", "keys", "value"), BENCH_PATHS)
+def test_a_bench_can_be_swept(desk, matrix: str, keys: tuple[str, ...], value: float) -> None:
+    trial = make_plan(desk.load(GOOD + f"[test.matrix]\n{matrix}\n")).trials[0]
+    found = trial.bench
+    for key in keys:
+        found = found[key]
+    assert found == value
+    assert trial.point == {"bench." + ".".join(keys): value}
+
+
+def test_a_whole_friction_can_be_swept(desk) -> None:
+    stribeck = (
+        '{ model = "stribeck", static_torque = "32 N m", coulomb_torque = "26 N m", '
+        'stribeck_velocity = "0.03 rad/s" }'
+    )
+    plan = make_plan(desk.load(GOOD + f'[test.matrix]\n"bench.friction.load" = [{stribeck}]\n'))
+    friction = plan.trials[0].bench["friction"]
+    assert friction["load"]["model"] == "stribeck"
+    assert friction["motor"]["model"] == "lugre"
+
+
+def test_sweeping_one_field_leaves_the_rest_of_the_bench(desk) -> None:
+    plain = make_plan(desk.load(GOOD)).trials[0].bench
+    matrix = '[test.matrix]\n"bench.axis.inertia" = ["35 kg m^2", "36 kg m^2"]\n'
+    first, second = (trial.bench for trial in make_plan(desk.load(GOOD + matrix)).trials)
+    assert first == plain
+    assert second == {**plain, "axis": {**plain["axis"], "inertia": 36.0}}
+
+
+def test_too_large_is_refused_before_anything_is_expanded(desk) -> None:
+    ranges = ", ".join(
+        f"{name} = {{ start = 1, stop = 2, num = 9999999 }}" for name in ("gain", "cycles")
+    )
+    protocol = desk.load(GOOD + f"matrix = {{ {ranges} }}\n")
+    with pytest.raises(ProtocolError, match=r":6:1: test 't' alone has 99999980000001, the plan"):
+        make_plan(protocol)
+
+
+def test_exactly_the_largest_plan_is_allowed_and_one_more_is_not(desk, monkeypatch) -> None:
+    for module in ("axes", "expand"):
+        monkeypatch.setattr(f"campaign.protocol.{module}.LARGEST_PLAN", 6)
+    two = GOOD.replace('"t"', '"u"') + "repeat = 3\n"
+    small = GOOD + "matrix = { cycles = [1, 2, 3] }\n" + two
+    assert len(make_plan(desk.load(small)).trials) == 6
+    large = desk.load(small + GOOD.replace('"t"', '"v"'))
+    with pytest.raises(ProtocolError, match="the plan has over 6 trials"):
+        make_plan(large)
+    assert len(make_plan(large, allow_large=True).trials) == 7
+
+
+def test_values_of_a_large_matrix_are_checked_too(desk, monkeypatch) -> None:
+    monkeypatch.setattr("campaign.protocol.axes.LARGEST_PLAN", 2)
+    protocol = desk.load(GOOD + "matrix = { cycles = [1, 2, 0] }\n")
+    with pytest.raises(ProtocolError, match="must be at least 1"):
+        make_plan(protocol, allow_large=True)

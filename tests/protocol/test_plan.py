@@ -1,0 +1,189 @@
+"""What is in a plan, and what its seeds and fingerprints depend on."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
+from campaign.experiments import experiments
+from campaign.protocol import as_tree, check_limits, load_protocol, make_plan
+from campaign.trial import Role, Trial
+
+from .conftest import SHIPPED
+
+SWING = '[[test]]\nname = "swing"\nkind = "swing"\nbench = "simulink"\nfrequency = "0.5 Hz"\n'
+SPEEDS = (
+    '[[test]]\nname = "speeds"\nkind = "speeds"\nbench = "simulink"\n'
+    'speeds = ["1 deg/s", "2 deg/s", "3 deg/s", "4 deg/s", "5 deg/s", "6 deg/s"]\n'
+)
+MATRIX = "matrix = { cycles = [1, 2, 3] }\n"
+
+
+def seeds(plan) -> dict[tuple[object, ...], int]:
+    return {(t.test, t.role, str(t.point), t.repeat): t.seed for t in plan.trials}
+
+
+def test_seeds_depend_on_the_place_alone(desk) -> None:
+    text = SWING + "repeat = 3\n" + MATRIX + SPEEDS + "repeat = 2\n"
+    plan = make_plan(desk.load(text), seed=5)
+    alone = make_plan(desk.load(text), seed=5, only=["speeds"])
+    shuffled = make_plan(desk.load(text + 'order = "shuffled"\n'), seed=5)
+    more = make_plan(desk.load(text.replace("[1, 2, 3]", "[7, 3, 1, 2]")), seed=5)
+    assert len(set(seeds(plan).values())) == len(plan.trials) == 9 + 14
+    assert seeds(alone).items() <= seeds(plan).items()
+    assert seeds(shuffled) == seeds(plan)
+    assert seeds(plan).items() <= seeds(more).items()
+    assert [t.number for t in alone.trials] == list(range(1, 15))
+
+
+def test_a_seed_is_drawn_and_recorded_when_none_is_given(desk) -> None:
+    protocol = desk.load(SWING)
+    first, second = make_plan(protocol), make_plan(protocol)
+    assert first.seed != second.seed
+    again = make_plan(protocol, seed=first.seed)
+    assert again.trials == first.trials
+    assert again.fingerprint == first.fingerprint
+
+
+def test_a_test_with_its_own_seed_ignores_the_plan_s(desk) -> None:
+    protocol = desk.load(SWING + "seed = 42\n")
+    first, second = make_plan(protocol, seed=1), make_plan(protocol, seed=2)
+    assert first.tests[0].seed == 42
+    assert first.trials == second.trials
+
+
+def test_shuffled_order(desk) -> None:
+    plan = make_plan(desk.load(SPEEDS + 'order = "shuffled"\nrepeat = 2\nseed = 3\n'))
+    blocks = [plan.trials[:7], plan.trials[7:]]
+    orders = []
+    for number, block in enumerate(blocks, start=1):
+        assert {trial.repeat for trial in block} == {number}
+        assert [t.role is Role.WARM_UP for t in block] == [True] + 6 * [False]
+        orders.append([trial.point["speed"] for trial in block[1:]])
+    written = [trial.point["speed"] for trial in make_plan(desk.load(SPEEDS)).trials[1:]]
+    assert sorted(orders[0]) == sorted(orders[1]) == written
+    # 6! orders: three of them being equal by chance has a probability of 2e-6, for one seed.
+    assert written != orders[0] != orders[1] != written
+
+
+def test_trials_are_what_validation_would_make_of_them(desk) -> None:
+    plan = make_plan(desk.load(SWING + MATRIX))
+    for trial in plan.trials:
+        again = Trial.model_validate_json(trial.model_dump_json())
+        assert again == trial
+        assert again.fingerprint == trial.fingerprint
+
+
+def test_prose_does_not_change_the_fingerprint_and_physics_does(desk) -> None:
+    def fingerprint(text: str, *overrides: str) -> str:
+        return make_plan(desk.load(text, *overrides), seed=1).fingerprint
+
+    plain = fingerprint(SWING + MATRIX)
+    assert fingerprint('title = "x"\nnotes = "y"\n' + SWING + "# a comment\n" + MATRIX) == plain
+    same = SWING.replace('"0.5 Hz"', '"500 mHz"')
+    assert fingerprint(same + MATRIX) == plain
+    changed = [
+        (SWING + MATRIX.replace("3", "4"),),
+        (SWING.replace("0.5", "0.6") + MATRIX,),
+        (SWING + "repeat = 2\n" + MATRIX,),
+        (SWING + MATRIX, "swing.bench.axis.inertia=36 kg m^2"),
+    ]
+    assert len({plain, *(fingerprint(*change) for change in changed)}) == 5
+
+
+def test_sources_are_verbatim_and_named_as_written(desk, simulink: str) -> None:
+    desk.write("more/own bench.toml", simulink)
+    included = SPEEDS.replace('"simulink"', '"../more/own bench.toml"')
+    desk.write("sub/other.toml", included)
+    desk.write("values.toml", "x = 1\n")
+    main = 'include = ["sub/other.toml"]\npublished = "values.toml"\n' + SWING + "# end"
+    plan = make_plan(desk.load(main))
+    assert plan.sources == {
+        "protocol.toml": main,
+        "sub/other.toml": included,
+        "more/own bench.toml": simulink,
+        "values.toml": "x = 1\n",
+        "simulink": simulink,
+    }
+    assert [test.name for test in plan.tests] == ["speeds", "swing"]
+    assert plan.published == "values.toml"
+
+
+def test_a_plan_is_json(desk) -> None:
+    plan = make_plan(desk.load(SWING + MATRIX + SPEEDS))
+    tree = json.loads(json.dumps(as_tree(plan), allow_nan=False))
+    assert tree["duration_s"] == 2.0 + 4.0 + 6.0 + 7 * 2.0
+    assert tree["samples"] == 200 + 400 + 600 + 7 * 20
+    assert [trial["number"] for trial in tree["trials"]] == list(range(1, 11))
+    assert {use["limit"] for use in tree["tests"][0]["limits"]} == {
+        "angle",
+        "rate",
+        "acceleration",
+        "torque",
+        "current",
+        "duration",
+    }
+
+
+def test_unknown_only(desk) -> None:
+    with pytest.raises(UsageError, match=r"'swign'; allowed are swing; did you mean 'swing'\?"):
+        make_plan(desk.load(SWING), only=["swign"])
+
+
+def test_an_experiment_that_refuses_names_the_point(desk) -> None:
+    protocol = desk.load("\n" + SWING + "matrix = { gain = [1, 101, 102] }\n")
+    with pytest.raises(ProtocolError) as caught:
+        make_plan(protocol)
+    assert str(caught.value).endswith(
+        "protocol.toml:2:1: test 'swing' at gain = 101.0: the gain is too high for this bench"
+    )
+
+
+def test_a_recording_nobody_can_store_is_refused(desk) -> None:
+    with pytest.raises(ProtocolError, match="a trial of .* samples"):
+        make_plan(desk.load(SWING.replace('"0.5 Hz"', '"1e-9 Hz"')))
+
+
+# Limits.
+
+
+def test_a_plan_within_its_limits_passes(desk) -> None:
+    check_limits(make_plan(desk.load(SWING + SPEEDS)))
+
+
+def test_every_broken_limit_is_named_with_value_and_bound(desk) -> None:
+    text = SWING.replace('"0.5 Hz"', '"0.1 Hz"') + (
+        '[test.matrix]\nacceleration = ["1 deg/s^2", "36 deg/s^2", "37 deg/s^2", "38 deg/s^2",'
+        ' "39 deg/s^2"]\n' + SPEEDS.replace('"6 deg/s"', '"95 deg/s"')
+    )
+    with pytest.raises(LimitError) as caught:
+        check_limits(make_plan(desk.load(text)))
+    message = str(caught.value)
+    assert caught.value.exit_code is ExitCode.LIMIT_OR_FAULT
+    assert "5 of 12 trials" in message
+    # 39 deg/s^2 / (0.2 pi / s)^2 = 98.79 deg; 36: 91.19 deg, as the thesis' own 0.1 Hz row.
+    assert "swing: angle up to 98.79 deg, limit 90 deg: trial-00005" in message
+    assert "[acceleration=0.628319] 91.19 deg" in message
+    assert "and 1 more" in message
+    assert "speeds: rate up to 95 deg/s, limit 90 deg/s: trial-00012" in message
+
+
+# The shipped protocols.
+
+
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_protocols_can_be_executed_within_the_limits(path) -> None:
+    plan = make_plan(load_protocol(path, experiments(), shipped=SHIPPED))
+    check_limits(plan)
+    assert any(test.reproduces for test in plan.tests)
+
+
+def test_the_full_map_has_80_speeds_in_both_directions() -> None:
+    path = SHIPPED / "velocity_map.toml"
+    plan = make_plan(load_protocol(path, experiments(), shipped=SHIPPED))
+    speeds = [t.point["speed"] for t in plan.trials if t.role is Role.MEASUREMENT]
+    assert len(set(speeds)) == 80
+    assert min(speeds) == pytest.approx(0.05 * 3.141592653589793 / 180)
+    assert max(speeds) == pytest.approx(65 * 3.141592653589793 / 180)
