@@ -1,0 +1,105 @@
+"""The command line itself: quick help, and one place that turns errors into exit codes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from campaign.cli import main as command_line
+from campaign.cli.output import bytes_text, print_table
+from campaign.cli.prepare import find_protocol
+from campaign.errors import (
+    ArchiveError,
+    BackendError,
+    LimitError,
+    Problem,
+    ProtocolError,
+    UsageError,
+)
+from campaign.resources import protocols_folder
+
+HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "pint", "scipy", "tree_sitter")
+COMMANDS = ("plan", "run", "report", "list", "show", "kinds", "init")
+
+
+@pytest.mark.parametrize("arguments", [[], *([command] for command in COMMANDS)])
+def test_help_imports_nothing_heavy(arguments: list[str]):
+    # typer itself imports pydantic, where it is installed, for a command that has parameters.
+    heavy = HEAVY if arguments else (*HEAVY, "pydantic")
+    script = (
+        "import sys, campaign.cli\n"
+        f"sys.argv = {['campaign', *arguments, '--help']!r}\n"
+        "try:\n    campaign.cli.main()\n"
+        "except SystemExit as end:\n    assert not end.code\n"
+        f"print(sorted(set({heavy!r}) & set(sys.modules)), file=sys.stderr)\n"
+    )
+    root = Path(__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=root, timeout=60
+    )
+    assert done.stderr.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (UsageError("no such run"), 2, "campaign: no such run\n"),
+        (ProtocolError([Problem(Path("p.toml"), 3, 8, "what")]), 2, "p.toml:3:8: what\n"),
+        (LimitError("too fast"), 3, "campaign: too fast\n"),
+        (BackendError("the port closed"), 3, "campaign: the port closed\n"),
+        (ArchiveError("a.nxs: cut off"), 4, "campaign: a.nxs: cut off\n"),
+        (KeyboardInterrupt(), 130, "campaign: interrupted\n"),
+    ],
+)
+def test_every_error_is_one_message_and_its_code(
+    error: BaseException, code: int, message: str, monkeypatch, capsys
+):
+    assert leave_with(error, monkeypatch) == code
+    assert capsys.readouterr().err == message
+
+
+def test_a_bug_says_how_to_get_its_traceback_and_has_a_code_of_its_own(monkeypatch, capsys):
+    assert leave_with(ZeroDivisionError("oops"), monkeypatch) == 70
+    error = capsys.readouterr().err
+    assert "ZeroDivisionError: oops" in error
+    assert "CAMPAIGN_DEBUG=1" in error
+    assert "Traceback" not in error
+    monkeypatch.setenv("CAMPAIGN_DEBUG", "1")
+    assert leave_with(ZeroDivisionError("oops"), monkeypatch) == 70
+    assert "Traceback" in capsys.readouterr().err
+
+
+def leave_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> int:
+    def fail(prog_name: str) -> None:
+        raise error
+
+    module = sys.modules["campaign.cli.main"]
+    monkeypatch.setattr(module, "app", fail)
+    monkeypatch.setattr(module.threading, "active_count", lambda: 1)  # xdist has its own threads
+    with pytest.raises(SystemExit) as end:
+        command_line()
+    return int(end.value.code)
+
+
+def test_a_file_comes_before_a_shipped_protocol_of_the_same_name(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert find_protocol("quickstart") == protocols_folder() / "quickstart.toml"
+    Path("quickstart").touch()
+    assert find_protocol("quickstart") == Path("quickstart")
+    with pytest.raises(UsageError, match="no such file"):
+        find_protocol("elsewhere/quickstart.toml")
+
+
+def test_without_a_terminal_a_table_is_tab_separated_and_one_line_per_row(capsys):
+    print_table(("a", "b"), [("1", "two\nlines\tand a tab")])
+    assert capsys.readouterr().out == "a\tb\n1\ttwo lines and a tab\n"
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "0 B"), (999, "999 B"), (14_230_000, "14.2 MB"), (2e15, "2000.0 TB")]
+)
+def test_sizes_are_decimal(count: int, text: str):
+    assert bytes_text(count) == text
