@@ -53,7 +53,7 @@ STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.limits": (-5, 6),
     "axes.xmargin": 0.02,
     "grid.color": HAIRLINE.light,
     "grid.linewidth": 0.6,
@@ -90,7 +90,8 @@ def draw(figure: Figure) -> str:
             _draw_panel(ax, panel, chosen, points)
         for ax in axes[len(figure.panels) :]:
             ax.set_axis_off()
-        add_legend(sheet, list(axes))
+        if not _titles_say_it(figure):
+            add_legend(sheet, list(axes))
         return to_svg(sheet)
 
 
@@ -149,6 +150,13 @@ def add_legend(sheet: Canvas, axes: Sequence[Axes]) -> None:
     columns = max(1, min(len(entries), int(WIDTH * 13 / (longest + 7))))
     sheet.legend(
         list(entries.values()), list(entries), loc="outside upper left", ncols=columns, borderpad=0
+    )
+
+
+def _titles_say_it(figure: Figure) -> bool:
+    """Whether every panel's title already names all its curves."""
+    return all(
+        {curve.label for curve in panel.curves} <= {"", panel.title} for panel in figure.panels
     )
 
 

@@ -29,7 +29,12 @@ ROOT = Path(__file__).resolve().parents[2]
 TEMPLATES = ROOT / "templates"
 SHAKEN = {"acceleration": np.deg2rad(18.0), "frequency": 0.24}
 TIME = Axis("Time", "s", "s")
-METHODS = {"none": "no compensation", "static": "static model", "lugre": "LuGre", "observer": "observer"}
+METHODS = {
+    "none": "no compensation",
+    "static": "static model",
+    "lugre": "LuGre",
+    "observer": "observer",
+}
 
 
 class ShakeOptions(Options):
@@ -91,13 +96,20 @@ def stabilization(data: TestData) -> Result:
             Column("stuck", "Time stuck", "", "percent"),
         ),
         tuple(
-            {"compensation": k, "frequency": 0.24, "error": v, "stuck": 0.13 if k == "none" else 0.0}
+            {
+                "compensation": k,
+                "frequency": 0.24,
+                "error": v,
+                "stuck": 0.13 if k == "none" else 0.0,
+            }
             for k, v in values.items()
         ),
         ("5.2", "5.8"),
         "The error is the standard deviation of the integrated gyro rate over whole cycles.",
     )
-    return Result((table,), (rates, errors), findings, ("One trial per method: no spread is known.",))
+    return Result(
+        (table,), (rates, errors), findings, ("One trial per method: no spread is known.",)
+    )
 
 
 def velocity_map(data: TestData) -> Result:
@@ -198,11 +210,15 @@ def made_up_run(
 ) -> RunReader:
     """Tests are kind to what they reproduce; the last trial of each failed."""
     used = bench or globals()["bench"]()
-    wanted = tests if tests is not None else {
-        "stabilization": ("5.2", "5.8", "figure 5.4"),
-        "velocity_map": ("4.3", "text 4.2.1"),
-        "breakaway": ("4.5",),
-    }
+    wanted = (
+        tests
+        if tests is not None
+        else {
+            "stabilization": ("5.2", "5.8", "figure 5.4"),
+            "velocity_map": ("4.3", "text 4.2.1"),
+            "breakaway": ("4.5",),
+        }
+    )
     archive = folder / "made-up.nxs"
     archive.write_bytes(b"not really HDF5")
     trials = []

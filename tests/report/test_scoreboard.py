@@ -1,0 +1,190 @@
+"""Matching and statuses on a small published file, with deviations worked out by hand."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+
+import pytest
+
+from campaign.report.published import read_published
+from campaign.report.scoreboard import COLUMNS, Evidence, Line, Scoreboard, score, to_csv
+from campaign.result import Finding
+
+PUBLISHED = read_published(
+    """
+source = "made up"
+[[table]]
+name = "1.1"
+title = "Errors"
+quantity = "error"
+unit = "mrad"
+decimals = 1
+conditions = { acceleration = "18 deg/s^2" }
+rows = { condition = "frequency", unit = "Hz" }
+columns = { condition = "compensation", names = ["none", "lugre"] }
+[table.cells]
+"0.5" = [0.5, 0.2]
+"2.0" = [0.8, 0.0]
+[[table.mark]]
+cells = ["2.0/none"]
+status = "not reproducible"
+reason = "the base cannot do that"
+[[table.mark]]
+cells = ["2.0/none", "0.5/lugre"]
+status = "inconsistent"
+reason = "printed twice"
+[[table]]
+name = "text 1.2"
+title = "Claim"
+column.value = {}
+[table.row.rise_time]
+quantity = "rise_time"
+unit = "ms"
+relation = "at most"
+[table.cells]
+rise_time = [40]
+""",
+    "made-up.toml",
+)
+SHAKEN = {"acceleration": math.radians(18), "compensation": "none", "frequency": 0.5}
+ERROR = Finding("error", 0.55e-3, "rad", SHAKEN)
+
+
+def board(*findings: Finding, **more: object) -> Scoreboard:
+    return score(PUBLISHED, [Evidence("test", ("1.1", "text 1.2"), findings, **more)])
+
+
+def line(found: Scoreboard, path: str) -> Line:
+    return next(line for line in found.lines if line.cell.path == path)
+
+
+def test_the_deviation_is_in_percent_of_the_published_value_in_its_unit() -> None:
+    found = line(board(ERROR), "1.1/0.5/none")
+    assert found.reproduced == pytest.approx(0.55)
+    assert found.deviation == pytest.approx(10.0)
+    assert found.status == "simulated"
+
+
+@pytest.mark.parametrize(
+    ("changed", "matches"),
+    [
+        ({}, True),
+        ({"frequency": 0.5 * 1.0009}, True),
+        ({"frequency": 0.5 * 1.0011}, False),
+        ({"acceleration": None}, False),
+        ({"compensation": "static"}, False),
+        ({"position": 3}, True),
+    ],
+)
+def test_every_condition_of_the_cell_must_be_stated_and_met(
+    changed: dict[str, float], matches: bool
+) -> None:
+    conditions = {k: v for k, v in {**SHAKEN, **changed}.items() if v is not None}
+    found = board(Finding("error", 0.55e-3, "rad", conditions))
+    assert any(line.cell.path == "1.1/0.5/none" for line in found.lines) is matches
+
+
+def test_another_quantity_does_not_match() -> None:
+    found = board(Finding("peak_error", 0.55e-3, "rad", SHAKEN))
+    assert [cell.path for cell in found.missing] == [
+        "1.1/0.5/none",
+        "1.1/2.0/lugre",
+        "text 1.2/rise_time/value",
+    ]
+
+
+def test_a_table_nobody_reproduces_is_not_spoken_to() -> None:
+    assert score(PUBLISHED, [Evidence("test", (), [ERROR])]) == Scoreboard()
+
+
+@pytest.mark.parametrize(
+    ("more", "recomputed", "status"),
+    [
+        ({}, False, "simulated"),
+        ({"fitted": ("5.3",)}, False, "predicted"),
+        ({"fitted": ("5.3",)}, True, "recomputed"),
+        ({"fitted": ("5.3",), "given": ("1.1",)}, True, "recovered"),
+        ({"fitted": ("1.1",), "given": ("1.1",)}, True, "calibrated"),
+        ({"fitted": ("1.1/0.5/none",)}, False, "calibrated"),
+        ({"fitted": ("1.1/0.5/lugre",)}, False, "predicted"),
+        ({"fitted": ("1.11", "1.1/0.5/no")}, False, "predicted"),
+    ],
+)
+def test_the_first_status_that_applies(
+    more: dict[str, tuple[str, ...]], recomputed: bool, status: str
+) -> None:
+    finding = Finding("error", 0.55e-3, "rad", SHAKEN, recomputed)
+    assert line(board(finding, **more), "1.1/0.5/none").status == status
+
+
+def test_a_marked_cell_is_a_line_with_and_without_a_finding() -> None:
+    without = line(board(), "1.1/0.5/lugre")
+    assert (without.status, without.reproduced) == ("inconsistent", None)
+    finding = Finding("error", 0.2e-3, "rad", {**SHAKEN, "compensation": "lugre"})
+    found = line(board(finding, fitted=("1.1",)), "1.1/0.5/lugre")
+    assert (found.status, found.reproduced) == ("inconsistent", pytest.approx(0.2))
+
+
+def test_a_published_zero_has_no_deviation_in_percent() -> None:
+    conditions = {**SHAKEN, "compensation": "lugre", "frequency": 2.0}
+    found = line(board(Finding("error", 0.01e-3, "rad", conditions)), "1.1/2.0/lugre")
+    assert found.deviation is None
+    assert found.agrees is True
+
+
+def test_nan_is_no_finding() -> None:
+    assert board(Finding("error", math.nan, "rad", SHAKEN)) == board()
+
+
+def test_the_first_test_that_found_a_cell_counts() -> None:
+    other = Finding("error", 0.6e-3, "rad", SHAKEN)
+    empty = Finding("error", math.nan, "rad", SHAKEN)
+    tests = [Evidence(n, ("1.1",), [f]) for n, f in (("a", empty), ("b", ERROR), ("c", other))]
+    assert line(score(PUBLISHED, tests), "1.1/0.5/none").test == "b"
+
+
+@pytest.mark.parametrize(("seconds", "met"), [(0.039, True), (0.040, True), (0.041, False)])
+def test_a_claim_is_met_or_not(seconds: float, met: bool) -> None:
+    found = line(board(Finding("rise_time", seconds, "s", {})), "text 1.2/rise_time/value")
+    assert found.agrees is met
+
+
+def test_agreement_to_the_printed_digit() -> None:
+    for value, agrees in ((0.549e-3, True), (0.5501e-3, False), (0.451e-3, True)):
+        found = line(board(Finding("error", value, "rad", SHAKEN)), "1.1/0.5/none")
+        assert found.agrees is agrees
+
+
+def test_what_is_known_of_the_test_holds_for_its_findings() -> None:
+    bare = {k: v for k, v in SHAKEN.items() if k != "acceleration"}
+    finding = Finding("error", 0.55e-3, "rad", bare)
+    assert line(board(finding, known={"acceleration": math.radians(18)}), "1.1/0.5/none")
+
+
+def test_an_impossible_unit_is_told_and_costs_nothing_else() -> None:
+    found = board(Finding("error", 1.0, "kg m^2", SHAKEN), ERROR)
+    assert found.problems == (
+        "test: error in 'kg m^2' cannot be compared with 1.1/0.5/none in 'mrad'",
+    )
+    assert line(found, "1.1/0.5/none").reproduced == pytest.approx(0.55)
+
+
+def test_an_unknown_table_is_told() -> None:
+    found = score(PUBLISHED, [Evidence("test", ("9.9", "figure 5.4"), ())])
+    assert found.problems == ("test reproduces '9.9', which is no published table",)
+
+
+def test_the_file_has_exactly_these_columns_and_unrounded_values() -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(board(ERROR).lines))))
+    assert tuple(rows[0]) == COLUMNS == (
+        "table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status"
+    )  # fmt: skip
+    by_cell = {(r["row"], r["column"]): r for r in rows}
+    found = by_cell["0.5", "none"]
+    assert found["published"] == "0.5"
+    assert float(found["reproduced"]) == 0.55e-3 * 1e3
+    empty = by_cell["2.0", "none"]
+    assert (empty["reproduced"], empty["deviation_percent"]) == ("", "")
+    assert empty["status"] == "not reproducible"
