@@ -189,7 +189,9 @@ def _attribute(item: h5py.HLObject, name: str) -> Any:
 
 def _own(parent: h5py.Group, name: str) -> Any:
     raw = name.encode()
-    if raw not in parent.id:
+    if "/" in name or name == ".":  # on a path, only the last link would be looked at
+        raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
+    if not raw or raw not in parent.id:
         raise ArchiveError(f"{_place(parent, name)}: is missing")
     if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
         raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")

@@ -26,7 +26,9 @@ from campaign.trial import ChannelInfo, Ending, Event, Trial, canonical_json
 
 Array = NDArray[np.float64]
 
-TIME_LABEL = "Time"
+TELLING = {"rate": "gyro_rate", "torque": "relative_rate"}
+"""By a task's mode, the channel that the default plot shows; else it is the first one."""
+
 _CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
 
 
@@ -52,6 +54,7 @@ class TrialFile:
         self._final = folder / f"{trial.name}{SEALED}"
         self._part = folder / f"{trial.name}{SEALED}{PART}"
         self._channels: tuple[ChannelInfo, ...] = ()
+        self._shown = 0
         self._columns: hdf5.SampleColumns | None = None
         self._preview = Preview()
         self._events: list[Event] = []
@@ -62,12 +65,16 @@ class TrialFile:
         self._entry = hdf5.make_group(self._file, entry_name(trial.number), "NXentry")
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
-        """Announce the channels. The first is the one the default plot shows."""
+        """Announce the channels. See `TELLING` for the one that the default plot shows."""
         if self._columns is not None:
             raise BackendError(f"{self._trial.name}: the channels were announced twice")
         _check_names(self._trial, channels)
         self._channels = channels
-        data = _plot_group(self._entry, "data", self._trial, channels)
+        shown = TELLING[self._trial.task.mode]
+        names = [channel.name for channel in channels]
+        self._shown = names.index(shown) if shown in names else 0
+        others = [name for name in names if name != names[self._shown]]
+        data = _plot_group(self._entry, "data", self._trial, names[self._shown], others)
         attributes = {"time": _time_attributes()} | {c.name: _attributes(c) for c in channels}
         self._columns = hdf5.SampleColumns(data, attributes)
 
@@ -82,7 +89,7 @@ class TrialFile:
             )
         with self._writing():
             for chunk in self._columns.append([time, *block]):
-                self._preview.add(chunk[0], chunk[1])
+                self._add_to_preview(chunk)
 
     def event(self, event: Event) -> None:
         self._events.append(event)
@@ -91,7 +98,7 @@ class TrialFile:
         """Write the rest, put it on the disk and give the file its real name."""
         with self._writing():
             self._finish_samples()
-            _write_record(self._entry, self._trial, ending, self._events)
+            _write_record(self._entry, self._trial, ending, self._channels, self._events)
             hdf5.put_text(self._entry, "title", self._trial.label)
             hdf5.put_text(self._entry, "entry_identifier", self._trial.name)
             hdf5.put_text(self._entry, "start_time", started)
@@ -113,13 +120,17 @@ class TrialFile:
         if self._columns is None:
             return
         rest = self._columns.finish()
-        self._preview.add(rest[0], rest[1])
+        self._add_to_preview(rest)
         hdf5.attach_time(self._entry["data"])
         shown = "data"
         if self._columns.length > PREVIEW_POINTS:
             shown = "preview"
-            _write_preview(self._entry, self._trial, self._channels[0], self._preview)
+            channel = self._channels[self._shown]
+            _write_preview(self._entry, self._trial, channel, self._preview)
         self._entry.attrs["default"] = shown
+
+    def _add_to_preview(self, rows: Array) -> None:
+        self._preview.add(rows[0], rows[1 + self._shown])
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
@@ -146,7 +157,13 @@ def write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
         file.attrs["default"] = shown.name.lstrip("/")
 
 
-def _write_record(entry: h5py.Group, trial: Trial, ending: Ending, events: list[Event]) -> None:
+def _write_record(
+    entry: h5py.Group,
+    trial: Trial,
+    ending: Ending,
+    channels: tuple[ChannelInfo, ...],
+    events: list[Event],
+) -> None:
     record = hdf5.make_group(entry, "record", "NXcollection")
     hdf5.put_text(record, "trial", canonical_json(trial.model_dump(mode="json")))
     hdf5.put_text(record, "test", trial.test)
@@ -157,12 +174,13 @@ def _write_record(entry: h5py.Group, trial: Trial, ending: Ending, events: list[
     hdf5.put_text(record, "outcome", ending.outcome)
     hdf5.put_text(record, "reason", ending.reason)
     hdf5.put_text(record, "safe_state", ending.safe_state)
+    hdf5.put_text(record, "channels", canonical_json([channel.name for channel in channels]))
     told = [{"time": float(event.time), "text": event.text} for event in events]
     hdf5.put_text(record, "events", canonical_json(told))
 
 
 def _write_preview(entry: h5py.Group, trial: Trial, channel: ChannelInfo, preview: Preview) -> None:
-    group = _plot_group(entry, "preview", trial, (channel,))
+    group = _plot_group(entry, "preview", trial, channel.name, [])
     times, values = preview.points()
     attributes = {"time": _time_attributes(), channel.name: _attributes(channel)}
     columns = hdf5.SampleColumns(group, attributes)
@@ -172,12 +190,12 @@ def _write_preview(entry: h5py.Group, trial: Trial, channel: ChannelInfo, previe
 
 
 def _plot_group(
-    entry: h5py.Group, name: str, trial: Trial, channels: tuple[ChannelInfo, ...]
+    entry: h5py.Group, name: str, trial: Trial, signal: str, others: list[str]
 ) -> h5py.Group:
     group = hdf5.make_group(entry, name, "NXdata")
-    group.attrs["signal"] = channels[0].name
-    if channels[1:]:
-        group.attrs["auxiliary_signals"] = [channel.name for channel in channels[1:]]
+    group.attrs["signal"] = signal
+    if others:
+        group.attrs["auxiliary_signals"] = others
     group.attrs["axes"] = ["time"]
     group.attrs["time_indices"] = np.array([0], dtype="<i4")
     hdf5.put_text(group, "title", trial.label)
@@ -195,7 +213,7 @@ def _attributes(channel: ChannelInfo) -> dict[str, object]:
 
 
 def _time_attributes() -> dict[str, object]:
-    return {"units": "s", "long_name": f"{TIME_LABEL} (s)"}
+    return {"units": "s", "long_name": "Time (s)"}
 
 
 def _check_names(trial: Trial, channels: tuple[ChannelInfo, ...]) -> None:

@@ -24,6 +24,7 @@ class _Event(BaseModel):
 
 
 _EVENTS = TypeAdapter(list[_Event])
+_NAMES = TypeAdapter(list[str])
 _ENTRY = re.compile(r"trial_([0-9]{5,10})")
 
 
@@ -75,7 +76,8 @@ def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
             return Recording(np.empty(0), {}, events, ending)
         data = guarded.group_at(entry, "data", "NXdata")
         time = guarded.read_samples(guarded.samples_at(data, "time"))
-        channels = {name: _channel(data, name, len(time)) for name in _channel_names(data)}
+        names = _NAMES.validate_json(guarded.text_at(record, "channels"))
+        channels = {name: _channel(data, name, len(time)) for name in names}
         return Recording(time, channels, events, ending)
 
 
@@ -92,17 +94,13 @@ def check_recording(path: Path, entry_name: str) -> Iterator[str]:
 
 
 def _damaged(path: Path, data: h5py.Group) -> Iterator[str]:
-    for name in ["time", *_channel_names(data)]:
+    plotted = [guarded.attribute(data, "signal"), *guarded.text_list(data, "auxiliary_signals")]
+    for name in ["time", *plotted]:
         try:
             with guarded.guarded(path, f"{data.name}/{name}"):
                 guarded.check_samples(guarded.samples_at(data, name))
         except ArchiveError as error:
             yield str(error)
-
-
-def _channel_names(data: h5py.Group) -> list[str]:
-    """In the order they were announced."""
-    return [guarded.attribute(data, "signal"), *guarded.text_list(data, "auxiliary_signals")]
 
 
 def _channel(data: h5py.Group, name: str, length: int) -> Channel:

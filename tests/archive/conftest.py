@@ -14,7 +14,8 @@ STARTED = "2026-11-21T09:37:00.250Z"
 ENDED = "2026-11-21T09:37:01.500Z"
 
 CHANNELS = (
-    ChannelInfo("load_rate", "rad/s", "Load rate", "deg/s"),
+    ChannelInfo("command", "rad/s", "Command", "deg/s"),
+    ChannelInfo("gyro_rate", "rad/s", "Load rate", "deg/s"),
     ChannelInfo("friction_torque", "N m", "Friction torque", "N m", measured=False),
 )
 

@@ -57,7 +57,7 @@ def check_whole(results: Path, kit, reported: list[int]) -> None:
         times, block = kit.samples(200 * number, number)
         recording = archived.recording()
         assert recording.time.tobytes() == times.tobytes()
-        assert recording["friction_torque"].tobytes() == block[1].tobytes()
+        assert recording["friction_torque"].tobytes() == block[2].tobytes()
     if run.sealed:
         assert run.unchanged()
 
@@ -121,7 +121,7 @@ def test_a_full_disk_loses_the_running_trial_only(small_disk, kit):
     kit.record(writer, kit.trial(1), 3000)
     recorder = writer.begin(kit.trial(2))
     recorder.start(kit.CHANNELS)
-    noise = np.random.default_rng(5).normal(size=(2, 500_000))
+    noise = np.random.default_rng(5).normal(size=(3, 500_000))
     with pytest.raises(ArchiveError, match="No space left on device"):
         recorder.append(np.arange(500_000) / 1000.0, noise)
     assert not list(writer.folder.glob("*.part"))
@@ -221,4 +221,4 @@ def test_several_threads_write_at_once(tmp_path, kit):
     assert [archived.trial for archived in run.trials] == trials
     for archived in run.trials:
         expected = kit.samples(40_000, archived.trial.number)[1]
-        assert archived.recording()["load_rate"].tobytes() == expected[0].tobytes()
+        assert archived.recording()["gyro_rate"].tobytes() == expected[1].tobytes()

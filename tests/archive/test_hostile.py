@@ -1,5 +1,6 @@
 """A file that nobody vouches for is read right or refused with a message: never anything else."""
 
+import hashlib
 import json
 import random
 
@@ -55,9 +56,15 @@ def test_a_newer_format_is_named(sealed):
     refused(sealed, "has format 99")
 
 
-def replace_integer(group, name, value):
-    import hashlib
+def put_text(file, place, text):
+    """Put another text where one is, with a checksum that holds."""
+    del file[place]
+    kind = h5py.string_dtype("utf-8", max(1, len(text)))
+    file.create_dataset(place, data=np.array(text.encode(), dtype=kind))
+    file[place].attrs["sha256"] = hashlib.sha256(text.encode()).hexdigest()
 
+
+def replace_integer(group, name, value):
     del group[name]
     group[name] = np.array(value, "<i8")
     group[name].attrs["sha256"] = hashlib.sha256(np.array(value, "<i8").tobytes()).hexdigest()
@@ -66,9 +73,9 @@ def replace_integer(group, name, value):
 def replace_samples(file, **options):
     """Replace a channel by a dataset made some other way, with its attributes."""
     data = file["trial_00001/data"]
-    attributes = {k: v for k, v in data["load_rate"].attrs.items() if k != "DIMENSION_LIST"}
-    del data["load_rate"]
-    dataset = data.create_dataset("load_rate", **options)
+    attributes = {k: v for k, v in data["gyro_rate"].attrs.items() if k != "DIMENSION_LIST"}
+    del data["gyro_rate"]
+    dataset = data.create_dataset("gyro_rate", **options)
     dataset.attrs.update(attributes)
 
 
@@ -118,6 +125,14 @@ def test_links_are_not_followed(sealed, tmp_path):
     refused(sealed, "/trial_00001: is a link")
 
 
+@pytest.mark.parametrize("name", ["/trial_00001/data/command", "aside/command", ".", "", "x"])
+def test_a_channel_is_not_looked_for_along_a_path(sealed, name):
+    with h5py.File(sealed, "r+") as file:
+        file["trial_00001/data/aside"] = h5py.SoftLink("/trial_00002/data")
+        put_text(file, "trial_00001/record/channels", json.dumps([name]))
+    refused(sealed, "is a path, not a name|is missing")
+
+
 def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
     outside = tmp_path / "secret"
     outside.write_bytes(bytes(400))
@@ -127,8 +142,8 @@ def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
     layout = h5py.VirtualLayout(shape=(50,), dtype="<f8")
     layout[:] = h5py.VirtualSource(str(outside), "x", shape=(50,))
     with h5py.File(sealed, "r+") as file:
-        del file["trial_00001/data/load_rate"]
-        file["trial_00001/data"].create_virtual_dataset("load_rate", layout)
+        del file["trial_00001/data/gyro_rate"]
+        file["trial_00001/data"].create_virtual_dataset("gyro_rate", layout)
     refused(sealed, "lies in another file")
 
 
@@ -142,17 +157,13 @@ def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
         "trial_00001/record/trial",
         "trial_00001/record/outcome",
         "trial_00001/record/events",
+        "trial_00001/record/channels",
     ],
 )
 @pytest.mark.parametrize("text", ["", "nonsense", "[" * 20_000, '{"a":1}', "NaN"])
 def test_text_that_is_not_what_belongs_there_is_refused(sealed, place, text):
-    import hashlib
-
     with h5py.File(sealed, "r+") as file:
-        del file[place]
-        kind = h5py.string_dtype("utf-8", max(1, len(text)))
-        file.create_dataset(place, data=np.array(text.encode(), dtype=kind))
-        file[place].attrs["sha256"] = hashlib.sha256(text.encode()).hexdigest()
+        put_text(file, place, text)
     if (place, text) == ("run/plan/data", ""):
         assert open_run(sealed).plan == ()
     else:
@@ -196,7 +207,7 @@ def test_mutated_files_are_read_right_or_refused(sealed):
             refusals += 1
             continue
         for mine, theirs in zip(found, original, strict=False):
-            assert mine["load_rate"].tobytes() == theirs["load_rate"].tobytes()
+            assert mine["gyro_rate"].tobytes() == theirs["gyro_rate"].tobytes()
     assert refusals > 10
 
 

@@ -25,7 +25,7 @@ def test_a_recording_comes_back_to_the_bit(tmp_path, kit, count):
     recording = run.trials[0].recording()
     times, block = kit.samples(count, 1)
     assert equal_bits(recording.time, times)
-    assert list(recording.channels) == ["load_rate", "friction_torque"]
+    assert list(recording.channels) == ["command", "gyro_rate", "friction_torque"]
     for info, row in zip(kit.CHANNELS, block, strict=True):
         channel = recording.channels[info.name]
         assert equal_bits(channel.samples, row)
@@ -138,7 +138,7 @@ def test_chunks_are_what_zlib_and_a_shuffle_undo(tmp_path, kit):
     """Read the raw chunks without HDF5's filters, as the format's description says."""
     path = kit.run(tmp_path, [CHUNK + 5])
     with h5py.File(path) as file:
-        dataset = file["trial_00001/data/load_rate"]
+        dataset = file["trial_00001/data/gyro_rate"]
         parts = []
         for start in (0, CHUNK):
             mask, packed = dataset.id.read_direct_chunk((start,))
@@ -146,7 +146,7 @@ def test_chunks_are_what_zlib_and_a_shuffle_undo(tmp_path, kit):
             plain = np.frombuffer(zlib.decompress(packed), np.uint8)
             parts.append(plain.reshape(8, -1).T.tobytes())
         samples = np.frombuffer(b"".join(parts), "<f8")[: CHUNK + 5]
-    assert equal_bits(samples, kit.samples(CHUNK + 5)[1][0])
+    assert equal_bits(samples, kit.samples(CHUNK + 5)[1][1])
 
 
 def test_a_long_recording_opens_on_a_preview_that_misses_no_peak(tmp_path, kit):
@@ -155,17 +155,17 @@ def test_a_long_recording_opens_on_a_preview_that_misses_no_peak(tmp_path, kit):
     recorder = writer.begin(kit.trial(1))
     recorder.start(kit.CHANNELS)
     times = np.arange(count) / 1000.0
-    block = np.zeros((2, count))
-    block[0, [12_345, 70_001]] = [9.0, -7.0]
+    block = np.zeros((3, count))
+    block[1, [12_345, 70_001]] = [9.0, -7.0]
     recorder.append(times, block)
     recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
     path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     with h5py.File(path) as file:
         entry = file["trial_00001"]
         assert entry.attrs["default"] == "preview"
-        shown, at = entry["preview/load_rate"][:], entry["preview/time"][:]
-        assert entry["preview/load_rate"].dims[0][0] == entry["preview/time"]
-        assert len(entry["data/load_rate"]) == count
+        shown, at = entry["preview/gyro_rate"][:], entry["preview/time"][:]
+        assert entry["preview/gyro_rate"].dims[0][0] == entry["preview/time"]
+        assert len(entry["data/gyro_rate"]) == count
     assert 2 < len(at) <= PREVIEW_POINTS
     assert np.all(np.diff(at) >= 0)
     assert (shown.max(), at[shown.argmax()]) == (9.0, 12.345)
@@ -177,4 +177,4 @@ def test_h5dump_reads_every_dataset(sealed):
     dumped = subprocess.run(["h5dump", sealed], capture_output=True, text=True, check=False)
     assert dumped.returncode == 0
     assert dumped.stderr == ""
-    assert dumped.stdout.count('DATASET "load_rate"') == 2
+    assert dumped.stdout.count('DATASET "gyro_rate"') == 2

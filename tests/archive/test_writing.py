@@ -82,7 +82,7 @@ def test_every_dataset_carries_its_checksum(sealed):
 def test_sealing_copies_chunks_as_they_are(tmp_path, kit):
     writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
     kit.record(writer, kit.trial(1), CHUNK + 10)
-    name = "trial_00001/data/load_rate"
+    name = "trial_00001/data/gyro_rate"
     with h5py.File(writer.folder / "trial-00001.nxs") as file:
         before = [file[name].id.read_direct_chunk((start,)) for start in (0, CHUNK)]
     with h5py.File(writer.seal("complete", ended=kit.ENDED)) as file:
@@ -97,9 +97,9 @@ def recorder(tmp_path, kit):
 
 def test_samples_that_do_not_fit_the_channels_are_a_backend_fault(recorder, kit):
     with pytest.raises(BackendError, match="before the channels"):
-        recorder.append(np.zeros(3), np.zeros((2, 3)))
+        recorder.append(np.zeros(3), np.zeros((3, 3)))
     recorder.start(kit.CHANNELS)
-    for times, block in ((3, (3, 3)), (3, (2, 4)), ((3, 1), (2, 3))):
+    for times, block in ((3, (2, 3)), (3, (3, 4)), ((3, 1), (3, 3))):
         with pytest.raises(BackendError, match="do not fit"):
             recorder.append(np.zeros(times), np.zeros(block))
     with pytest.raises(BackendError, match="announced twice"):
