@@ -1,0 +1,444 @@
+"""The page and its folder: complete, valid, bounded, safe, and the same every time."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import dataclasses
+import io
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunReader
+from campaign.errors import UsageError
+from campaign.experiments.interface import Experiment, TestData
+from campaign.report.build import Report, build_report
+from campaign.report.output import MARKER, replaced_folder
+from campaign.result import Axis, Curve, Figure, Panel, Result
+from campaign.trial import Ending, Outcome
+
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+FOREIGN_VOID = {"path", "use", "rect", "circle", "image", "stop"}
+
+
+class Page(HTMLParser):
+    """Every element with its attributes and text, and whether the tags are balanced."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.open: list[str] = []
+        self.mistakes: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {k: v or "" for k, v in attrs}))
+        if len(dict(attrs)) != len(attrs):
+            self.mistakes.append(f"an attribute twice in <{tag}>")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {k: v or "" for k, v in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.mistakes.append(f"</{tag}> closes something else")
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    def all(self, tag: str) -> list[dict[str, str]]:
+        return [attrs for name, attrs in self.elements if name == tag]
+
+
+@pytest.fixture(scope="module")
+def page(report: Report) -> Page:
+    return Page(report.path.read_text(encoding="utf-8"))
+
+
+def build(made_up: ModuleType, run: RunReader, output: Path, **more: object) -> Report:
+    options = {
+        "experiments": made_up.EXPERIMENTS,
+        "packaged_templates": made_up.TEMPLATES,
+    }
+    return build_report(run, output, **(options | more))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def scoreboard(folder: Path) -> list[dict[str, str]]:
+    text = (folder / "tables" / "scoreboard.csv").read_text(encoding="utf-8")
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_the_folder_has_the_page_its_tables_and_its_figures(report: Report) -> None:
+    assert set(contents(report.path.parent)) == {
+        MARKER,
+        "report.html",
+        "figures/figure-4.11.svg",
+        "figures/figure-5.4.svg",
+        "figures/figure-5.9.svg",
+        "figures/scoreboard.svg",
+        "tables/scoreboard.csv",
+        "tables/stabilization-stabilization-error.csv",
+        "tables/table-4.3.csv",
+        "tables/table-4.5.csv",
+        "tables/table-5.2.csv",
+        "tables/table-5.8.csv",
+        "tables/text-4.2.1.csv",
+    }
+
+
+def test_tags_are_balanced_and_ids_are_unique(page: Page) -> None:
+    assert page.mistakes == []
+    assert page.open == []
+    ids = [attrs["id"] for _, attrs in page.elements if "id" in attrs]
+    assert len(ids) == len(set(ids))
+
+
+def test_every_internal_link_leads_somewhere(page: Page) -> None:
+    ids = {attrs["id"] for _, attrs in page.elements if "id" in attrs}
+    links = [a["href"] for a in page.all("a") if a["href"].startswith("#")]
+    assert {link[1:] for link in links} <= ids
+    assert {"#scoreboard", "#test-1", "#test-3", "#failed", "#provenance"} <= set(links)
+    labels = [a[k].split() for _, a in page.elements for k in ("aria-labelledby",) if k in a]
+    assert {name for label in labels for name in label} <= ids
+
+
+def test_the_page_asks_nobody_for_anything(report: Report, page: Page) -> None:
+    for tag, attrs in page.elements:
+        for name in ("src", "href", "xlink:href", "action", "srcset", "poster"):
+            assert attrs.get(name, "#").startswith(("#", "data:")), (tag, attrs)
+    assert {"script", "iframe", "object", "embed"}.isdisjoint(tag for tag, _ in page.elements)
+    style = report.path.read_text(encoding="utf-8").split("</style>")[0]
+    assert "@import" not in style
+    assert "url(" not in style
+
+
+def test_everything_seen_is_also_said(page: Page) -> None:
+    plots = [a for a in page.all("svg") if a.get("role") == "img"]
+    assert len(plots) == len(page.all("svg")) == len(page.all("figure")) == 4
+    assert page.all("th")
+    assert all(a.get("scope") in ("col", "row") for a in page.all("th"))
+    assert page.all("html")[0]["lang"] == "en"
+    assert len(page.all("h1")) == 1
+
+
+def test_each_downloaded_table_is_the_file(report: Report, page: Page) -> None:
+    links = [a for a in page.all("a") if "download" in a]
+    assert len(links) == 7
+    for link in links:
+        text = base64.b64decode(link["href"].split(",", 1)[1]).decode()
+        assert text == (report.path.parent / "tables" / link["download"]).read_text()
+
+
+def test_a_published_table_has_its_own_file(report: Report) -> None:
+    text = (report.path.parent / "tables" / "table-5.8.csv").read_text()
+    rows = {row["row"]: row for row in csv.DictReader(io.StringIO(text))}
+    assert list(rows) == ["none", "static", "lugre", "observer"]
+    assert float(rows["none"]["deviation_percent"]) == pytest.approx(0.82783, abs=1e-5)
+
+
+def test_a_failing_analysis_is_one_line_and_costs_nobody_else(report: Report, page: Page) -> None:
+    text = " ".join(page.words)
+    assert report.problems == (
+        "breakaway: the analysis failed: ValueError: no recording reached breakaway",
+    )
+    assert "no recording reached breakaway" in text
+    assert "second line" not in text
+    assert "Traceback" not in text
+    assert "Friction torque over rate" in text
+
+
+def test_failed_trials_are_shown_with_their_reasons(page: Page) -> None:
+    text = " ".join(page.words)
+    assert text.count("current 93.1 A is over the limit of 90 A") == 3
+
+
+def test_contradictions_are_told_with_their_reasons(page: Page) -> None:
+    text = " ".join(page.words)
+    assert "Table 4.4 prints 35.2 (set 5,6), and under the opposite direction" in text
+    assert "the rows of Table 4.1 give 69.5 %" in text
+
+
+def test_conditions_are_in_units_people_read(page: Page) -> None:
+    text = " ".join(page.words)
+    assert "0.24 Hz" in text
+    assert "18 deg/s²" in text
+
+
+def test_provenance_comes_from_the_archive(made_up: ModuleType, page: Page, tmp_path: Path) -> None:
+    run = made_up.made_up_run(tmp_path)
+    text = " ".join(page.words)
+    assert run.sha256 in text
+    assert "ab" * 32 in text
+    assert "campaign run made-up.toml" in text
+    assert 'kind = "stabilization"' in text
+
+
+def test_the_command_repeats_what_was_asked(made_up: ModuleType, tmp_path: Path) -> None:
+    run = made_up.made_up_run(
+        tmp_path, only=("a b",), overrides={"bench.gear.ratio": "100"}, backend="serial"
+    )
+    build(made_up, run, tmp_path / "out")
+    text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
+    assert (
+        "campaign run made-up.toml --backend serial --only 'a b' --set bench.gear.ratio=100" in text
+    )
+
+
+def test_the_same_archive_gives_the_same_bytes_anywhere(
+    made_up: ModuleType, report: Report, tmp_path: Path
+) -> None:
+    script = (
+        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); import made_up\n"
+        "from campaign.report.build import build_report\n"
+        "build_report(made_up.made_up_run(Path(sys.argv[2])), Path(sys.argv[2]) / 'elsewhere',"
+        " experiments=made_up.EXPERIMENTS, packaged_templates=made_up.TEMPLATES)\n"
+    )
+    environment = os.environ | {
+        "PYTHONHASHSEED": "4711",
+        "TZ": "Asia/Kathmandu",
+        "LC_ALL": "C",
+        "PYTHONPATH": str(made_up.ROOT),
+        "MPLCONFIGDIR": str(tmp_path),
+    }
+    (tmp_path / "matplotlibrc").write_text("lines.linewidth: 9\nsvg.fonttype: path\n")
+    command = [sys.executable, "-c", script, str(Path(__file__).parent), str(tmp_path)]
+    subprocess.run(command, check=True, env=environment, cwd=tmp_path)
+    assert contents(tmp_path / "elsewhere") == contents(report.path.parent)
+    assert str(tmp_path).encode() not in (tmp_path / "elsewhere" / "report.html").read_bytes()
+
+
+def test_hostile_names_are_only_names(made_up: ModuleType, tmp_path: Path) -> None:
+    hostile = "<script>alert(1)</script>\"'& $x {{ 7*7 }} ../../etc"
+    x = np.arange(3.0)
+
+    def analyse(data: TestData) -> Result:
+        axis = Axis(hostile)
+        panel = Panel(axis, axis, [Curve(x, x, hostile, hostile)], hostile)
+        figure = Figure(hostile, hostile, hostile, hostile, (panel,), (hostile,))
+        return Result((), (figure,), (), (hostile,))
+
+    kind = made_up.EXPERIMENTS["stabilization"]
+    run = made_up.made_up_run(
+        tmp_path,
+        tests={"stabilization": (hostile,)},
+        title=hostile,
+        description=hostile,
+        sources={hostile: hostile},
+        notes=hostile,
+    )
+    build(
+        made_up,
+        run,
+        tmp_path / "out",
+        experiments={"stabilization": dataclasses.replace(kind, analyse=analyse)},
+    )
+    page = Page((tmp_path / "out" / "report.html").read_text())
+    assert page.mistakes == []
+    assert not page.all("script")
+    assert "49" not in "".join(page.words).replace("0.49", "")[:400]
+    written = {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+    assert all(path.startswith("out/") or path == "made-up.nxs" for path in written)
+
+
+def test_own_templates_win_one_by_one(made_up: ModuleType, tmp_path: Path) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "provenance.html").write_text("<p>Made at {{ header.name }}</p>")
+    build(made_up, made_up.made_up_run(tmp_path), tmp_path / "out", templates=own)
+    text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
+    assert "Made at 2026-11-21T09-36-58-made-up" in text
+    assert "Archive SHA-256" not in text
+    assert "Scoreboard" in text
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        ("{{ nothing }}", "'nothing' is undefined"),
+        ("{% if %}", "provenance.html:1"),
+        ("{% include 'none.html' %}", "none.html"),
+    ],
+)
+def test_a_wrong_template_is_told_and_the_old_report_stays(
+    made_up: ModuleType, tmp_path: Path, template: str, message: str
+) -> None:
+    run = made_up.made_up_run(tmp_path, tests={})
+    before = contents(build(made_up, run, tmp_path / "out").path.parent)
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "provenance.html").write_text(template)
+    with pytest.raises(UsageError, match=re.escape(message)):
+        build(made_up, run, tmp_path / "out", templates=own)
+    assert contents(tmp_path / "out") == before
+
+
+def test_templates_in_the_working_directory_are_not_used(
+    made_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "report.html").write_text("hijacked")
+    (tmp_path / "templates").mkdir()
+    (tmp_path / "templates" / "report.html").write_text("hijacked")
+    monkeypatch.chdir(tmp_path)
+    found = build(made_up, made_up.made_up_run(tmp_path, tests={}), tmp_path / "out")
+    assert "hijacked" not in found.path.read_text()
+
+
+OWN = """
+source = "Our own paper"
+[[table]]
+name = "1"
+title = "Ours"
+quantity = "stabilization_error"
+unit = "urad"
+rows = { condition = "compensation" }
+column.error = {}
+[table.cells]
+none = [500]
+"""
+
+
+def test_a_laboratory_compares_with_its_own_numbers(made_up: ModuleType, tmp_path: Path) -> None:
+    run = made_up.made_up_run(tmp_path, tests={"stabilization": ("1",)}, published=OWN)
+    build(made_up, run, tmp_path / "out")
+    (row,) = scoreboard(tmp_path / "out")
+    assert (row["table"], row["unit"], row["published"]) == ("1", "urad", "500.0")
+    assert float(row["deviation_percent"]) == pytest.approx(-2.318, abs=1e-3)
+    assert "Our own paper" in (tmp_path / "out/report.html").read_text()
+
+
+def test_nothing_published_is_a_report_without_a_scoreboard(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    run = made_up.made_up_run(tmp_path, normalised={"published": "none"})
+    build(made_up, run, tmp_path / "out")
+    rows = (tmp_path / "out/tables/scoreboard.csv").read_text().splitlines()
+    assert len(rows) == 1
+
+
+@pytest.mark.parametrize(("sampled", "column"), [(False, "simulation"), (True, "experimental")])
+def test_a_continuous_bench_speaks_to_simulations_and_a_sampled_one_to_hardware(
+    made_up: ModuleType, tmp_path: Path, sampled: bool, column: str
+) -> None:
+    bench = made_up.bench()
+    if sampled:
+        controller = bench.controller.model_copy(update={"sample_rate": 1000.0})
+        bench = bench.model_copy(update={"controller": controller})
+    run = made_up.made_up_run(tmp_path, tests={"stabilization": ("6.1",)}, bench=bench)
+    build(made_up, run, tmp_path / "out")
+    assert {row["column"] for row in scoreboard(tmp_path / "out")} == {column}
+
+
+def test_an_unknown_experiment_is_a_problem_not_an_end(made_up: ModuleType, tmp_path: Path) -> None:
+    found = build(made_up, made_up.made_up_run(tmp_path), tmp_path / "out", experiments={})
+    assert len(found.problems) == 3
+    assert "no experiment is called 'stabilization' here" in found.problems[0]
+
+
+def test_a_figure_that_cannot_be_drawn_costs_only_itself(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    def analyse(data: TestData) -> Result:
+        good = made_up.velocity_map(data)
+        wrong = Figure("wrong", "w", "w", "w", (Panel(Axis("x", "m", "kg"), Axis("y"), ()),))
+        return dataclasses.replace(good, figures=(wrong, *good.figures))
+
+    kinds = {"velocity_map": Experiment("v", "v", made_up.ShakeOptions, lambda o, b: (), analyse)}
+    run = made_up.made_up_run(tmp_path, tests={"velocity_map": ("4.3",)})
+    found = build(made_up, run, tmp_path / "out", experiments=kinds)
+    assert len(found.problems) == 1
+    assert "wrong cannot be shown" in found.problems[0]
+    assert (tmp_path / "out/figures/figure-4.11.svg").is_file()
+
+
+def test_two_tests_with_one_published_figure_have_two_files(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    analyse = made_up.velocity_map
+    kinds = {
+        k: Experiment(k, k, made_up.ShakeOptions, lambda o, b: (), analyse) for k in ("one", "two")
+    }
+    run = made_up.made_up_run(tmp_path, tests={"one": ("4.3",), "two": ("4.3",)})
+    build(made_up, run, tmp_path / "out", experiments=kinds)
+    files = {path.name for path in (tmp_path / "out").rglob("*.*")}
+    assert {"figure-4.11.svg", "figure-4.11-two-map.svg", "table-4.3.csv"} <= files
+    assert not any(name.startswith("table-4.3-") for name in files)
+
+
+def test_thousands_of_failed_trials_stay_a_page(made_up: ModuleType, tmp_path: Path) -> None:
+    run = made_up.made_up_run(tmp_path, tests={"stabilization": ("5.8",)})
+    failed = dataclasses.replace(run.trials[0], ending=Ending(Outcome.DIVERGED, "rate is infinite"))
+    many = dataclasses.replace(run, trials=(failed,) * 5000)
+    found = build(made_up, many, tmp_path / "out")
+    text = found.path.read_text()
+    assert text.count("rate is infinite") == 200
+    assert "4800 more are in the archive" in text
+
+
+# --- the folder -----------------------------------------------------------------------------
+
+
+def test_a_newer_report_replaces_the_older_as_a_whole(tmp_path: Path) -> None:
+    output = tmp_path / "deep" / "report"
+    for name in ("old", "new"):
+        with replaced_folder(output) as folder:
+            (folder / name).write_text(name)
+    assert {p.name for p in output.iterdir()} == {MARKER, "new"}
+    assert [p.name for p in output.parent.iterdir()] == ["report"]
+
+
+def test_a_failed_build_leaves_the_old_report(tmp_path: Path) -> None:
+    with replaced_folder(tmp_path / "report") as folder:
+        (folder / "old").write_text("old")
+    with pytest.raises(KeyboardInterrupt), replaced_folder(tmp_path / "report"):
+        raise KeyboardInterrupt
+    assert (tmp_path / "report" / "old").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["report"]
+
+
+@pytest.mark.parametrize("kind", ["folder", "file"])
+def test_somebody_s_other_files_are_left_alone(tmp_path: Path, kind: str) -> None:
+    precious = tmp_path / "precious"
+    if kind == "folder":
+        precious.mkdir()
+        (precious / "thesis.tex").write_text("years of work")
+    else:
+        precious.write_text("years of work")
+    with pytest.raises(UsageError, match="no report of campaign"), replaced_folder(precious):
+        pytest.fail("must refuse before anything is built")
+    assert precious.exists()
+
+
+def test_an_empty_folder_may_become_a_report(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with replaced_folder(tmp_path / "empty") as folder:
+        (folder / "page").write_text("x")
+    assert (tmp_path / "empty" / "page").is_file()
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with (
+        pytest.raises(UsageError, match="cannot be written"),
+        replaced_folder(tmp_path / "file" / "report"),
+    ):
+        pytest.fail("must not come here")
