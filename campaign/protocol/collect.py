@@ -102,14 +102,12 @@ def apply_overrides(overrides: list[Override], collected: Collected) -> None:
 def top_level(source: Source, overrides: list[Override]) -> tuple[dict[str, Any], Origin]:
     """The main file's tree with `--set` applied, and where its values stand."""
     tests = source.tree.get("test")
-    named = {t.get("name") for t in tests if isinstance(t, dict)} if isinstance(tests, list) else ()
+    tables = [t for t in tests if isinstance(t, dict)] if isinstance(tests, list) else []
+    named = [table.get("name") for table in tables]
     tree, patches = dict(source.tree), []
     for override in overrides:
-        if (
-            len(override.keys) == 1
-            and override.keys[0] in SETTABLE
-            and override.keys[0] not in named
-        ):
+        key = override.keys[0]
+        if len(override.keys) == 1 and key in SETTABLE and key not in named:
             tree = replaced(tree, override.keys, override.value)
             patches.append((override.keys, override.origin))
     return tree, Patched(Within(source), patches)

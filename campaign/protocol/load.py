@@ -175,8 +175,10 @@ class _Loader:
     ) -> Source | None:
         """A further file, read once; a missing one is a problem of the text that names it."""
         known = self.collected.sources.get(name)
-        if known is not None:
+        if known is not None and known.file == file:
             return known
+        if known is not None:  # a protocol file that is called like a shipped bench
+            name = str(file)
         try:
             source = read_source(file, name)
         except UnreadableError as error:

@@ -35,6 +35,7 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD.replace('"swing"', '§"swign"'), r"unknown kind 'swign'.*speeds.*'swing'\?"),
         (GOOD.replace('"swing"', "§7"), r"7 is not text"),
         (GOOD.replace('[[test]]\nname = "t"', "§[[test]]"), r"'name' is missing: What the test"),
+        (GOOD.replace('"t"', "§[]"), r"a list is not text in quotes"),
         (GOOD.replace('"t"', '§"Tea Time"'), r"'Tea Time': .*pattern"),
         (GOOD.replace('"simulink"', '§"simulik"'), r"no shipped bench.*'simulink'\?, or the path"),
         (GOOD.replace('"simulink"', '§"nope.toml"'), r"'nope.toml': no such file \(looked for"),
@@ -84,13 +85,17 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD + 'matrix = { §acceleratio = ["1 deg/s^2"] }\n', r"did you mean 'acceleration'\?"),
         (
             GOOD + '[test.matrix]\n§"bench.axis.inertai" = ["3 kg m^2"]\n',
-            r"nothing to sweep at 'bench.axis.inertai'; allowed are bench.axis.name, "
-            r"bench.axis.inertia; did you mean 'bench.axis.inertia'\?",
+            (
+                r"nothing to sweep at 'bench.axis.inertai'; allowed are bench.axis.name, "
+                r"bench.axis.inertia; did you mean 'bench.axis.inertia'\?"
+            ),
         ),
         (
             GOOD + "[test.matrix]\nbench.friction.laod.§coulomb_torque = ['3 N m']\n",
-            r"nothing to sweep at 'bench.friction.laod'; allowed are bench.friction.load, "
-            r"bench.friction.motor; did you mean 'bench.friction.load'\?",
+            (
+                r"nothing to sweep at 'bench.friction.laod'; allowed are bench.friction.load, "
+                r"bench.friction.motor; did you mean 'bench.friction.load'\?"
+            ),
         ),
         (
             GOOD + '[test.matrix]\n§"bench.friction.load.coulomb" = ["3 N m"]\n',

@@ -142,7 +142,7 @@ def test_an_experiment_that_refuses_names_the_point(desk) -> None:
 
 
 def test_a_recording_nobody_can_store_is_refused(desk) -> None:
-    with pytest.raises(ProtocolError, match="a trial of .* samples"):
+    with pytest.raises(ProtocolError, match=r"a trial of .* samples"):
         make_plan(desk.load(SWING.replace('"0.5 Hz"', '"1e-9 Hz"')))
 
 
