@@ -1,4 +1,4 @@
-"""A run that nobody executed, with results that nobody measured: to see what a report makes of it."""
+"""A run nobody executed with results nobody measured: to see what a report makes of it."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def stabilization(data: TestData) -> Result:
     rates = Figure(
         "relative-rate",
         "Rate of the load relative to the hull",
-        "Where the relative rate passes zero the load sticks to the hull; compensation shortens it.",
+        "Where the relative rate passes zero the load sticks to the hull.",
         "Relative rate over time for four methods, and a zoom on one reversal.",
         (Panel(TIME, rate, curves, "Base motion"), Panel(zoom, near, curves, "At a reversal")),
         ("5.4", "5.18"),
