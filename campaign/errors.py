@@ -1,6 +1,6 @@
 """Every error a user can cause or meet, and the exit code each one means.
 
-The codes are part of the public interface (README, `docs/exit-codes.md`):
+The codes are part of the public interface (README, `docs/commands.md`):
 
 ====  =======================================================================
 code  meaning
