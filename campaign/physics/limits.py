@@ -29,6 +29,11 @@ MOST_CYCLES = 1000
 """of such a sum that are looked at."""
 
 
+_SPEEDS = np.concatenate([[1e-12], np.geomspace(1e-6, 1.0, 60)])
+_SPEEDS = np.concatenate([-_SPEEDS[::-1], _SPEEDS])
+"""Shares of the largest speed, both ways, at which friction is looked at."""
+
+
 @dataclass(frozen=True)
 class Margin:
     """One limit and what a task comes to, both in `unit` (SI).
@@ -109,7 +114,8 @@ def worst_friction(bench: Bench, rate: float) -> float:
     """Largest friction torque at the load (N m) of sliding up to `rate` (rad/s); 0 at rest.
 
     The largest of the curve without its viscous part, which is the static torque where a model has
-    one, plus the viscous part at `rate`. What acts at the motor counts N times.
+    one, plus the viscous part at `rate`, in the worse of both directions. What acts at the motor
+    counts N times.
     """
     from campaign.physics.friction import friction_models
 
@@ -119,7 +125,7 @@ def worst_friction(bench: Bench, rate: float) -> float:
     for friction in bench.friction.values():
         model = friction_models()[friction.model]
         speed = rate * (bench.gear.ratio if friction.velocity == "motor" else 1.0)
-        speeds = np.concatenate([[1e-12], np.geomspace(1e-6, 1.0, 60)]) * speed
+        speeds = _SPEEDS * speed
         viscous = model.viscous(friction)
         dry = np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds))
         torque = float(dry) + viscous * speed

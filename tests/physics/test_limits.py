@@ -184,3 +184,10 @@ def test_friction_whose_static_torque_is_the_smaller(bench: Bench) -> None:
     del tree["friction"]["motor"]
     tree["friction"]["load"] |= {"static_torque": "20 N m", "viscous_friction": "0 N m s/rad"}
     assert worst_friction(Bench.model_validate(tree), 1.0) == pytest.approx(26.0, rel=1e-6)
+
+
+def test_friction_that_is_larger_backwards() -> None:
+    tree = tomllib.loads(BENCH.read_text())
+    del tree["friction"]["motor"]
+    tree["friction"]["load"]["negative"] = {"static_torque": "40 N m"}
+    assert worst_friction(Bench.model_validate(tree), 0.5) == pytest.approx(40 + 4 * 0.5, rel=1e-6)
