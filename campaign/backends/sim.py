@@ -60,8 +60,11 @@ class SimBackend:
         """Why this backend cannot execute `trial`, or None."""
         from campaign.physics.simulate import make_grid
 
+        bench, name = _bench(trial), trial.task.compensation
+        if name != "none" and name not in bench.compensation:
+            return f"bench {bench.name!r} has no compensation {name!r}"
         try:
-            make_grid(_bench(trial), trial.task, self._options.longest_step)
+            make_grid(bench, trial.task, self._options.longest_step)
         except ValueError as error:
             return str(error)
         return None
@@ -102,10 +105,13 @@ class SimBackend:
             end, ending = _first_violation(bench.limits, time[:reached], block[:, :reached])
             recorder.append(time[:end], block[:, :end])
             if ending is not None:
-                recorder.event(Event(float(time[min(end, len(time) - 1)]), ending.reason))
+                late = ending.outcome is Outcome.LIMIT  # its own sample is the last one kept
+                recorder.event(Event(float(time[end - 1 if late else end]), ending.reason))
                 return ending
             if reached < len(time):
-                recorder.event(Event(float(time[reached]), "the rate that ends the trial was reached"))
+                recorder.event(
+                    Event(float(time[reached]), "the rate that ends the trial was reached")
+                )
                 return Ending(Outcome.COMPLETED)
             if stopped():
                 return Ending(Outcome.INTERRUPTED, "stopped by the operator")
@@ -160,8 +166,7 @@ def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[
 
 
 def _open(options: Options) -> SimBackend:
-    assert isinstance(options, SimOptions)
-    return SimBackend(options)
+    return SimBackend(SimOptions.model_validate(options.model_dump(), context={"si": True}))
 
 
 BACKEND = BackendKind(

@@ -84,6 +84,7 @@ class BreakawayOptions(Options):
 
 def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
     ramp = options.peak_torque / options.torque_rate
+    stop_rate = STOP_FACTOR * options.sliding_rate
     for number, position in enumerate(options.positions, start=1):
         yield TrialRequest(
             Task(
@@ -96,10 +97,10 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
                 window=(options.rest, options.rest + ramp),
                 sample_rate=options.sample_rate,
                 start_angle=position,
-                stop_rate=STOP_FACTOR * options.sliding_rate,
+                stop_rate=stop_rate,
             ),
             point={"measurement": number, "position": position},
-            note=f"ends early, when the load slides at {STOP_FACTOR * options.sliding_rate:.3g} rad/s",
+            note=f"ends early, once the load slides at {np.rad2deg(stop_rate):.3g} deg/s",
         )
 
 
@@ -121,8 +122,8 @@ def _evaluate(data: TrialData) -> Ramp:
     bench = bench_of(data.trial)
     recording = data.recording()
     torque, rate = recording["drive_torque"], recording["gyro_rate"]
-    before = recording.time < options.rest
-    zero = float(np.mean(recording["relative_angle"][before])) if before.any() else 0.0
+    before = recording.time <= options.rest
+    zero = float(np.mean(recording["relative_angle"][before]))
     angle = recording["relative_angle"] - zero
     sign = 1.0 if options.peak_torque > 0 else -1.0
     breakaway, at = breakaway_torque(
@@ -133,7 +134,9 @@ def _evaluate(data: TrialData) -> Ramp:
     viscous = options.viscous_friction
     if viscous is None:
         models = friction_models()
-        viscous = sum(models[f.model].viscous(f) for f in bench.friction.values() if f.side == "load")
+        viscous = sum(
+            models[f.model].viscous(f) for f in bench.friction.values() if f.side == "load"
+        )
     damping = damping_by_ratio(found.stiffness, bench.axis.inertia, viscous, options.damping_ratio)
     return Ramp(conditions(data), recording.time, angle, torque, rate, found, damping)
 
@@ -191,17 +194,16 @@ def _findings(ramps: list[Ramp]) -> Iterator[Finding]:
 
 
 def _table(ramps: list[Ramp], suffix: str) -> Table:
-    rows: list[dict[str, Value]] = []
-    for ramp in ramps:
-        rows.append(
-            {
-                "measurement": ramp.place.get("measurement"),
-                "position": ramp.place.get("position"),
-                **_means([ramp]),
-                "chord": ramp.found.chord,
-                "interfaces": len(ramp.found.interfaces),
-            }
-        )
+    rows: list[dict[str, Value]] = [
+        {
+            "measurement": ramp.place.get("measurement"),
+            "position": ramp.place.get("position"),
+            **_means([ramp]),
+            "chord": ramp.found.chord,
+            "interfaces": len(ramp.found.interfaces),
+        }
+        for ramp in ramps
+    ]
     mean: dict[str, Value] = {"measurement": "mean", "position": None, **_means(ramps)}
     mean |= {"chord": float(np.mean([r.found.chord for r in ramps])), "interfaces": None}
     return Table(
@@ -281,7 +283,7 @@ def _figure(ramp: Ramp, suffix: str) -> Figure:
     curves = [
         Curve(ramp.angle[shown], ramp.torque[shown], "measured", "measured"),
         Curve(fine, presliding_curve(fine, values), "fitted curve", "fit"),
-        Curve(reach, tail + first[0] * reach, f"σ0 = {first[0]:.4g} N m/rad", "reference", "thin"),
+        Curve(reach, tail + first[0] * reach, f"σ0 = {first[0]:,.0f} N m/rad", "reference", "thin"),
     ]
     if len(found.interfaces) > 1:
         steep = fine[fine <= 1.3 * (tail + first[0] * top * 0.02) / found.stiffness_at_rest]
@@ -289,17 +291,17 @@ def _figure(ramp: Ramp, suffix: str) -> Figure:
             Curve(
                 steep,
                 found.stiffness_at_rest * steep,
-                f"at rest: {found.stiffness_at_rest:.4g} N m/rad",
+                f"at rest: {found.stiffness_at_rest:,.0f} N m/rad",
                 "alternative",
             )
         )
     return Figure(
         key=f"ramp{suffix}",
         title="Breakaway: torque ramp, motion, and the presliding curve",
-        caption="The torque rises until the load slides. Before that it already moves, elastically: "
+        caption="The torque rises until the load slides. Before that it already gives, elastically: "
         "the slope at the start of the lower curve is the stiffness of the bristles.",
-        alt="Drive torque and rate over time, and drive torque over angle with the fitted presliding "
-        "curve and its initial slopes.",
+        alt="Drive torque and rate over time, and drive torque over angle with the fitted "
+        "presliding curve and its initial slopes.",
         panels=(
             Panel(
                 time,

@@ -29,6 +29,8 @@ from campaign.units import AngularAcceleration, Frequency
 TIME = Axis("Time", "s", "s")
 RELATIVE_RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
 ERROR = Axis("Position error", "rad", "mrad")
+SAMPLES_PER_CYCLE = 10
+"""of the base motion, at least: the standard deviation needs the shape of the error."""
 SHOWN_CYCLES = 1.5
 """of the base motion in a time history; more cycles only make the reversals smaller."""
 ZOOM_RATE = 0.02
@@ -53,6 +55,11 @@ class StabilizationOptions(Options):
 
 
 def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialRequest]:
+    if options.sample_rate < SAMPLES_PER_CYCLE * options.frequency:
+        raise ValueError(
+            f"a recording at {options.sample_rate:.4g} Hz shows fewer than {SAMPLES_PER_CYCLE} "
+            f"samples per cycle of a {options.frequency:.4g} Hz motion; raise sample_rate"
+        )
     start = options.settle_cycles / options.frequency
     stop = start + options.cycles / options.frequency
     yield TrialRequest(
@@ -87,7 +94,9 @@ def _measure(data: TrialData) -> tuple[float, float, float]:
     """Error (rad, 1 sigma), largest deviation from the mean (rad), stuck share of one trial."""
     recording = data.recording().window(*data.trial.task.window)
     signal = data.trial.task.base_acceleration
-    frequency = signal.frequency if isinstance(signal, Sine) else 1.0 / float(np.ptp(recording.time))
+    frequency = (
+        signal.frequency if isinstance(signal, Sine) else 1.0 / float(np.ptp(recording.time))
+    )
     position = recording["pointing_error"]
     peak = float(np.max(np.abs(position - np.mean(position))))
     return stabilization_error(recording, frequency), peak, stuck_share(recording)
@@ -240,7 +249,9 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
         cut = _cut(item)
         error = cut["pointing_error"] - np.mean(cut["pointing_error"])
         panels.append(
-            Panel(TIME, ERROR, [Curve(cut.time, error, method_label(name), name)], method_label(name))
+            Panel(
+                TIME, ERROR, [Curve(cut.time, error, method_label(name), name)], method_label(name)
+            )
         )
     return Figure(
         key="position-error",

@@ -25,6 +25,8 @@ from campaign.signals import Polyline
 from campaign.trial import Role, Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
 
+SMALLEST_WINDOW = 10
+"""samples: fewer say nothing about a mean and a slope."""
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 SYMBOLS = {
     "viscous_friction": "σ2",
@@ -55,8 +57,9 @@ class VelocityMapOptions(Options):
     """...or the time to travel this, whichever takes longer; as far as the run has room."""
     settle_time: Time = Field(default=0.3, ge=0)
     """After the ramp, before the window: for the loop to settle..."""
-    settle_angle: Angle = Field(default=float(np.deg2rad(0.5)), ge=0)
-    """...or the time to travel this, whichever takes longer: friction's own memory is an angle."""
+    settle_angle: Angle = Field(default=float(np.deg2rad(0.75)), ge=0)
+    """...or the time to travel this, whichever takes longer: friction's own memory is an angle.
+    With Ts / sigma0 of 0.1 deg, 0.75 deg leaves a thousandth of it, also after a reversal."""
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(300.0)), gt=0)
     """Of the ramps."""
     rest: Time = Field(default=0.5, ge=0)
@@ -123,8 +126,8 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     if room <= 0:
         raise ValueError(
             f"at {np.rad2deg(speed):.4g} deg/s the run lasts {max(cruise, 0):.3g} s at constant "
-            f"speed but takes {settle:.3g} s to settle; raise max_travel, max_time or acceleration, "
-            "or drop that speed"
+            f"speed but takes {settle:.3g} s to settle; raise max_travel, max_time or "
+            "acceleration, or drop that speed"
         )
     by_angle = options.window_angle / speed
     wanted = max(options.window_time, by_angle)
@@ -143,6 +146,11 @@ def _trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]
         if speed <= 0:
             raise ValueError("speeds are positive; each is run in both directions")
         run = plan_run(speed, options)
+        if run.window * options.sample_rate < SMALLEST_WINDOW:
+            raise ValueError(
+                f"at {np.rad2deg(speed):.4g} deg/s the window of {run.window:.3g} s holds fewer "
+                f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
+            )
         (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
         yield TrialRequest(
             Task(
@@ -155,7 +163,7 @@ def _trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]
                 start_angle=start_angle,
             ),
             point={"speed": speed},
-            note=f"window {run.window:.3g} s ({np.rad2deg(run.window * speed):.3g} deg): {run.rule}",
+            note=f"window {run.window:.3g} s, {np.rad2deg(run.window * speed):.3g} deg: {run.rule}",
         )
 
 
@@ -184,7 +192,7 @@ def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
 
 @dataclass(frozen=True)
 class MapPoint:
-    """One point of the map: signed, SI. `spread` is the torque's standard deviation in the window."""
+    """One point of the map: signed, SI. `spread`: standard deviation of the torque in the window."""
 
     speed: float
     rate: float
@@ -253,20 +261,18 @@ def _analyse(data: TestData) -> Result:
         findings += _findings(fits, place)
         figures += [_map_figure(points, suffix, where), _fit_figure(fits, suffix, where)]
         for name, fit in fits.items():
-            notes += [f"{name.capitalize()} direction, δ free: {doubt}." for doubt in fit.free.doubts]
+            notes += [
+                f"{name.capitalize()} direction, δ free: {doubt}." for doubt in fit.free.doubts
+            ]
     example = _example(data)
     return Result(tuple(tables), (*example, *figures), tuple(findings), tuple(notes))
 
 
 def _nominal(fits: Mapping[str, DirectionFit], parameter: str, fixed: bool) -> float:
-    return float(
-        np.mean([(f.fixed if fixed else f.free).values[parameter] for f in fits.values()])
-    )
+    return float(np.mean([(f.fixed if fixed else f.free).values[parameter] for f in fits.values()]))
 
 
-def _findings(
-    fits: Mapping[str, DirectionFit], place: Mapping[str, object]
-) -> Iterator[Finding]:
+def _findings(fits: Mapping[str, DirectionFit], place: Mapping[str, object]) -> Iterator[Finding]:
     told = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
     for fixed in (False, True):
         for parameter in PARAMETERS:
@@ -406,8 +412,8 @@ def _example(data: TestData) -> tuple[Figure, ...]:
         Figure(
             key="one-point",
             title=f"One point of the map: {speed}",
-            caption="Rate and drive torque of one run. The mean torque between the two lines is the "
-            "friction torque at this speed.",
+            caption="Rate and drive torque of one run. The mean torque between the two lines is "
+            "the friction torque at this speed.",
             alt="Rate and drive torque over time for one constant-velocity run, with the averaging "
             "window marked.",
             panels=(
@@ -416,7 +422,9 @@ def _example(data: TestData) -> tuple[Figure, ...]:
                     RATE,
                     [
                         Curve(recording.time, recording["gyro_rate"], "measured", "measured"),
-                        Curve(recording.time, recording["command"], "commanded", "reference", "thin"),
+                        Curve(
+                            recording.time, recording["command"], "commanded", "reference", "thin"
+                        ),
                     ],
                     marks=marks,
                 ),

@@ -1,4 +1,4 @@
-"""Nonlinear least squares with several starts, standard errors, and a word on what it cannot tell."""
+"""Nonlinear least squares with several starts, standard errors, and what the data cannot tell."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Fit:
             determine the parameter.
         residuals: data minus model, shape (n,), in the data's unit.
         bic: Bayesian information criterion for Gaussian residuals; lower is better.
-        doubts: sentences naming parameters at a bound or not determined by the data.
+        doubts: sentences naming parameters at a bound, not determined by the data, or less than two
+            standard errors from zero.
     """
 
     values: Mapping[str, float]
@@ -80,6 +81,11 @@ def fit(
         f"{name} ended at its bound {value:.4g}"
         for name, value, side in zip(names, best.x, best.active_mask, strict=True)
         if side != 0
+    ]
+    doubts += [
+        f"{name} cannot be told from zero: {value:.3g} ± {error:.2g} (1σ)"
+        for name, value, error in zip(names, best.x, errors, strict=True)
+        if error > 0.5 * abs(value)
     ]
     n, k = len(y), len(names)
     mean_square = max(float(np.mean(best.fun**2)), np.finfo(float).tiny)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,6 +38,8 @@ def fit_stribeck(speed: Array, torque: Array, exponent: float | None = None) -> 
     `exponent` fixes delta (2 for the LuGre model); None fits it too. Ts is not forced above Tc,
     because real axes with Ts < Tc exist.  Raises ValueError for fewer points than parameters.
     """
+    if len(speed) < len(PARAMETERS):
+        raise ValueError(f"{len(speed)} points are too few for {len(PARAMETERS)} parameters")
     low, high = float(torque.min()), float(torque.max())
     slope = max((high - low) / float(np.ptp(speed) or 1.0), 1e-9)
     first = float(torque[np.argmin(speed)])
@@ -53,10 +56,26 @@ def fit_stribeck(speed: Array, torque: Array, exponent: float | None = None) -> 
     ]
     if exponent is None:
         parameters.append(Parameter("stribeck_exponent", 0.2, 5.0, (1.0, 2.0)))
-        return fit(stribeck, speed, torque, parameters)
+        return _doubting(fit(stribeck, speed, torque, parameters))
     fixed = {"stribeck_exponent": exponent}
     found = fit(lambda v, values: stribeck(v, {**values, **fixed}), speed, torque, parameters)
-    return Fit(
-        {**found.values, **fixed}, {**found.errors, "stribeck_exponent": 0.0},
-        found.residuals, found.bic, found.doubts,
-    )  # fmt: skip
+    return _doubting(
+        replace(
+            found,
+            values={**found.values, **fixed},
+            errors={**found.errors, "stribeck_exponent": 0.0},
+        )
+    )
+
+
+def _doubting(found: Fit) -> Fit:
+    """The fit, with a doubt where the map is too flat to show a Stribeck effect."""
+    drop = abs(found.values["static_torque"] - found.values["coulomb_torque"])
+    error = float(np.hypot(found.errors["static_torque"], found.errors["coulomb_torque"]))
+    if drop >= 2.0 * error:  # an undetermined torque (NaN) is a doubt too
+        return found
+    doubt = "static_torque and coulomb_torque are the same within their errors: no Stribeck effect"
+    return replace(
+        found,
+        doubts=(*found.doubts, f"{doubt} shows, and stribeck_velocity is not determined"),
+    )

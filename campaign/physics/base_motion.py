@@ -25,10 +25,13 @@ def base_rate(acceleration: Signal, time: Array) -> Array:
 
 
 def _integral(polyline: Polyline, time: Array) -> Array:
-    """Exact integral of a polyline from t = 0, shape (n,)."""
-    knots = np.unique(np.concatenate([[0.0], [t for t in polyline.times if t > 0], [max(time[-1], 0.0)]]))
-    values = polyline.sample(knots)
+    """Exact integral of a polyline from t = 0, shape (n,). Its steps (equal times) are kept."""
+    knots, values = np.array(polyline.times), np.array(polyline.values)
     area = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots) * (values[1:] + values[:-1]))])
-    where = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 1)
-    passed = time - knots[where]
-    return np.asarray(area[where] + 0.5 * passed * (values[where] + polyline.sample(time)))
+
+    def from_first_knot(at: Array) -> Array:
+        last = np.maximum(np.searchsorted(knots, at, side="right") - 1, 0)
+        passed = at - knots[last]
+        return np.asarray(area[last] + 0.5 * passed * (values[last] + polyline.sample(at)))
+
+    return from_first_knot(time) - from_first_knot(np.zeros(1))

@@ -14,23 +14,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
-from numba import config
+from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @cache
 def cache_folder() -> Path:
-    """Where compiled functions are kept: the user's cache, or a temporary folder if that is shut."""
+    """Where compiled functions are kept: the user's cache, or a temporary folder if it is shut."""
     import platformdirs
 
-    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
-    folder = platformdirs.user_cache_path("campaign") / "compiled" / digest.hexdigest()[:16]
+    name = digest_of_sources(Path(__file__).parent)
+    folder = platformdirs.user_cache_path("campaign") / "compiled" / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -39,9 +37,18 @@ def cache_folder() -> Path:
     return folder
 
 
+def digest_of_sources(folder: Path) -> str:
+    """16 hexadecimal digits that change with numba, Python, or any source file in `folder`."""
+    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(source.relative_to(folder).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 @contextmanager
 def _cached_here() -> Iterator[None]:
-    """numba chooses the cache folder when it decorates; other packages keep their own."""
+    """Numba chooses the cache folder when it decorates; other packages keep their own."""
     before = config.CACHE_DIR
     config.CACHE_DIR = before or str(cache_folder())
     try:
@@ -53,7 +60,7 @@ def _cached_here() -> Iterator[None]:
 def compiled(function: F) -> F:
     """Decorator: compile at the first call, keep on disk, release the GIL while running."""
     with _cached_here():
-        return numba.njit(cache=True, nogil=True)(function)  # type: ignore[no-any-return]
+        return cast(F, numba.njit(cache=True, nogil=True)(function))
 
 
 def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
