@@ -47,7 +47,7 @@ PRECEDENCE = (
 
 
 def worst_exit_code(codes: Sequence[ExitCode]) -> ExitCode:
-    """The first code of the documented precedence that is among `codes`; DONE when there is none."""
+    """The first of `codes` in the documented precedence; DONE when there is none."""
     return next((code for code in PRECEDENCE if code in codes), ExitCode.DONE)
 
 

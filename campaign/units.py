@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class Quantity:
     """A physical quantity: its SI unit, the unit people read, and every unit it accepts.
 
-    Used as pydantic metadata: ``inertia: Annotated[float, MOMENT_OF_INERTIA]``. The field then takes
-    text with a unit. A bare number is an error, except under the validation context
+    Used as pydantic metadata: ``inertia: Annotated[float, INERTIA]``. The field then takes text
+    with a unit. A bare number is an error, except under the validation context
     ``{"si": True}`` with which normalised (already SI) trees are read back.
     """
 
@@ -45,7 +45,7 @@ class Quantity:
             raise ValueError(f"{text!r} is not a finite number")
         try:
             parsed = _unit(unit)
-        except Exception:
+        except Exception:  # noqa: BLE001 - pint raises whatever its parser meets
             raise ValueError(f"{unit!r} is not a unit; {self._allowed()}") from None
         if parsed not in _accepted(self.accepts):
             raise ValueError(f"{unit!r} is not a unit of {self.name}; {self._allowed()}")
@@ -80,7 +80,10 @@ class Quantity:
         return value
 
 
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?))\s*(.*?)\s*\Z", re.I | re.S)
+_NUMBER = re.compile(
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?))\s*(.*?)\s*\Z",
+    re.I | re.S,
+)
 
 
 def split_quantity(text: str) -> tuple[float, str]:
@@ -109,7 +112,7 @@ def to_si(text: str) -> float:
     registry = _registry()
     try:
         return float(registry.Quantity(number, _unit(unit)).to_base_units().magnitude)
-    except Exception:
+    except Exception:  # noqa: BLE001 - pint raises whatever its parser meets
         raise ValueError(f"{unit!r} is not a unit") from None
 
 
@@ -128,7 +131,9 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 @cache
 def _unit(text: str) -> Any:
-    return _registry().Unit(text.replace("°", "deg").replace("Ω", "ohm").replace("·", " ").replace("²", "^2"))
+    for symbol, spelled in (("°", "deg"), ("Ω", "ohm"), ("·", " "), ("²", "^2")):
+        text = text.replace(symbol, spelled)
+    return _registry().Unit(text)
 
 
 @cache
@@ -154,7 +159,9 @@ INDUCTANCE = _quantity("inductance", "H", "mH", "uH")
 INERTIA = _quantity("moment of inertia", "kg m^2", "kg m^2", "g m^2", "g cm^2")
 TORQUE_CONSTANT = _quantity("torque constant", "N m/A", "N m/A", "mN m/A")
 BACK_EMF_CONSTANT = _quantity("back-EMF constant", "V s/rad", "V s/rad", "mV s/rad", "V/rpm")
-ROTATIONAL_STIFFNESS = _quantity("rotational stiffness", "N m/rad", "N m/rad", "kN m/rad", "N m/mrad", "N m/deg")
+ROTATIONAL_STIFFNESS = _quantity(
+    "rotational stiffness", "N m/rad", "N m/rad", "kN m/rad", "N m/mrad", "N m/deg"
+)
 ROTATIONAL_DAMPING = _quantity(
     "rotational damping", "N m s/rad", "N m s/rad", "mN m s/rad", "N m s/deg"
 )
