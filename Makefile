@@ -20,7 +20,7 @@ demo: $(VENV)/installed
 		&& echo "archive  $$run" && echo "report   $${run%.nxs}-report/report.html"
 
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto $(PYTEST_OPTIONS)
+	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_OPTIONS)
 
 check: $(VENV)/installed-test
 	$(BIN)/ruff check .
