@@ -33,6 +33,8 @@ FIGURE_POINTS = 40_000
 """Most points of a figure's lines together; many curves share them."""
 DENSE = 2_000
 """From here on a scatter is drawn as an image: thousands of signs would outweigh the page."""
+FLAT = 1e-4
+"""Share of its level that a curve must vary by to be drawn as varying."""
 
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -184,6 +186,8 @@ def _draw_panel(ax: Axes, panel: Panel, chosen: dict[str, Look], points: int) ->
     for set_scale, axis in ((ax.set_xscale, panel.x), (ax.set_yscale, panel.y)):
         if axis.scale == "log" and not empty:
             set_scale("log")
+    if panel.y.scale == "linear":
+        _spare_rounding_errors(ax, [y for _, y, _ in shown])
     _label_axes(ax, panel, scale_x, scale_y)
     for mark in panel.marks:
         _draw_mark(ax, mark, scale_x, scale_y)
@@ -218,7 +222,7 @@ def _draw_curve(
         ax.fill_between(x, low, y, color=look.light, alpha=0.18, linewidth=0, label=label)
         return
     if curve.style == "points":
-        size = 3.2 if len(x) <= 400 else 1.8
+        size = 4.0 if len(x) <= 60 else 3.0 if len(x) <= 400 else 1.8
         ax.plot(
             x,
             y,
@@ -236,10 +240,20 @@ def _draw_curve(
     if look.dash:  # above the solid lines, which then show through the gaps
         line |= {"dashes": look.dash, "zorder": 2.1}
     if curve.style == "thin":
-        line |= {"linewidth": 0.6, "alpha": 0.75}
+        line |= {"linewidth": 0.9, "alpha": 0.9}
     if curve.style == "line+points":
         line |= {"marker": look.marker, "markersize": 4, "markeredgewidth": 0}
     ax.plot(x, y, **line)
+
+
+def _spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
+    """A constant is drawn as one: an axis does not zoom in on its last digits."""
+    finite = np.concatenate([np.empty(0), *(y[np.isfinite(y)] for y in values)])
+    if not finite.size:
+        return
+    middle, span = float(np.median(finite)), float(np.ptp(finite))
+    if span < FLAT * abs(middle):
+        ax.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
 
 
 def _draw_mark(ax: Axes, mark: Mark, scale_x: float, scale_y: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 from campaign.options import Options
 from campaign.report import tables
@@ -314,15 +314,25 @@ def _label(path: str) -> str:
 
 
 def _with_unit(test: AnalysedTest, path: str, values: Sequence[Any]) -> str:
+    """Values in display units; a float whose unit is not known is SI, and says so."""
     quantity = _quantity(test.experiment.options if test.experiment else None, path)
     shown = [_plain(value, quantity) for value in values]
     text = ", ".join(shown[:LISTED])
     if len(shown) > LISTED:
         text = f"{len(shown)} values from {shown[0]} to {shown[-1]}"
-    return f"{text} {pretty_unit(quantity.display)}" if quantity else text
+    if quantity and text != "–":
+        return f"{text} {pretty_unit(quantity.display)}"
+    known = test.experiment is not None and path in test.experiment.options.model_fields
+    return text if known or not any(isinstance(v, float) for v in values) else f"{text} (SI)"
 
 
 def _plain(value: Any, quantity: Quantity | None) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, list | tuple):
+        return ", ".join(_plain(item, quantity) for item in value[:LISTED]) + (
+            f" … ({len(value)})" if len(value) > LISTED else ""
+        )
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value if isinstance(value, str) else canonical_json(value)[:200]
     return number(convert(value, quantity.si, quantity.display) if quantity else value, 6)
@@ -330,7 +340,16 @@ def _plain(value: Any, quantity: Quantity | None) -> str:
 
 def _quantity(options: type[Options] | None, path: str) -> Quantity | None:
     info = options.model_fields.get(path) if options else None
-    return next((m for m in info.metadata if isinstance(m, Quantity)), None) if info else None
+    return next(_quantities((*info.metadata, info.annotation)), None) if info else None
+
+
+def _quantities(hints: Sequence[Any]) -> Iterator[Quantity]:
+    """Physical quantities in a field's metadata, or inside a list or an optional type of it."""
+    for hint in hints:
+        if isinstance(hint, Quantity):
+            yield hint
+        else:
+            yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))
 
 
 def anchors(sections: Sequence[Section]) -> Mapping[str, str]:

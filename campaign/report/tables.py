@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import csv
 import io
+import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.report.scoreboard import Line, Scoreboard, Status
@@ -16,6 +17,8 @@ from campaign.units import convert
 
 ROWS = 300
 """Most rows on the page; the CSV file has them all."""
+ROUNDING = 1e-12
+"""Share of a column's largest number below which one is a rounding error, shown as 0."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +40,8 @@ class ShownTable:
 
 def show(table: Table) -> ShownTable:
     """The first `ROWS` rows, rounded to four significant digits, in display units."""
-    rows = tuple(
-        tuple(_shown_cell(_displayed(row.get(c.name), c)) for c in table.columns)
-        for row in table.rows[:ROWS]
-    )
+    shown = [_shown_column(column, table.rows[:ROWS]) for column in table.columns]
+    rows = tuple(zip(*shown, strict=True))
     headers = tuple(
         f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
         for column in table.columns
@@ -89,7 +90,7 @@ def agreement(scoreboard: Scoreboard) -> str:
     agreeing = sum(line.agrees is True for line in lines)
     return (
         f"{len(compared)} published numbers compared: the median deviation is"
-        f" {compared[len(compared) // 2]:.2g} %, the worst {compared[-1]:.2g} %;"
+        f" {number(compared[len(compared) // 2], 2)} %, the worst {number(compared[-1], 2)} %;"
         f" {agreeing} agree to the printed digit or meet the claim."
     )
 
@@ -104,14 +105,24 @@ def _displayed(value: Value, column: Column) -> Value:
     return value
 
 
-def _shown_cell(value: Value) -> ShownCell:
+def _shown_column(column: Column, rows: Sequence[Mapping[str, Value]]) -> list[ShownCell]:
+    """Numbers stand to the right, and so does what is missing among them."""
+    values = [_displayed(row.get(column.name), column) for row in rows]
+    given = [value for value in values if value is not None]
+    numbers = [float(v) for v in given if isinstance(v, int | float) and not isinstance(v, bool)]
+    right = bool(numbers) and len(numbers) == len(given)
+    largest = max((abs(v) for v in numbers if math.isfinite(v)), default=0.0)
+    return [ShownCell(_text(value, ROUNDING * largest), right) for value in values]
+
+
+def _text(value: Value, negligible: float) -> str:
     if isinstance(value, bool):
-        return ShownCell("yes" if value else "no", number=False)
+        return "yes" if value else "no"
     if isinstance(value, int):
-        return ShownCell(minus(str(value)), number=True)
+        return minus(str(value))
     if isinstance(value, float):
-        return ShownCell(number(value), number=True)
-    return ShownCell("–" if value is None else str(value), number=False)
+        return "0" if abs(value) < negligible else number(value)
+    return "–" if value is None else str(value)
 
 
 def _csv_name(column: Column) -> str:

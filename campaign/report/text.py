@@ -7,15 +7,16 @@ import re
 
 
 def number(value: float | None, digits: int = 4, decimals: int = 0) -> str:
-    """A number for people: at most `digits` significant ones, no exponent where none is needed.
+    """A number for people: `digits` significant ones, no exponent where none is needed.
 
-    A number that is exact with fewer keeps at least `decimals` after the point.
+    Digits before the point are never rounded away. A number that is exact with fewer keeps at
+    least `decimals` after the point.
     """
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:
         return f"{0:.{decimals}f}"
-    short = float(f"{value:.{digits}g}")
+    short = float(f"{value:.{digits}g}") if abs(value) < 10.0**digits else float(round(value))
     if not 1e-5 <= abs(short) < 10.0 ** (digits + 3):
         mantissa, exponent = f"{short:.{digits - 1}e}".split("e")
         return minus(f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}")

@@ -183,6 +183,13 @@ def test_a_figure_without_data_says_so(curves: tuple[Curve, ...], scale: str) ->
     assert ("no data" in shown) is not drawable
 
 
+def test_rounding_errors_are_not_blown_up() -> None:
+    x, noise = np.arange(3.0), np.array([0.0, 1e-9, -1e-9])
+    shown = texts(draw(figure(Curve(x, 1e-3 * (18 + noise), "flat", "measured", "points"))))
+    assert "18.0" in shown
+    assert max(len(text) for text in shown if text[:2] == "18") <= 5
+
+
 def test_many_long_curves_do_not_outweigh_the_page() -> None:
     x = np.linspace(0, 1, 5_000)
     curves = [Curve(x, np.sin(90 * x + i), "", f"run {i}", "thin") for i in range(120)]
@@ -224,7 +231,7 @@ def test_figures_in_one_page_share_no_ids_and_keep_their_links() -> None:
         (0.000595, "0.000595"),
         (1.23456e-7, "1.235 × 10⁻⁷"),
         (-4.0712, "−4.071"),
-        (159176.4, "159200"),
+        (159176.4, "159176"),
         (12345678901.0, "1.235 × 10¹⁰"),
         (0.0, "0"),
         (float("nan"), "–"),
