@@ -77,7 +77,10 @@ def breakaway_torque(
         raise ValueError(f"only {len(time)} samples: too short a recording for a breakaway torque")
     acceleration = savgol_filter(rate, length, 1, deriv=1, delta=interval)
     friction = savgol_filter(torque, length, 1) - inertia * acceleration
-    return float(np.max(np.abs(friction))), int(np.argmax(moving))
+    # Within half a window of either end the slope belongs to another moment: it would leave some
+    # of the acceleration at the end of the ramp in the friction.
+    inner = friction[length // 2 : len(friction) - length // 2]
+    return float(np.max(np.abs(inner))), int(np.argmax(moving))
 
 
 def presliding_curve(angle: Array, values: Mapping[str, float]) -> Array:
@@ -90,10 +93,8 @@ def presliding_curve(angle: Array, values: Mapping[str, float]) -> Array:
     return total
 
 
-def fit_presliding(
-    angle: Array, torque: Array, breakaway: float, share: float = 0.8
-) -> Presliding:
-    """Fit the curve up to `share` of the breakaway torque (N m); angle (rad) and torque (N m), (n,).
+def fit_presliding(angle: Array, torque: Array, breakaway: float, share: float = 0.8) -> Presliding:
+    """Fit the curve up to `share` of the breakaway torque; angle (rad) and torque (N m), (n,).
 
     Angle and torque are positive and begin near zero. One interface is assumed, unless two explain
     the curve clearly better (Bayesian information criterion lower by more than 10).
@@ -121,7 +122,9 @@ def _fit_window(
     inside[past:] = False
     q, t = angle[inside], torque[inside]
     if len(q) < 10 or float(np.ptp(q)) <= 0.0:
-        raise ValueError(f"only {len(q)} samples lie between {window[0]:.3g} and {window[1]:.3g} N m")
+        raise ValueError(
+            f"only {len(q)} samples lie between {window[0]:.3g} and {window[1]:.3g} N m"
+        )
     # Evenly in torque: a slow ramp has far more samples than information.
     pick = np.unique(np.linspace(0, len(q) - 1, min(len(q), 400)).astype(int))
     q, t = q[pick], t[pick]
@@ -153,7 +156,11 @@ def _fit_window(
 
 def _interfaces(found: Fit) -> tuple[tuple[float, float, float], ...]:
     rows = [
-        (found.values[f"stiffness_{k}"], found.errors[f"stiffness_{k}"], found.values[f"torque_{k}"])
+        (
+            found.values[f"stiffness_{k}"],
+            found.errors[f"stiffness_{k}"],
+            found.values[f"torque_{k}"],
+        )
         for k in (1, 2)
         if f"stiffness_{k}" in found.values
     ]

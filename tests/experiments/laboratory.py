@@ -1,0 +1,84 @@
+"""Runs an experiment on the simulated bench as the program does, without protocol and archive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from campaign.backends.sim import SimBackend, SimOptions
+from campaign.experiments import experiments
+from campaign.experiments.interface import TestData
+from campaign.physics.bench import Bench
+from campaign.result import Finding, Result, Table
+from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+
+Tree = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished trial, in memory."""
+
+    trial: Trial
+    ending: Ending
+    samples: Recording
+
+    def recording(self) -> Recording:
+        return self.samples
+
+
+def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},)) -> list[Trial]:
+    experiment = experiments()[kind]
+    found: list[Trial] = []
+    for point in matrix:
+        chosen = experiment.options.model_validate({**options, **point})
+        for request in experiment.trials(chosen, bench):
+            found.append(
+                Trial(
+                    number=len(found) + 1,
+                    test=kind,
+                    kind=kind,
+                    role=request.role,
+                    point={**point, **request.point},
+                    options=chosen.model_dump(mode="json"),
+                    seed=len(found) + 1,
+                    bench=bench.model_dump(mode="json"),
+                    task=request.task,
+                    note=request.note,
+                )
+            )
+    return found
+
+
+def execute(planned: Iterable[Trial]) -> tuple[Done, ...]:
+    backend = SimBackend(SimOptions())
+    done = []
+    for trial in planned:
+        recorder = MemoryRecorder()
+        ending = backend.execute(trial, recorder, lambda: False)
+        done.append(Done(trial, ending, recorder.recording(ending)))
+    return tuple(done)
+
+
+def analyse(kind: str, done: Iterable[Done]) -> Result:
+    return experiments()[kind].analyse(TestData(kind, kind, {}, tuple(done)))
+
+
+def failed(item: Done) -> Done:
+    """The same trial, had a limit ended it."""
+    return Done(item.trial, Ending(Outcome.LIMIT, "the rate limit"), item.samples)
+
+
+def table(result: Result, key: str) -> Table:
+    return next(table for table in result.tables if table.key == key)
+
+
+def finding(result: Result, quantity: str, **conditions: object) -> Finding:
+    """The one finding of a quantity under these conditions."""
+    (found,) = [
+        f
+        for f in result.findings
+        if f.quantity == quantity and conditions.items() <= f.conditions.items()
+    ]
+    return found

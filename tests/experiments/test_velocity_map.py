@@ -1,0 +1,150 @@
+"""The friction-velocity map, from planning to fit, on a bench whose friction is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from campaign.experiments.velocity_map import EXPERIMENT, VelocityMapOptions, plan_run
+from campaign.result import Result
+from campaign.trial import Role
+from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
+from tests.physics.benches import bench
+
+RATIO = 141.176
+COMBINED = {
+    "viscous_friction": 4.0 + RATIO * 0.001,
+    "coulomb_torque": 26.0 + RATIO * 0.03,
+    "static_torque": 32.0 + RATIO * 0.04,
+    "stribeck_velocity": 0.03,
+    "stribeck_exponent": 2.0,
+}
+
+
+@pytest.fixture(scope="module")
+def full_map() -> Result:
+    return analyse("velocity_map", execute(trials("velocity_map", bench(), {})))
+
+
+@pytest.mark.parametrize("direction", ["positive", "negative", "nominal"])
+@pytest.mark.parametrize("exponent", ["free", "2"])
+def test_the_fit_returns_the_benchs_combined_friction(
+    full_map: Result, direction: str, exponent: str
+) -> None:
+    """Within 1 %, every parameter, both directions; T(load) + N T(motor) at one relative rate."""
+    for name, true in COMBINED.items():
+        found = finding(full_map, name, direction=direction, exponent=exponent)
+        assert found.value == pytest.approx(true, rel=0.01), name
+
+
+def test_every_point_lies_on_the_curve(full_map: Result) -> None:
+    rows = table(full_map, "map").rows
+    assert len(rows) == 160
+    for row in rows:
+        rate = float(str(row["rate"]))
+        fall = np.exp(-((rate / 0.03) ** 2))
+        curve = COMBINED["coulomb_torque"] + fall * (
+            COMBINED["static_torque"] - COMBINED["coulomb_torque"]
+        )
+        expected = np.sign(rate) * curve + COMBINED["viscous_friction"] * rate
+        assert row["torque"] == pytest.approx(expected, rel=1e-3)
+        assert rate == pytest.approx(row["speed"], rel=2e-3)
+
+
+def test_the_shipped_speeds() -> None:
+    speeds = np.rad2deg(VelocityMapOptions().speeds)
+    assert len(speeds) == 80
+    assert speeds[0] == pytest.approx(0.05)
+    assert speeds[-1] == pytest.approx(65.0)
+    assert np.sum(speeds < 1.72) > 35  # dense below the Stribeck velocity
+
+
+def deg(value: float) -> float:
+    return float(np.deg2rad(value))
+
+
+@pytest.mark.parametrize(
+    ("speed", "window", "rule"),
+    [
+        # 20 s at 0.1 deg/s are 2 deg, less 0.75 deg to settle: 5 deg do not fit in.
+        (0.1, 12.5, "max_time"),
+        # 5 deg at 1 deg/s take 5 s, longer than 2 s.
+        (1.0, 5.0, "window_angle"),
+        # 5 deg at 10 deg/s take 0.5 s, shorter than 2 s; there are 60 deg, 6 s.
+        (10.0, 2.0, "window_time"),
+        # 60 deg at 60 deg/s are 0.8 s besides the ramps (0.2 s each), 0.3 s to settle.
+        (60.0, 0.5, "max_travel"),
+    ],
+)
+def test_windows_follow_the_rules(speed: float, window: float, rule: str) -> None:
+    options = VelocityMapOptions()
+    run = plan_run(deg(speed), options)
+    assert run.window == pytest.approx(window, abs=2e-3)
+    assert rule in run.rule
+    for direction in (+1.0, -1.0):
+        start, stop = run.window_of(direction)
+        assert stop - start == pytest.approx(run.window)
+        # All of the window lies within the constant speed, and behind the settling.
+        commanded = run.command().sample(np.linspace(start + 1e-9, stop - 1e-9, 50))
+        np.testing.assert_allclose(commanded, direction * deg(speed))
+
+
+def test_travel_is_the_shorter_of_an_angle_and_a_time() -> None:
+    options = VelocityMapOptions()
+    for speed in options.speeds:
+        run = plan_run(speed, options)
+        motion = 2 * run.ramp + run.cruise
+        way = speed * (run.cruise + run.ramp)
+        assert motion <= 20.0 + 1e-9
+        assert way <= deg(60.0) + 1e-9
+        assert motion == pytest.approx(20.0) or way == pytest.approx(deg(60.0))
+        command = run.command()
+        times, values = np.array(command.times), np.array(command.values)
+        there_and_back = np.sum(0.5 * np.diff(times) * (values[1:] + values[:-1]))
+        assert there_and_back == pytest.approx(0.0, abs=1e-12)
+
+
+def test_runs_that_cannot_settle_or_be_sampled_are_refused() -> None:
+    with pytest.raises(ValueError, match="settle"):
+        plan_run(deg(130.0), VelocityMapOptions())
+    for changed in ({"sample_rate": "1 Hz"}, {"speeds": ["-1 deg/s"]}):
+        options = VelocityMapOptions.model_validate(changed)
+        with pytest.raises(ValueError, match="samples|positive"):
+            list(EXPERIMENT.trials(options, bench()))
+
+
+def test_all_runs_start_at_one_place_after_a_warm_up() -> None:
+    planned = trials("velocity_map", bench(), {"speeds": ["1 deg/s", "20 deg/s"]})
+    assert [trial.role for trial in planned] == [Role.WARM_UP, Role.MEASUREMENT, Role.MEASUREMENT]
+    assert {trial.task.start_angle for trial in planned} == {deg(-30.0)}
+    assert all(trial.note for trial in planned)
+    measured = execute(planned[1:])
+    for done in measured:
+        assert done.samples["relative_angle"][-1] == pytest.approx(deg(-30.0), abs=deg(0.1))
+
+
+FEW = {"speeds": [f"{v} deg/s" for v in (5, 10, 15, 20, 30, 40)], "warm_up_cycles": 0}
+
+
+def test_failed_trials_are_left_out_and_told() -> None:
+    done = list(execute(trials("velocity_map", bench(), FEW)))
+    done[2] = failed(done[2])
+    result = analyse("velocity_map", done)
+    assert len(table(result, "map").rows) == 10
+    assert any("1 of 6 trials" in note for note in result.notes)
+
+
+def test_one_trial_gives_its_points_and_no_fit() -> None:
+    done = execute(trials("velocity_map", bench(), {**FEW, "speeds": ["10 deg/s"]}))
+    result = analyse("velocity_map", done)
+    assert len(table(result, "map").rows) == 2
+    assert not [t for t in result.tables if t.key == "parameters"]
+    assert any(note.startswith("No fit") and "1 points" in note for note in result.notes)
+
+
+def test_nothing_measured_gives_nothing() -> None:
+    assert analyse("velocity_map", ()).tables == ()
+    done = execute(trials("velocity_map", bench(), {**FEW, "speeds": ["10 deg/s"]}))
+    result = analyse("velocity_map", [failed(done[0])])
+    assert result.findings == ()
+    assert result.notes
