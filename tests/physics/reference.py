@@ -68,10 +68,7 @@ def trajectory(
             dobserved = (RATIO * KT * i + disturbance) / INERTIA
             added = -disturbance
         error = -w * DEG
-        if torque is None:
-            wanted = KPV * (error + KIV * rate_sum)
-        else:
-            wanted = torque(t) / (RATIO * KT)
+        wanted = KPV * (error + KIV * rate_sum) if torque is None else torque(t) / (RATIO * KT)
         current_error = wanted + added / (RATIO * KT) - i
         voltage = KPC * current_error + KIC * current_sum
         return [

@@ -26,7 +26,7 @@ def ramp(*interfaces: dict[str, Any]) -> tuple[np.ndarray, dict[str, np.ndarray]
 
 
 def test_sticks_below_and_breaks_away_at_the_static_torque() -> None:
-    time, out = ramp(stribeck(32.0, 26.0, 4.0))
+    _, out = ramp(stribeck(32.0, 26.0, 4.0))
     drive = out["motor_current"] * RATIO * KT
     moving = int(np.argmax(np.abs(out["load_rate"]) > 1e-12))
     assert drive[moving - 1] < 32.0 + 1e-2
