@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +17,16 @@ from campaign.archive.reader import ArchivedTrial
 from campaign.archive.run_folder import first_line
 from campaign.archive.trial_file import entry_name
 from campaign.errors import ArchiveError
-from campaign.trial import Channel, Ending, Event, Outcome, Recording, SafeState, Trial
+from campaign.trial import (
+    Channel,
+    Ending,
+    Event,
+    Outcome,
+    Recording,
+    SafeState,
+    Trial,
+    canonical_json,
+)
 
 
 class _Event(BaseModel):
@@ -47,13 +58,14 @@ def read_trial(path: Path, file: h5py.File, number: int) -> ArchivedTrial:
     with guarded.guarded(path, name):
         entry = guarded.group_at(file, name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
+        text = guarded.text_at(record, "trial")
         try:
-            trial = Trial.model_validate_json(guarded.text_at(record, "trial"))
+            trial = Trial.model_validate_json(text)
         except ValueError as error:
             raise ArchiveError(f"{path}: /{name}/record/trial: {first_line(error)}") from None
         if trial.number != number:
             raise ArchiveError(f"{path}: /{name}: holds trial number {trial.number}")
-        if trial.fingerprint != guarded.text_at(record, "fingerprint"):
+        if _fingerprint(text) != guarded.text_at(record, "fingerprint"):
             raise ArchiveError(f"{path}: /{name}/record: does not match its fingerprint")
         ending = Ending(
             Outcome(guarded.text_at(record, "outcome")),
@@ -63,6 +75,17 @@ def read_trial(path: Path, file: h5py.File, number: int) -> ArchivedTrial:
         started = guarded.text_at(entry, "start_time")
         ended = guarded.text_at(entry, "end_time")
         return ArchivedTrial(trial, ending, started, ended, path, name)
+
+
+def _fingerprint(trial_text: str) -> str:
+    """Of a trial as it was stored.
+
+    `Trial.fingerprint` would be another one as soon as a later program gives a trial a further
+    field, with a default that old archives do not have.
+    """
+    tree = json.loads(trial_text)
+    what = {key: tree[key] for key in ("bench", "task", "seed")}
+    return hashlib.sha256(canonical_json(what).encode()).hexdigest()
 
 
 def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:

@@ -177,6 +177,25 @@ def test_a_missing_group_is_named(sealed, name):
     refused(sealed, f"/{name}: is missing")
 
 
+def test_an_archive_from_before_a_trial_had_a_field_still_opens(sealed):
+    with h5py.File(sealed, "r+") as file:
+        tree = json.loads(file["trial_00001/record/trial"][()])
+        del tree["task"]["start_angle"], tree["note"]
+        put_text(file, "trial_00001/record/trial", json.dumps(tree))
+        what = {key: tree[key] for key in ("bench", "seed", "task")}
+        digest = hashlib.sha256(json.dumps(what, separators=(",", ":"), sort_keys=True).encode())
+        put_text(file, "trial_00001/record/fingerprint", digest.hexdigest())
+    assert open_run(sealed).trials[0].trial.task.start_angle == 0.0
+
+
+def test_a_trial_that_is_not_what_ran_is_refused(sealed):
+    with h5py.File(sealed, "r+") as file:
+        tree = json.loads(file["trial_00001/record/trial"][()])
+        tree["bench"]["axis"]["inertia"] = 36.0
+        put_text(file, "trial_00001/record/trial", json.dumps(tree))
+    refused(sealed, "/trial_00001/record: does not match its fingerprint")
+
+
 def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
     with h5py.File(sealed, "r+") as file:
         dataset = file["trial_00002/data/friction_torque"]
