@@ -38,7 +38,12 @@ class Task(Options):
 
     Attributes:
         mode: `rate` closes the velocity loop on `command` (rad/s); `torque` opens it and commands
-            `command` (N m at the load) through the current loop.
+            `command` (N m at the load) through the current loop. Two modes exist only where a bench
+            is simulated: `prescribed` moves the load relative to the hull exactly at `command`
+            (rad/s), with no motor; `spring` pulls it through a spring whose far end stands at the
+            angle `command` (rad), with no motor.
+        spring_stiffness: of mode `spring` (N m/rad).
+        disturbance: torque on the load from outside (N m); only where a bench is simulated.
         command: the commanded rate or torque over the trial's own time.
         base_acceleration: angular acceleration of the hull (rad/s^2); its rate has zero mean when
             it is a sine, and starts from rest otherwise.
@@ -52,8 +57,10 @@ class Task(Options):
         start_angle: where the load stands relative to the hull when the trial begins (rad).
     """
 
-    mode: Literal["rate", "torque"]
+    mode: Literal["rate", "torque", "prescribed", "spring"]
     command: Signal = Zero()
+    spring_stiffness: float = Field(default=0.0, ge=0)
+    disturbance: Signal = Zero()
     base_acceleration: Signal = Zero()
     compensation: str = "none"
     duration: float = Field(gt=0)
@@ -193,9 +200,7 @@ class ChannelInfo:
     measured: bool = True
 
     def with_samples(self, samples: Array) -> Channel:
-        return Channel(
-            self.name, self.unit, self.label, self.display_unit, samples, self.measured
-        )
+        return Channel(self.name, self.unit, self.label, self.display_unit, samples, self.measured)
 
 
 @dataclass(frozen=True)

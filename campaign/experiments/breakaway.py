@@ -298,8 +298,8 @@ def _figure(ramp: Ramp, suffix: str) -> Figure:
     return Figure(
         key=f"ramp{suffix}",
         title="Breakaway: torque ramp, motion, and the presliding curve",
-        caption="The torque rises until the load slides. Before that it already gives, elastically: "
-        "the slope at the start of the lower curve is the stiffness of the bristles.",
+        caption="The torque rises until the load slides. Before that it already gives, "
+        "elastically: the slope at the start of the lower curve is the stiffness of the bristles.",
         alt="Drive torque and rate over time, and drive torque over angle with the fitted "
         "presliding curve and its initial slopes.",
         panels=(

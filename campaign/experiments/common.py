@@ -46,11 +46,8 @@ def swept(data: TestData, own: Sequence[str] = ()) -> tuple[str, ...]:
 def conditions(data: TrialData, *names: str) -> dict[str, Value]:
     """Options of the trial by name, and its whole sweep point, for findings and table rows."""
     options: Mapping[str, object] = data.trial.options
-    found: dict[str, Value] = {}
-    for name, value in [*((n, options.get(n)) for n in names), *data.trial.point.items()]:
-        if value is None or isinstance(value, str | int | float | bool):
-            found[name] = value
-    return found
+    told = {name: options.get(name) for name in names} | data.trial.point
+    return {k: v for k, v in told.items() if v is None or isinstance(v, str | int | float | bool)}
 
 
 def failures_note(data: TestData) -> tuple[str, ...]:
@@ -58,7 +55,8 @@ def failures_note(data: TestData) -> tuple[str, ...]:
     failed = [item for item in data.trials if item.ending.outcome != "completed"]
     if not failed:
         return ()
-    return (
+    note = (
         f"{len(failed)} of {len(data.trials)} trials did not complete and are not analysed; "
-        "the table of failed trials says why.",
+        "the table of failed trials says why."
     )
+    return (note,)

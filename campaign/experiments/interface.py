@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
-from campaign.trial import Ending, Recording, Trial, TrialRequest, Tree
+from campaign.trial import Ending, Recording, Tree, Trial, TrialRequest
 
 
 class TrialData(Protocol):

@@ -21,7 +21,7 @@ from campaign.experiments.common import (
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table
+from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
 from campaign.signals import Sine
 from campaign.trial import Recording, Task, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
@@ -106,7 +106,8 @@ def _analyse(data: TestData) -> Result:
     groups = grouped(data.completed())
     paths = swept(data)
     columns = ["compensation", "frequency", "acceleration"]
-    rows, findings = [], []
+    findings: list[Finding] = []
+    rows: list[dict[str, Value]] = []
     for group in groups.values():
         measures = np.array([_measure(item) for item in group])
         error, peak, stuck = measures.mean(axis=0)
@@ -129,7 +130,7 @@ def _analyse(data: TestData) -> Result:
             Column("stuck", "Time stuck", "", "percent"),
             *(
                 (Column("repeats", "Repeats"), Column("spread", "Spread (1σ)", "rad", "mrad"))
-                if any(row["repeats"] > 1 for row in rows)
+                if any(len(group) > 1 for group in groups.values())
                 else ()
             ),
         ),
@@ -157,7 +158,7 @@ def _reductions(findings: list[Finding]) -> Iterator[Finding]:
 
 
 def _figures(
-    data: TestData, firsts: list[TrialData], paths: tuple[str, ...], rows: list[dict[str, object]]
+    data: TestData, firsts: list[TrialData], paths: tuple[str, ...], rows: list[dict[str, Value]]
 ) -> Iterator[Figure]:
     shown = _one_per_method(firsts)
     if shown:
@@ -290,7 +291,7 @@ def _torque_figure(shown: dict[str, TrialData]) -> Figure:
     )
 
 
-def _sweep_figure(path: str, rows: list[dict[str, object]]) -> Figure:
+def _sweep_figure(path: str, rows: list[dict[str, Value]]) -> Figure:
     methods: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
         value, error = row.get(path), row["error"]

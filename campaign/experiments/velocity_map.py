@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from campaign.experiments.common import failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
@@ -192,7 +192,7 @@ def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
 
 @dataclass(frozen=True)
 class MapPoint:
-    """One point of the map: signed, SI. `spread`: standard deviation of the torque in the window."""
+    """One point of the map: signed, SI. `spread`: the torque's 1 sigma in the window."""
 
     speed: float
     rate: float
@@ -244,7 +244,7 @@ def _analyse(data: TestData) -> Result:
     figures: list[Figure] = []
     findings: list[Finding] = []
     notes: list[str] = list(failures_note(data))
-    maps: list[tuple[Mapping[str, object], list[MapPoint]]] = []
+    maps: list[tuple[dict[str, JsonValue], list[MapPoint]]] = []
     for group in grouped(data.completed(), own=("speed",)).values():
         place = {k: v for k, v in group[0].trial.point.items() if k != "speed"}
         maps.append((place, [point for item in group for point in _points(item)]))
@@ -272,7 +272,9 @@ def _nominal(fits: Mapping[str, DirectionFit], parameter: str, fixed: bool) -> f
     return float(np.mean([(f.fixed if fixed else f.free).values[parameter] for f in fits.values()]))
 
 
-def _findings(fits: Mapping[str, DirectionFit], place: Mapping[str, object]) -> Iterator[Finding]:
+def _findings(
+    fits: Mapping[str, DirectionFit], place: Mapping[str, JsonValue]
+) -> Iterator[Finding]:
     told = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
     for fixed in (False, True):
         for parameter in PARAMETERS:

@@ -55,11 +55,26 @@ class MotorOptions(Options):
     """L: armature inductance."""
 
 
+class PreloadOptions(Options):
+    """The preload of the anti-backlash gear, told by the breakaway torque it leads to."""
+
+    torque: Torque = Field(gt=0)
+    """Breakaway torque of the axis as the gear is preloaded now."""
+    nominal: Torque = Field(gt=0)
+    """Breakaway torque that the friction parameters of this bench belong to."""
+    static_share: float = Field(default=1.0, ge=0, le=2)
+    """Share of the difference that static friction gains."""
+    coulomb_share: float = Field(default=0.0, ge=0, le=2)
+    """Share of the difference that Coulomb friction gains."""
+
+
 class GearOptions(Options):
     """The gear between motor and load."""
 
     ratio: float = Field(gt=0)
     """N: motor rate over load rate."""
+    preload: PreloadOptions | None = None
+    """Its anti-backlash preload; absent: the friction parameters say it all."""
 
 
 class IdealRateController(Options):
@@ -141,6 +156,8 @@ class ControllerOptions(Options):
     """From a sample to the current command that answers it, rounded up to whole samples."""
     relative_rate_filter: Time = Field(default=0.0, ge=0)
     """Time constant of the first-order low-pass of the relative rate that compensation uses."""
+    pointing_high_pass: Frequency = Field(default=0.0, ge=0)
+    """Corner of the first-order high-pass that the pointing error is seen through; 0 for none."""
 
 
 class RateSensor(Options):
@@ -176,6 +193,20 @@ class CurrentSensor(Options):
     """Age of a reading, rounded to whole controller samples."""
 
 
+class AppendageOptions(Options):
+    """An elastic part of the load: an inertia on a spring, seen by the gyro only through the load.
+
+    It puts an antiresonance at its own frequency and a resonance just above into the open loop.
+    """
+
+    inertia: Inertia = Field(gt=0)
+    """Its moment of inertia, a part of the axis' inertia."""
+    frequency: Frequency = Field(gt=0)
+    """Its natural frequency when the load is held still."""
+    damping_ratio: float = Field(ge=0, le=2)
+    """Its damping ratio when the load is held still."""
+
+
 class SensorsOptions(Options):
     """What the controller sees. A continuous controller sees everything exactly."""
 
@@ -187,6 +218,27 @@ class SensorsOptions(Options):
     """Angle of the motor shaft relative to the hull (motor side: N times the load's)."""
     current: CurrentSensor = CurrentSensor()
     """Motor current."""
+
+
+class VariationOptions(Options):
+    """How the friction of a simulated bench scatters: relative standard deviations."""
+
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Of all draws."""
+    day: int = Field(default=0, ge=0, lt=2**31)
+    """Which day it is: each has its own friction; on day 0 it is exactly as described."""
+    coulomb_torque: float = Field(default=0.0, ge=0, le=0.3)
+    """Of Tc, from day to day."""
+    static_torque: float = Field(default=0.0, ge=0, le=0.3)
+    """Of Ts, from day to day."""
+    stribeck_velocity: float = Field(default=0.0, ge=0, le=0.3)
+    """Of vs, from day to day."""
+    viscous_friction: float = Field(default=0.0, ge=0, le=0.3)
+    """Of sigma2, from day to day."""
+    bristle_stiffness: float = Field(default=0.0, ge=0, le=0.3)
+    """Of sigma0, from day to day."""
+    trial: float = Field(default=0.0, ge=0, le=0.3)
+    """Of all torques, from trial to trial."""
 
 
 class LimitsOptions(Options):
@@ -219,12 +271,16 @@ class Bench(Options):
     """Published cells it was fitted to, `table/row/column` or `table`: those are `calibrated`."""
     axis: AxisOptions
     """The stabilized axis."""
+    appendage: AppendageOptions | None = None
+    """An elastic part of the load; absent: it is rigid."""
     motor: MotorOptions
     """The servo motor."""
     gear: GearOptions
     """The gear."""
     friction: dict[str, FrictionField] = Field(min_length=0, max_length=8)
     """The true friction, by interface (`load`, `motor` ...)."""
+    variation: VariationOptions | None = None
+    """How the friction of a simulated bench scatters; absent: it is always the same."""
     controller: ControllerOptions
     """The loops."""
     sensors: SensorsOptions = SensorsOptions()

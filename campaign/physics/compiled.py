@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import config
 
+_CONFIG: Any = numba.config
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -49,18 +49,23 @@ def digest_of_sources(folder: Path) -> str:
 @contextmanager
 def _cached_here() -> Iterator[None]:
     """Numba chooses the cache folder when it decorates; other packages keep their own."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = before or str(cache_folder())
+    before = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = before or str(cache_folder())
     try:
         yield
     finally:
-        config.CACHE_DIR = before
+        _CONFIG.CACHE_DIR = before
 
 
 def compiled(function: F) -> F:
     """Decorator: compile at the first call, keep on disk, release the GIL while running."""
     with _cached_here():
         return cast(F, numba.njit(cache=True, nogil=True)(function))
+
+
+def inlined(function: F) -> F:
+    """Decorator: a part of the engine's loop, pasted into its caller so that it costs no call."""
+    return cast(F, numba.njit(inline="always")(function))
 
 
 def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:

@@ -1,9 +1,9 @@
 """The engine: advances loop, friction and controller step by step in compiled code.
 
-Scheme: everything linear is exact (`campaign.physics.loop.discretise`). Each friction model is asked
-once per step for its torque as a straight line over the step, from the relative rate at the start
-and the rate expected at the end; that line is then an input of the linear part. The result is of
-second order in the step for friction with a state, and stable for any bristle stiffness.
+Scheme: everything linear is exact (`campaign.physics.loop.discretise`). Each friction model is
+asked once per step for its torque as a straight line over the step, from the relative rate at the
+start and the rate expected at the end; that line is then an input of the linear part. The result
+is of second order in the step for friction with a state, and stable for any bristle stiffness.
 
 The engine knows no friction model, compensation or controller form by name. It is compiled once:
 friction models come as addresses of compiled step functions, everything else as numbers.
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.compiled import compiled
+from campaign.physics.compiled import compiled, inlined
 from campaign.physics.step_function import call_step
 
 Array = NDArray[np.float64]
@@ -54,12 +54,15 @@ class Elements(NamedTuple):
     address: NDArray[np.uintp]  # (k,) compiled step functions
     parameters: Array  # (k, p)
     state: Array  # (k, s) advanced in place
+    parameters_at: NDArray[np.uintp]  # (k,) where each row of `parameters` begins
+    state_at: NDArray[np.uintp]  # (k,) where each row of `state` begins
     torque: Array  # (k,) what one N m counts at the load, gain included
     rate: Array  # (k,) model's rate per relative rate of the load
     viscous: Array  # (k,) the linear part (N m s/rad at the load), gain included
     motor_side: NDArray[np.bool_]  # (k,) reads the resolver rather than the encoder
     last: Array  # (k,) torque at the end of the last step; in place
     stateless: NDArray[np.bool_]  # (k,)
+    ripple: Array  # (k, 3) amplitude, periods, phase: torque over the angle of the load
 
 
 class Controller(NamedTuple):
@@ -73,6 +76,7 @@ class Controller(NamedTuple):
     torque_per_current: float  # N m/A
     ratio: float  # N
     filter_pole: float  # of the relative-rate low-pass, 0 for none
+    pointing_pole: float  # of the pointing error's high-pass, 1 for none
     resolution: Array  # (4,) of the sensors, 0 for none
     delay: NDArray[np.int64]  # (4,) samples
     output_delay: int  # samples
@@ -106,118 +110,161 @@ def advance(
     memory: Memory,
     command: Array,
     base_rate: Array,
+    disturbance: Array,
     noise: Array,
     every: int,
     out: Array,
 ) -> None:
     """Advance over one block and record every `every`-th step.
 
-    command, base_rate: (steps + 1,) at the step grid.   noise: (samples, 4), in sensor units.
+    command, base_rate, disturbance: (steps + 1,) at the step grid.
+    noise: (samples, 4), in sensor units.
     out: (8, steps / every), rows as OUTPUTS; the sample at the start of each `every` steps.
     """
     n = system.f.shape[0]
-    x = memory.x
     new = np.empty(n)
-    u = np.zeros(4)
-    line = np.zeros(2)
+    u, du, line = np.zeros(4), np.zeros(4), np.zeros(2)
+    ask, rub = np.zeros(3), np.zeros(3)  # mean, change over the step, value at its start
     sampled = controller.every > 0
     samples = 0
-    # Relative rate that compensation sees at the end of a step, per constant torque over it.
-    seen_per_friction, seen_per_compensation = 0.0, 0.0
-    for i in range(n):
-        seen_per_friction += system.relative_x[i] * system.g[i, 2]
-        seen_per_compensation += system.relative_x[i] * system.g[i, 3]
     for k in range(command.shape[0] - 1):
-        if sampled and memory.counters[0] % controller.every == 0:
+        if not sampled:
+            u[0] = command[k]
+            du[0] = command[k + 1] - command[k]
+        elif memory.counters[0] % controller.every == 0:
             u[0] = _sample(controller, compensation, memory, command[k], noise[samples], line)
             samples += 1
         memory.counters[0] += 1
         u[1] = base_rate[k]
-        du0 = 0.0
-        if not sampled:
-            u[0] = command[k]
-            du0 = command[k + 1] - command[k]
-        du1 = base_rate[k + 1] - base_rate[k]
+        du[1] = base_rate[k + 1] - base_rate[k]
+        # A disturbance drives the load forwards, friction holds it back: the same input, negative.
+        u[2] = -disturbance[k]
+        du[2] = disturbance[k] - disturbance[k + 1]
+        _step_linear(system, memory.x, u, du, new)
 
-        # The step without friction and friction-model compensation.
-        for i in range(n):
-            total = system.g[i, 0] * u[0] + system.h[i, 0] * du0
-            total += system.g[i, 1] * u[1] + system.h[i, 1] * du1
-            for j in range(n):
-                total += system.f[i, j] * x[j]
-            new[i] = total
-
-        compensation_mean, compensation_change = 0.0, 0.0
         seen = 0.0
         if not sampled:
-            seen = system.relative_u[1] * u[1]
-            expected = system.relative_u[1] * base_rate[k + 1]
-            for i in range(n):
-                seen += system.relative_x[i] * x[i]
-                expected += system.relative_x[i] * new[i]
-            for e in range(friction.last.shape[0]):
-                expected += seen_per_friction * friction.last[e]
-            for e in range(compensation.last.shape[0]):
-                expected += seen_per_compensation * compensation.last[e]
-            for e in range(compensation.last.shape[0]):
-                _ask(compensation, e, seen, expected, system.step, 0.0, line)
-                compensation_mean += line[0]
-                compensation_change += line[1]
-
-        # Friction: what rate to expect at the end if its torque stayed as it is.
-        v0 = x[0] - u[1]
-        v1 = new[0] - base_rate[k + 1]
-        v1 += system.g[0, 3] * (compensation_mean - 0.5 * compensation_change)
-        v1 += system.h[0, 3] * compensation_change
-        compliance = -system.g[0, 2]
-        for e in range(friction.last.shape[0]):
-            v1 -= compliance * friction.last[e]
-        friction_mean, friction_change = 0.0, 0.0
-        friction_now = 0.0
-        for e in range(friction.last.shape[0]):
-            _ask(friction, e, v0, v1, system.step, compliance, line)
-            if friction.stateless[e]:
-                # What one dry friction takes is no longer there for the next to stop.
-                v1 -= compliance * line[0]
-                friction.last[e] = 0.0
-            friction_mean += line[0]
-            friction_change += line[1]
-            friction_now += line[0] - 0.5 * line[1] + friction.viscous[e] * v0
+            seen = _compensate(system, friction, compensation, memory.x, new, u, du, line, ask)
+        _rub(system, friction, memory.x, new, base_rate[k], base_rate[k + 1], ask, line, rub)
 
         if (memory.counters[0] - 1) % every == 0:
-            column = k // every
-            _record(out[:, column], system, controller, memory, u, seen)
-            if not sampled:
-                now = compensation_mean - 0.5 * compensation_change
-                for e in range(compensation.last.shape[0]):
-                    now += compensation.viscous[e] * seen
-                out[5, column] += now
-            out[6, column] = friction_now
-
-        friction_start = friction_mean - 0.5 * friction_change
-        compensation_start = compensation_mean - 0.5 * compensation_change
+            column = out[:, k // every]
+            _record(column, system, controller, memory, u, seen)
+            column[5] += ask[2]
+            column[6] = rub[2]
+        rub_start, ask_start = rub[0] - 0.5 * rub[1], ask[0] - 0.5 * ask[1]
         for i in range(n):
-            x[i] = (
+            memory.x[i] = (
                 new[i]
-                + system.g[i, 2] * friction_start
-                + system.h[i, 2] * friction_change
-                + system.g[i, 3] * compensation_start
-                + system.h[i, 3] * compensation_change
+                + system.g[i, 2] * rub_start
+                + system.h[i, 2] * rub[1]
+                + system.g[i, 3] * ask_start
+                + system.h[i, 3] * ask[1]
             )
 
 
-@compiled
+@inlined
+def _step_linear(system: System, x: Array, u: Array, du: Array, new: Array) -> None:
+    """The step without friction and without friction-model compensation."""
+    n = x.shape[0]
+    for i in range(n):
+        total = 0.0
+        for j in range(3):
+            total += system.g[i, j] * u[j] + system.h[i, j] * du[j]
+        for j in range(n):
+            total += system.f[i, j] * x[j]
+        new[i] = total
+
+
+@inlined
+def _compensate(
+    system: System,
+    friction: Elements,
+    compensation: Elements,
+    x: Array,
+    new: Array,
+    u: Array,
+    du: Array,
+    line: Array,
+    ask: Array,
+) -> float:
+    """Ask continuous compensation for its torque; return the relative rate it sees now."""
+    seen = system.relative_u[1] * u[1]
+    expected = system.relative_u[1] * (u[1] + du[1])
+    per_friction, per_compensation = 0.0, 0.0
+    for i in range(x.shape[0]):
+        seen += system.relative_x[i] * x[i]
+        expected += system.relative_x[i] * new[i]
+        per_friction += system.relative_x[i] * system.g[i, 2]
+        per_compensation += system.relative_x[i] * system.g[i, 3]
+    # What it expects to see at the end of the step if all torques stay as they are.
+    for e in range(friction.last.shape[0]):
+        expected += per_friction * friction.last[e]
+    for e in range(compensation.last.shape[0]):
+        expected += per_compensation * compensation.last[e]
+    ask[:] = 0.0
+    for e in range(compensation.last.shape[0]):
+        _ask(compensation, e, x[2], seen, expected, system.step, 0.0, line)
+        ask[0] += line[0]
+        ask[1] += line[1]
+        ask[2] += line[0] - 0.5 * line[1] + compensation.viscous[e] * seen
+    return float(seen)
+
+
+@inlined
+def _rub(
+    system: System,
+    friction: Elements,
+    x: Array,
+    new: Array,
+    base_before: float,
+    base_after: float,
+    ask: Array,
+    line: Array,
+    rub: Array,
+) -> None:
+    """Ask friction for its torque, from the rate expected if its torque stays as it is."""
+    v0 = x[0] - base_before
+    v1 = new[0] - base_after
+    v1 += system.g[0, 3] * (ask[0] - 0.5 * ask[1]) + system.h[0, 3] * ask[1]
+    compliance = -system.g[0, 2]
+    for e in range(friction.last.shape[0]):
+        v1 -= compliance * friction.last[e]
+    rub[:] = 0.0
+    for e in range(friction.last.shape[0]):
+        _ask(friction, e, x[2], v0, v1, system.step, compliance, line)
+        if friction.stateless[e]:
+            # What one dry friction takes is no longer there for the next to stop.
+            v1 -= compliance * line[0]
+            friction.last[e] = 0.0
+        rub[0] += line[0]
+        rub[1] += line[1]
+        rub[2] += line[0] - 0.5 * line[1] + friction.viscous[e] * v0
+
+
+@inlined
 def _ask(
-    elements: Elements, e: int, v0: float, v1: float, step: float, compliance: float, line: Array
+    elements: Elements,
+    e: int,
+    angle: float,
+    v0: float,
+    v1: float,
+    step: float,
+    compliance: float,
+    line: Array,
 ) -> None:
     """Torque line of one element at the load; also kept as its last torque."""
     torque, rate = elements.torque[e], elements.rate[e]
+    if elements.ripple[e, 0] != 0.0:
+        torque *= 1.0 + elements.ripple[e, 0] * np.sin(
+            elements.ripple[e, 1] * angle + elements.ripple[e, 2]
+        )
     line[0] = 0.0
     line[1] = 0.0
     call_step(
         elements.address[e],
-        elements.parameters[e].ctypes.data,
-        elements.state[e].ctypes.data,
+        elements.parameters_at[e],
+        elements.state_at[e],
         v0 * rate,
         v1 * rate,
         step,
@@ -291,6 +338,7 @@ def _sample(
     own[2] = pole * own[2] + (1.0 - pole) * (resolver - own[4]) / controller.period
     own[3], own[4] = encoder, resolver
     if sample > 0:
+        own[5] *= controller.pointing_pole
         own[5] += 0.5 * controller.period * (own[6] + gyro)
     own[6], own[7], own[9] = gyro, current, encoder
 
@@ -304,7 +352,7 @@ def _sample(
         before, now = before_load, own[1]
         if compensation.motor_side[e]:
             before, now = before_motor, own[2]
-        _ask(compensation, e, before, now, controller.period, 0.0, line)
+        _ask(compensation, e, encoder, before, now, controller.period, 0.0, line)
         torque += compensation.last[e] + compensation.viscous[e] * now
     own[8] = torque
 
@@ -336,3 +384,41 @@ def _linear(
         new[i] = total
     state[:] = new
     return torque
+
+
+@compiled
+def drive(
+    friction: Elements,
+    compensation: Elements,
+    memory: Memory,
+    rate: Array,
+    step: float,
+    every: int,
+    out: Array,
+) -> None:
+    """Move friction and compensation at a prescribed relative rate, without plant or motor.
+
+    rate: (steps + 1,) rad/s at the step grid.   out: (8, steps / every), rows as OUTPUTS; both
+    rates are the prescribed one and there is no current.
+    """
+    line = np.zeros(2)
+    for k in range(rate.shape[0] - 1):
+        angle = memory.x[0]
+        friction_now, compensation_now = 0.0, 0.0
+        for e in range(friction.last.shape[0]):
+            _ask(friction, e, angle, rate[k], rate[k + 1], step, 0.0, line)
+            friction_now += line[0] - 0.5 * line[1] + friction.viscous[e] * rate[k]
+        for e in range(compensation.last.shape[0]):
+            _ask(compensation, e, angle, rate[k], rate[k + 1], step, 0.0, line)
+            compensation_now += line[0] - 0.5 * line[1] + compensation.viscous[e] * rate[k]
+        if k % every == 0:
+            column = k // every
+            out[:, column] = 0.0
+            out[0, column] = rate[k]
+            out[1, column] = rate[k]
+            out[2, column] = angle
+            out[4, column] = angle
+            out[5, column] = compensation_now
+            out[6, column] = friction_now
+            out[7, column] = rate[k]
+        memory.x[0] += 0.5 * step * (rate[k] + rate[k + 1])

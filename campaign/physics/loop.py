@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.bench import Bench
+from campaign.physics.bench import AppendageOptions, Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import Compensator, LinearBlock
 from campaign.physics.friction import friction_models
@@ -29,7 +29,8 @@ from campaign.physics.friction.interface import FrictionOptions
 
 Array = NDArray[np.float64]
 
-# States that every loop has, in this order; the continuous controller's own follow.
+# States that every loop has, in this order; the appendage's two and the continuous controller's
+# own follow.
 RATE, ANGLE, RELATIVE_ANGLE, CURRENT, CURRENT_INTEGRAL = range(5)
 # Inputs. DRIVE is the commanded rate or torque, or, with a sampled controller, the current.
 DRIVE, BASE_RATE, FRICTION, COMPENSATION = range(4)
@@ -78,12 +79,13 @@ def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
 
 
 def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compensator) -> Loop:
-    """The loop with a continuous controller."""
+    """The loop with a continuous controller, closed on the rate or open for a torque command."""
     block = compensator.linear
     order = 0 if block is None else len(block.c)
     filtered = bench.controller.relative_rate_filter > 0.0
-    rate_integral, filter_state = 5, 6
-    first = 6 + filtered
+    rate_integral = _plant_order(bench)
+    filter_state = rate_integral + 1
+    first = filter_state + filtered
     a, b = _plant(bench, first + order)
     filter_x, filter_u = np.zeros(len(a)), np.zeros(4)
     if filtered:
@@ -122,31 +124,66 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
     return Loop(a, b, (filter_x, filter_u), (torque_x, torque_u))
 
 
+def make_spring(bench: Bench, stiffness: float) -> Loop:
+    """The load without its motor, pulled through a spring; DRIVE is the far end's angle (rad)."""
+    order = _plant_order(bench)
+    a, b = _plant(bench, order)
+    a[RATE, CURRENT] = 0.0
+    inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
+    a[RATE, RELATIVE_ANGLE] -= stiffness / inertia
+    b[RATE, DRIVE] += stiffness / inertia
+    relative_x, relative_u = np.zeros(order), np.zeros(4)
+    relative_x[RATE], relative_u[BASE_RATE] = 1.0, -1.0
+    return Loop(a, b, (relative_x, relative_u), (np.zeros(order), np.zeros(4)))
+
+
 def make_plant(bench: Bench) -> Loop:
     """The axis with its current loop; DRIVE is the commanded current that a controller holds."""
-    a, b = _plant(bench, 5)
+    order = _plant_order(bench)
+    a, b = _plant(bench, order)
     command_u = np.zeros(4)
     command_u[DRIVE] = 1.0
-    _close_current_loop(a, b, bench, np.zeros(5), command_u)
-    relative_x, relative_u = np.zeros(5), np.zeros(4)
+    _close_current_loop(a, b, bench, np.zeros(order), command_u)
+    relative_x, relative_u = np.zeros(order), np.zeros(4)
     relative_x[RATE], relative_u[BASE_RATE] = 1.0, -1.0
-    return Loop(a, b, (relative_x, relative_u), (np.zeros(5), np.zeros(4)))
+    return Loop(a, b, (relative_x, relative_u), (np.zeros(order), np.zeros(4)))
+
+
+def _plant_order(bench: Bench) -> int:
+    return 5 if bench.appendage is None else 7
 
 
 def _plant(bench: Bench, size: int) -> tuple[Array, Array]:
     a, b = np.zeros((size, size)), np.zeros((size, 4))
     inertia, motor = bench.axis.inertia, bench.motor
+    if bench.appendage is not None:
+        inertia -= bench.appendage.inertia
+        _add_appendage(a, bench.appendage, inertia)
     viscous = sum(viscous_at_load(friction, bench) for friction in bench.friction.values())
-    a[RATE, RATE] = -viscous / inertia
+    a[RATE, RATE] -= viscous / inertia
     a[RATE, CURRENT] = bench.torque_per_current / inertia
     b[RATE, BASE_RATE] = viscous / inertia
     b[RATE, FRICTION] = -1.0 / inertia
     a[ANGLE, RATE] = 1.0
+    a[ANGLE, ANGLE] = -2.0 * np.pi * bench.controller.pointing_high_pass
     a[RELATIVE_ANGLE, RATE], b[RELATIVE_ANGLE, BASE_RATE] = 1.0, -1.0
     back_emf = motor.back_emf_constant * bench.gear.ratio / motor.inductance
     a[CURRENT, CURRENT] = -motor.resistance / motor.inductance
     a[CURRENT, RATE], b[CURRENT, BASE_RATE] = -back_emf, back_emf
     return a, b
+
+
+def _add_appendage(a: Array, appendage: AppendageOptions, body: float) -> None:
+    """States 5, 6: deflection and rate of the appendage, elastically hung on the load."""
+    omega = 2.0 * np.pi * appendage.frequency
+    stiffness = omega**2 * appendage.inertia
+    damping = 2.0 * appendage.damping_ratio * omega * appendage.inertia
+    deflection, rate = 5, 6
+    a[deflection, rate], a[deflection, RATE] = 1.0, -1.0
+    for row, share in ((rate, -1.0 / appendage.inertia), (RATE, 1.0 / body)):
+        a[row, deflection] += share * stiffness
+        a[row, rate] += share * damping
+        a[row, RATE] -= share * damping
 
 
 def _close_current_loop(

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import AngleSensor, Bench, CurrentSensor, RateSensor
 from campaign.physics.compensation.interface import Compensator
-from campaign.physics.engine import Controller, Elements, Memory, System, advance
+from campaign.physics.engine import Controller, Elements, Memory, System, advance, drive
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionOptions
-from campaign.physics.step_function import address_of
 from campaign.physics.loop import (
     Array,
+    Loop,
     at_load,
     discretise,
     make_compensator,
     make_loop,
     make_plant,
+    make_spring,
     viscous_at_load,
 )
+from campaign.physics.step_function import address_of
+from campaign.physics.variation import as_it_is
 from campaign.signals import Sine
 from campaign.trial import Task
 
@@ -56,12 +60,12 @@ def make_grid(bench: Bench, task: Task, longest_step: float = LONGEST_STEP) -> G
 
     Raises ValueError when the recording's rate and the controller's do not divide each other.
     """
-    for signal in (task.command, task.base_acceleration):
+    for signal in (task.command, task.base_acceleration, task.disturbance):
         if isinstance(signal, Sine):
             longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * signal.frequency))
     samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
     control_rate = bench.controller.sample_rate
-    if control_rate is None:
+    if control_rate is None or task.mode in ("prescribed", "spring"):
         every = max(1, math.ceil(1.0 / (task.sample_rate * longest_step) - 1e-9))
         return Grid(1.0 / (task.sample_rate * every), every, 0, samples)
     per_record = control_rate / task.sample_rate
@@ -79,40 +83,70 @@ def simulate(
     bench: Bench, task: Task, seed: int, longest_step: float = LONGEST_STEP
 ) -> Iterator[tuple[Array, Array]]:
     """Blocks of (time (n,), outputs (8, n) with rows as `engine.OUTPUTS`) until the task ends."""
+    bench = as_it_is(bench, seed)
     grid = make_grid(bench, task, longest_step)
     compensator = make_compensator(bench, task.compensation)
-    continuous = grid.per_control == 0
-    loop = make_loop(bench, task.mode, compensator) if continuous else make_plant(bench)
-    f, g, h = discretise(loop.a, loop.b, grid.step)
-    system = System(f, g, h, *loop.relative_rate, *loop.linear_compensation, grid.step)
     friction = _elements([(item, 1.0) for item in bench.friction.values()], bench)
     compensation = _elements(compensator.friction, bench)
+    samples_per_block = max(1, BLOCK_STEPS // grid.every)
+    advance_block = _advancer(bench, task, compensator, grid, friction, compensation, seed)
+    for first in range(0, grid.samples, samples_per_block):
+        count = min(samples_per_block, grid.samples - first)
+        at: Array = (first * grid.every + np.arange(count * grid.every + 1.0)) * grid.step
+        out = np.empty((8, count))
+        advance_block(at, out)
+        yield at[: -1 : grid.every], out
+
+
+def _advancer(
+    bench: Bench,
+    task: Task,
+    compensator: Compensator,
+    grid: Grid,
+    friction: Elements,
+    compensation: Elements,
+    seed: int,
+) -> Callable[[Array, Array], None]:
+    """What advances over the step grid `at` (steps + 1,) and fills `out`; it keeps the state."""
+    loop = _loop(bench, task, compensator, grid)
+    f, g, h = discretise(loop.a, loop.b, grid.step)
+    system = System(f, g, h, *loop.relative_rate, *loop.linear_compensation, grid.step)
     controller = _controller(bench, task, compensator, grid)
     memory = _memory(len(f), controller)
-    memory.x[2] = task.start_angle
     random = np.random.Generator(np.random.PCG64(seed))
     sigmas = np.array([sensor.noise for sensor in _sensors(bench)])
 
-    samples_per_block = max(1, BLOCK_STEPS // grid.every)
-    for first in range(0, grid.samples, samples_per_block):
-        count = min(samples_per_block, grid.samples - first)
-        at = (first * grid.every + np.arange(count * grid.every + 1)) * grid.step
-        readings = 0 if continuous else count * grid.every // grid.per_control
-        noise = random.standard_normal((max(readings, 1), 4)) * sigmas
-        out = np.empty((8, count))
+    if task.mode == "prescribed":
+        memory.x[0] = task.start_angle
+
+        def prescribe(at: Array, out: Array) -> None:
+            rate = task.command.sample(at)
+            drive(friction, compensation, memory, rate, grid.step, grid.every, out)
+
+        return prescribe
+
+    memory.x[2] = task.start_angle
+
+    def simulate_block(at: Array, out: Array) -> None:
+        readings = (len(at) - 1) // grid.per_control if grid.per_control else 1
+        noise = random.standard_normal((readings, 4)) * sigmas
+        command, base = task.command.sample(at), base_rate(task.base_acceleration, at)
+        disturbance = task.disturbance.sample(at)
         advance(
-            system,
-            friction,
-            compensation,
-            controller,
-            memory,
-            task.command.sample(at),
-            base_rate(task.base_acceleration, at),
-            noise,
-            grid.every,
-            out,
-        )
-        yield at[: -1 : grid.every], out
+            system, friction, compensation, controller, memory,
+            command, base, disturbance, noise, grid.every, out,
+        )  # fmt: skip
+
+    return simulate_block
+
+
+def _loop(bench: Bench, task: Task, compensator: Compensator, grid: Grid) -> Loop:
+    match task.mode:
+        case "spring":
+            return make_spring(bench, task.spring_stiffness)
+        case "rate" | "torque" if grid.per_control == 0:
+            return make_loop(bench, task.mode, compensator)
+    return make_plant(bench)
 
 
 def _elements(items: Sequence[tuple[FrictionOptions, float]], bench: Bench) -> Elements:
@@ -121,18 +155,29 @@ def _elements(items: Sequence[tuple[FrictionOptions, float]], bench: Bench) -> E
     parameters = np.zeros((len(items), max((len(row) for row in rows), default=1)))
     for row, values in zip(parameters, rows, strict=True):
         row[: len(values)] = values
+    state = np.zeros((len(items), max((m.state_size for m in models), default=0) or 1))
     sides = [at_load(options, bench) for options, _ in items]
     return Elements(
         address=np.array([address_of(model.step) for model in models], dtype=np.uintp),
         parameters=parameters,
-        state=np.zeros((len(items), max((m.state_size for m in models), default=0) or 1)),
+        state=state,
+        parameters_at=_row_addresses(parameters),
+        state_at=_row_addresses(state),
         torque=np.array([t * gain for (t, _), (_, gain) in zip(sides, items, strict=True)]),
         rate=np.array([rate for _, rate in sides]),
         viscous=np.array([gain * viscous_at_load(o, bench) for o, gain in items]),
         motor_side=np.array([o.side == "motor" for o, _ in items], dtype=np.bool_),
         last=np.zeros(len(items)),
         stateless=np.array([model.state_size == 0 for model in models], dtype=np.bool_),
+        ripple=np.array(
+            [(o.ripple.amplitude, o.ripple.periods, o.ripple.phase) for o, _ in items]
+        ).reshape(-1, 3),
     )
+
+
+def _row_addresses(rows: Array) -> NDArray[np.uintp]:
+    """Where each row of a C-ordered array begins in memory, shape (rows,)."""
+    return rows.ctypes.data + np.arange(len(rows), dtype=np.uintp) * np.uintp(rows.strides[0])
 
 
 def _sensors(bench: Bench) -> tuple[RateSensor, AngleSensor, AngleSensor, CurrentSensor]:
@@ -160,6 +205,7 @@ def _controller(bench: Bench, task: Task, compensator: Compensator, grid: Grid) 
         torque_per_current=bench.torque_per_current,
         ratio=bench.gear.ratio,
         filter_pole=math.exp(-period / low_pass) if low_pass > 0.0 else 0.0,
+        pointing_pole=math.exp(-2.0 * math.pi * gains.pointing_high_pass * period),
         resolution=np.array([sensor.resolution for sensor in sensors]),
         delay=np.array([round(sensor.delay / period) for sensor in sensors], dtype=np.int64),
         output_delay=math.ceil(gains.delay / period - 1e-9) if gains.sample_rate else 0,

@@ -8,10 +8,23 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from campaign.options import Options
+from campaign.units import Angle
 
 Array = NDArray[np.float64]
+
+
+class Ripple(Options):
+    """Friction over position: every torque times 1 + amplitude sin(periods q + phase)."""
+
+    amplitude: float = Field(default=0.0, ge=0, lt=1)
+    """Share of the torque."""
+    periods: float = Field(default=1.0, gt=0, le=10_000)
+    """Periods per revolution of the load."""
+    phase: Angle = 0.0
+    """Phase at zero angle, of the load's angle times periods."""
 
 
 class FrictionOptions(Options):
@@ -21,6 +34,10 @@ class FrictionOptions(Options):
     """Where it acts: a motor-side torque counts N times at the load."""
     velocity: Literal["load", "motor"] = "load"
     """Which relative rate drives it: the load's, or the motor's (N times the load's)."""
+    preloaded: bool = True
+    """Whether the preload of the anti-backlash gear acts on this interface."""
+    ripple: Ripple = Ripple()
+    """How the torque varies with the angle of the load."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,12 @@ import numpy as np
 from pydantic import Field
 
 from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
-from campaign.physics.friction.stribeck import stribeck_curve
+from campaign.physics.friction.stribeck import (
+    NegativeDirection,
+    curve_parameters,
+    mean_viscous,
+    steady_state,
+)
 from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, Torque
 
 
@@ -34,6 +39,8 @@ class LuGreOptions(FrictionOptions):
     """delta: shape of that fall."""
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
+    negative: NegativeDirection = NegativeDirection()
+    """What differs in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: slope of torque over angle at the onset of presliding."""
     bristle_damping: RotationalDamping = Field(default=0.0, ge=0)
@@ -42,14 +49,7 @@ class LuGreOptions(FrictionOptions):
 
 def _parameters(options: LuGreOptions) -> Array:
     return np.array(
-        [
-            options.coulomb_torque,
-            options.static_torque,
-            options.stribeck_velocity,
-            options.stribeck_exponent,
-            options.bristle_stiffness,
-            options.bristle_damping,
-        ]
+        [*curve_parameters(options), options.bristle_stiffness, options.bristle_damping]
     )
 
 
@@ -57,13 +57,13 @@ def _step(
     parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
 ) -> None:
     """See `campaign.physics.step_function`. state[0] is z (rad)."""
-    coulomb, static, stribeck_velocity = parameters[0], parameters[1], parameters[2]
-    exponent, stiffness, damping = parameters[3], parameters[4], parameters[5]
     v = 0.5 * (v0 + v1)
+    way = 0 if v >= 0.0 else 4
+    coulomb, static = parameters[way], parameters[way + 1]
+    stribeck_velocity, exponent = parameters[way + 2], parameters[way + 3]
+    stiffness, damping = parameters[9], parameters[10]
     # The mean of |v| over a straight line from v0 to v1, exact also where the sign changes.
-    mean_speed = (
-        abs(v) if v0 * v1 >= 0.0 else 0.5 * (v0 * v0 + v1 * v1) / (abs(v0) + abs(v1))
-    )
+    mean_speed = abs(v) if v0 * v1 >= 0.0 else 0.5 * (v0 * v0 + v1 * v1) / (abs(v0) + abs(v1))
     ratio = mean_speed / stribeck_velocity
     fall = math.exp(-ratio * ratio) if exponent == 2.0 else math.exp(-(ratio**exponent))
     s = coulomb + (static - coulomb) * fall
@@ -73,13 +73,8 @@ def _step(
     # z relaxes towards v / rate; (1 - exp(-x)) / x is written so that x -> 0 is exact.
     change = (v - rate * z) * h * (-math.expm1(-x) / x if x > 1e-12 else 1.0)
     state[0] = z + change
-    line[0] = stiffness * (z + 0.5 * change) + damping * change / h
+    line[0] = stiffness * (z + 0.5 * change) + damping * change / h + parameters[8] * mean_speed
     line[1] = stiffness * change
-
-
-def _steady_state(options: LuGreOptions, velocity: Array) -> Array:
-    viscous = options.viscous_friction * velocity
-    return np.asarray(stribeck_curve(options, velocity) * np.sign(velocity) + viscous)
 
 
 FRICTION = FrictionModel(
@@ -89,6 +84,6 @@ FRICTION = FrictionModel(
     parameters=_parameters,
     state_size=1,
     step=_step,
-    viscous=lambda options: options.viscous_friction,
-    steady_state=_steady_state,
+    viscous=mean_viscous,
+    steady_state=steady_state,
 )

@@ -13,8 +13,24 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from campaign.options import Options
 from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
 from campaign.units import AngularRate, RotationalDamping, Torque
+
+
+class NegativeDirection(Options):
+    """What is different when sliding in the negative direction; the rest is as in the positive."""
+
+    coulomb_torque: Torque | None = Field(default=None, gt=0)
+    """Tc in the negative direction."""
+    static_torque: Torque | None = Field(default=None, gt=0)
+    """Ts in the negative direction."""
+    stribeck_velocity: AngularRate | None = Field(default=None, gt=0)
+    """vs in the negative direction."""
+    stribeck_exponent: float | None = Field(default=None, gt=0, le=10)
+    """delta in the negative direction."""
+    viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
+    """sigma2 in the negative direction."""
 
 
 class StribeckOptions(FrictionOptions):
@@ -32,37 +48,80 @@ class StribeckOptions(FrictionOptions):
     """delta: shape of that fall."""
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
+    negative: NegativeDirection = NegativeDirection()
+    """What differs in the negative direction."""
     sign_smoothing: AngularRate = Field(default=0.0, ge=0)
     """Velocity over which sgn(v) is smoothed to tanh(v / this); 0 for a jump."""
 
 
+def in_direction(options: Any, name: str, sign: float) -> float:
+    """A parameter as it is for sliding in the direction of `sign`."""
+    other = getattr(options.negative, name) if sign < 0 else None
+    return float(getattr(options, name) if other is None else other)
+
+
+def curve_parameters(options: Any) -> list[float]:
+    """Tc, Ts, vs, delta forwards, the same backwards, and half the difference of sigma2.
+
+    The mean of sigma2 over both directions belongs to the linear part; the half difference times
+    |v| is what a step function adds.
+    """
+    names = ("coulomb_torque", "static_torque", "stribeck_velocity", "stribeck_exponent")
+    return [
+        *(in_direction(options, name, +1.0) for name in names),
+        *(in_direction(options, name, -1.0) for name in names),
+        0.5
+        * (
+            in_direction(options, "viscous_friction", +1.0)
+            - in_direction(options, "viscous_friction", -1.0)
+        ),
+    ]
+
+
+def mean_viscous(options: Any) -> float:
+    """sigma2 (N m s/rad), the mean of both directions."""
+    return 0.5 * (
+        in_direction(options, "viscous_friction", +1.0)
+        + in_direction(options, "viscous_friction", -1.0)
+    )
+
+
 def stribeck_curve(options: Any, velocity: Array) -> Array:
     """s(v) of Eq. 4.4 (N m), shape (n,): friction of steady sliding, unsigned, without sigma2."""
-    fall = np.exp(-(np.abs(velocity / options.stribeck_velocity) ** options.stribeck_exponent))
-    return np.asarray(
-        options.coulomb_torque + (options.static_torque - options.coulomb_torque) * fall
+    curve = np.empty_like(velocity, dtype=float)
+    for sign in (+1.0, -1.0):
+        here = velocity >= 0 if sign > 0 else velocity < 0
+        coulomb = in_direction(options, "coulomb_torque", sign)
+        drop = in_direction(options, "static_torque", sign) - coulomb
+        speed = np.abs(velocity[here]) / in_direction(options, "stribeck_velocity", sign)
+        fall = np.exp(-(speed ** in_direction(options, "stribeck_exponent", sign)))
+        curve[here] = coulomb + drop * fall
+    return curve
+
+
+def steady_state(options: Any, velocity: Array) -> Array:
+    """Friction torque (N m) of steady sliding at `velocity` (rad/s), shape (n,) (Eq. 4.6)."""
+    viscous = np.where(
+        velocity >= 0,
+        in_direction(options, "viscous_friction", +1.0),
+        in_direction(options, "viscous_friction", -1.0),
     )
+    return np.asarray(stribeck_curve(options, velocity) * np.sign(velocity) + viscous * velocity)
 
 
 def _parameters(options: StribeckOptions) -> Array:
-    return np.array(
-        [
-            options.coulomb_torque,
-            options.static_torque,
-            options.stribeck_velocity,
-            options.stribeck_exponent,
-            options.sign_smoothing,
-        ]
-    )
+    return np.array([*curve_parameters(options), options.sign_smoothing])
 
 
 def _step(
     parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
 ) -> None:
     """See `campaign.physics.step_function`. No state is kept."""
-    coulomb, static, stribeck_velocity = parameters[0], parameters[1], parameters[2]
-    exponent, smoothing = parameters[3], parameters[4]
     v = 0.5 * (v0 + v1)
+    way = 0 if v >= 0.0 else 4
+    coulomb, static = parameters[way], parameters[way + 1]
+    stribeck_velocity, exponent = parameters[way + 2], parameters[way + 3]
+    smoothing = parameters[9]
     speed = abs(v) / stribeck_velocity
     size = coulomb + (static - coulomb) * math.exp(-(speed**exponent))
     if compliance > 0.0:
@@ -76,13 +135,8 @@ def _step(
         torque = size * (v0 + v1) / (abs(v0) + abs(v1))
     else:
         torque = math.copysign(size, v) if v != 0.0 else 0.0
-    line[0] = torque
+    line[0] = torque + parameters[8] * abs(v)
     line[1] = 0.0
-
-
-def _steady_state(options: StribeckOptions, velocity: Array) -> Array:
-    viscous = options.viscous_friction * velocity
-    return np.asarray(stribeck_curve(options, velocity) * np.sign(velocity) + viscous)
 
 
 FRICTION = FrictionModel(
@@ -92,6 +146,6 @@ FRICTION = FrictionModel(
     parameters=_parameters,
     state_size=0,
     step=_step,
-    viscous=lambda options: options.viscous_friction,
-    steady_state=_steady_state,
+    viscous=mean_viscous,
+    steady_state=steady_state,
 )
