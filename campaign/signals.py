@@ -29,7 +29,7 @@ class Zero(Options):
 
 
 class Sine(Options):
-    """amplitude * sin(2 pi frequency t + phase), from t = 0 until `stop`."""
+    """amplitude * sin(2 pi frequency t + phase)."""
 
     shape: Literal["sine"] = "sine"
     amplitude: float

@@ -33,8 +33,10 @@ SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
 SHOWN_CYCLES = 1.5
 """of the base motion in a time history; more cycles only make the reversals smaller."""
-ZOOM_RATE = 0.02
+ZOOM_RATE = 0.12
 """Half height of the zoom on a reversal, as a share of the largest relative rate."""
+ZOOM_SPAN = 0.02
+"""Time before the reversal in the zoom, as a share of the time shown; a little more follows."""
 
 
 class StabilizationOptions(Options):
@@ -210,11 +212,11 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
     hull = Curve(
         reference.time, -reference["base_rate"], "held still in space", "reference", "thin"
     )
-    whole, near = [hull], [hull]
+    curves = [hull]
     for name, cut in cuts.items():
-        curve = Curve(cut.time, cut["relative_rate"], method_label(name), name)
-        whole.append(curve)
-        near.append(curve)
+        curves.append(Curve(cut.time, cut["relative_rate"], method_label(name), name))
+    inside = (reference.time >= zoom[0]) & (reference.time <= zoom[1])
+    near = [Curve(c.x[inside], c.y[inside], c.label, c.series, c.style) for c in curves]
     zoomed_time = Axis("Time", "s", "s", limits=zoom)
     zoomed_rate = Axis(
         RELATIVE_RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
@@ -223,11 +225,12 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
         key="relative-rate",
         title="Rate of the load relative to the hull",
         caption="Where the relative rate passes zero the load sticks to the hull and is carried "
-        "along: the flat part of the zoom on the right. Compensation shortens it.",
+        "along; then it breaks loose. The zoom shows by how much each method leaves the dotted "
+        "line of a load held still in space.",
         alt="Relative rate over time for each compensation method, and a zoom on one reversal "
         "where the uncompensated curve stays at zero the longest.",
         panels=(
-            Panel(TIME, RELATIVE_RATE, whole, "Base motion"),
+            Panel(TIME, RELATIVE_RATE, curves, "Base motion"),
             Panel(zoomed_time, zoomed_rate, near, "At a reversal"),
         ),
         thesis=("5.4", "5.18"),
@@ -241,7 +244,7 @@ def _reversal(recording: Recording) -> tuple[float, float]:
     changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
     span = float(np.ptp(recording.time))
     middle = recording.time[changes[len(changes) // 2]] if len(changes) else span / 2
-    return float(middle - 0.02 * span), float(middle + 0.05 * span)
+    return float(middle - ZOOM_SPAN * span), float(middle + 1.25 * ZOOM_SPAN * span)
 
 
 def _error_figure(shown: dict[str, TrialData]) -> Figure:

@@ -371,17 +371,16 @@ def _fit_figure(fits: Mapping[str, DirectionFit], suffix: str, where: str) -> Fi
     log_rate = Axis("Rate, either direction", "rad/s", "deg/s", scale="log")
     for name, fit in fits.items():
         fine = np.geomspace(fit.rate.min(), fit.rate.max(), 400)
-        delta = fit.free.values["stribeck_exponent"]
         panels.append(
             Panel(
                 log_rate,
                 TORQUE,
                 [
                     Curve(fit.rate, fit.torque, "measured", "measured", "points"),
-                    Curve(fine, stribeck(fine, fit.free.values), f"δ = {delta:.3g} (free)", "fit"),
-                    Curve(fine, stribeck(fine, fit.fixed.values), "δ = 2", "alternative"),
+                    Curve(fine, stribeck(fine, fit.free.values), "fitted, δ free", "fit"),
+                    Curve(fine, stribeck(fine, fit.fixed.values), "fitted, δ = 2", "alternative"),
                 ],
-                f"{name.capitalize()} direction",
+                f"{name.capitalize()} direction, δ = {fit.free.values['stribeck_exponent']:.3g}",
             )
         )
     return Figure(

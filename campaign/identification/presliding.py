@@ -128,7 +128,6 @@ def _fit_window(
     # Evenly in torque: a slow ramp has far more samples than information.
     pick = np.unique(np.linspace(0, len(q) - 1, min(len(q), 400)).astype(int))
     q, t = q[pick], t[pick]
-    # A stick can begin anywhere: the curve's own zero is fitted by starting from the first sample.
     slope = max(float(np.polyfit(q, t, 1)[0]), 1e-6)
     first = max(float((t[3] - t[0]) / max(q[3] - q[0], 1e-12)), slope)
     one = fit(

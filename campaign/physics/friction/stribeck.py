@@ -118,6 +118,10 @@ def _step(
 ) -> None:
     """See `campaign.physics.step_function`. No state is kept."""
     v = 0.5 * (v0 + v1)
+    if compliance > 0.0:
+        # v1 is without this friction: read the curve at the rate that its torque will leave.
+        reach = compliance * (parameters[1] if v1 >= 0.0 else parameters[5])
+        v -= 0.5 * min(max(v1, -reach), reach)
     way = 0 if v >= 0.0 else 4
     coulomb, static = parameters[way], parameters[way + 1]
     stribeck_velocity, exponent = parameters[way + 2], parameters[way + 3]
