@@ -124,12 +124,15 @@ class TrialRequest:
     Attributes:
         point: what distinguishes it within the test, e.g. {"speed": 0.0175}; SI.
         note: what the plan should say about it.
+        bench: a whole normalised bench (SI) to execute it on instead of the test's, for an
+            experiment that varies the bench itself; see `experiments.common.with_changes`.
     """
 
     task: Task
     role: Role = Role.MEASUREMENT
     point: Mapping[str, JsonValue] = field(default_factory=dict)
     note: str = ""
+    bench: Tree | None = None
 
 
 class Outcome(StrEnum):

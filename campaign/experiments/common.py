@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
 
 from campaign.experiments.interface import TestData, TrialData
+from campaign.physics.bench import Bench
 from campaign.result import Value
-from campaign.trial import canonical_json
+from campaign.trial import Tree, canonical_json
 
 METHOD_LABELS = {
     "none": "no compensation",
@@ -60,3 +65,36 @@ def failures_note(data: TestData) -> tuple[str, ...]:
         "the table of failed trials says why."
     )
     return (note,)
+
+
+def with_changes(bench: Bench, changes: Mapping[str, Any]) -> Tree:
+    """The normalised bench with other values (SI) at dotted paths, for `TrialRequest.bench`.
+
+    `with_changes(bench, {"friction.load.coulomb_torque": 30.0})`. Raises ValueError, with a message
+    for the user, for a path the bench does not have and for a value it refuses there.
+    """
+    tree: Tree = bench.model_dump(mode="json")
+    for path, value in changes.items():
+        *above, last = path.split(".")
+        table: Any = tree
+        for key in above:
+            table = table.get(key) if isinstance(table, dict) else None
+        if not isinstance(table, dict) or last not in table:
+            close = difflib.get_close_matches(path, list(_paths(bench.model_dump(mode="json"))), 1)
+            hint = f"; the nearest is '{close[0]}'" if close else ""
+            raise ValueError(f"the bench '{bench.name}' has no '{path}'{hint}")
+        table[last] = value
+    try:
+        return Bench.model_validate(tree, context={"si": True}).model_dump(mode="json")
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(key) for key in first["loc"])
+        message = first["msg"].removeprefix("Value error, ")
+        raise ValueError(f"the bench '{bench.name}' cannot have {where}: {message}") from None
+
+
+def _paths(tree: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in tree.items():
+        yield prefix + key
+        if isinstance(value, dict):
+            yield from _paths(value, f"{prefix}{key}.")

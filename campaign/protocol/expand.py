@@ -14,7 +14,7 @@ from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.points import Point, PointError, points_of
 from campaign.protocol.schema import Test
-from campaign.trial import Role, Task, Trial, TrialRequest, canonical_json
+from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 LARGEST_RECORDING = 200_000_000
 """samples of one trial; more fills a disk, and is a slip of units."""
@@ -36,30 +36,35 @@ class _Place:
     request: TrialRequest
     index: int  # among the requests of its point
     repeat: int
+    bench: Bench
+    bench_tree: Tree
 
 
 def expand(test: Test, seed: int, before: int, allow_large: bool) -> Expanded:
     """The trials of `test`, numbered from `before` + 1. Raises PointError."""
     places: list[_Place] = []
     points = list(points_of(test))
+    own_benches: dict[str, tuple[Bench, Tree]] = {}
     for repeat, point in itertools.product(range(1, test.entry.repeat + 1), points):
-        for index, request in enumerate(_requests(test, point)):
-            places.append(_Place(point, request, index, repeat))
+        for index, (request, bench, tree) in enumerate(_requests(test, point, own_benches)):
+            places.append(_Place(point, request, index, repeat, bench, tree))
             if len(places) + before > LARGEST_PLAN and not allow_large:
                 raise PointError([size_problem(test, "the plan has")])
     ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
     numbers = itertools.count(before + 1)
     trials = tuple(_trial(test, place, next(numbers), seed) for place in ordered)
-    return Expanded(trials, tuple(place.point.bench for place in ordered))
+    return Expanded(trials, tuple(place.bench for place in ordered))
 
 
-def _requests(test: Test, point: Point) -> Iterator[TrialRequest]:
-    """What the experiment asks for at a point, checked for what only a plan can see."""
-    names = ["none", *point.bench.compensation]
+def _requests(
+    test: Test, point: Point, own_benches: dict[str, tuple[Bench, Tree]]
+) -> Iterator[tuple[TrialRequest, Bench, Tree]]:
+    """What the experiment asks for at a point and on which bench, checked as only a plan can."""
     where = f" at {point.label}" if point.values else ""
     try:
         for request in test.experiment.trials(point.options, point.bench):
-            name = request.task.compensation
+            bench, tree = _bench_for(request, point, own_benches)
+            name, names = request.task.compensation, ["none", *bench.compensation]
             if name not in names:
                 raise ValueError(unknown_compensation(name, names, test))
             if samples_of(request.task) > LARGEST_RECORDING:
@@ -67,10 +72,23 @@ def _requests(test: Test, point: Point) -> Iterator[TrialRequest]:
                     f"a trial of {samples_of(request.task):.3g} samples; at most "
                     f"{LARGEST_RECORDING:.3g} are allowed: lower sample_rate or the duration"
                 )
-            yield request
+            yield request, bench, tree
     except (ValueError, ArithmeticError) as error:
         message = f"test '{test.entry.name}'{where}: {_first_line(error)}"
         raise PointError([test.origin.problem((), "value", message)]) from None
+
+
+def _bench_for(
+    request: TrialRequest, point: Point, own_benches: dict[str, tuple[Bench, Tree]]
+) -> tuple[Bench, Tree]:
+    """The point's bench, or the request's own, validated once for each that is different."""
+    if request.bench is None:
+        return point.bench, point.bench_tree
+    key = canonical_json(request.bench)
+    if key not in own_benches:
+        valid = Bench.model_validate(request.bench, context={"si": True})
+        own_benches[key] = valid, valid.model_dump(mode="json")
+    return own_benches[key]
 
 
 def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
@@ -105,7 +123,7 @@ def _trial(test: Test, place: _Place, number: int, seed: int) -> Trial:
         options=place.point.options_tree,
         repeat=place.repeat,
         seed=_hash(seed, place.point.values, place.index, place.repeat),
-        bench=place.point.bench_tree,
+        bench=place.bench_tree,
         task=request.task,
         note=request.note,
     )
