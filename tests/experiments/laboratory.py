@@ -43,7 +43,7 @@ def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},
                     point={**point, **request.point},
                     options=chosen.model_dump(mode="json"),
                     seed=len(found) + 1,
-                    bench=bench.model_dump(mode="json"),
+                    bench=request.bench or bench.model_dump(mode="json"),
                     task=request.task,
                     note=request.note,
                 )

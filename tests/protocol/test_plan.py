@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.experiments import experiments
+from campaign.experiments.common import with_changes
 from campaign.protocol import as_tree, check_limits, load_protocol, make_plan
 from campaign.trial import Role, Trial
 
-from .conftest import SHIPPED
+from .conftest import KINDS, SHIPPED
 
 SWING = '[[test]]\nname = "swing"\nkind = "swing"\nbench = "simulink"\nfrequency = "0.5 Hz"\n'
 SPEEDS = (
@@ -187,3 +189,36 @@ def test_the_full_map_has_80_speeds_in_both_directions() -> None:
     assert len(set(speeds)) == 80
     assert min(speeds) == pytest.approx(0.05 * 3.141592653589793 / 180)
     assert max(speeds) == pytest.approx(65 * 3.141592653589793 / 180)
+
+
+def test_a_request_may_bring_its_own_bench(desk) -> None:
+    """The trial gets it, whole, and is held against its limits, not the test's."""
+    swing = KINDS["swing"]
+
+    def two(options, bench):
+        other = with_changes(bench, {"axis.inertia": 70.0, "limits.acceleration": 0.05})
+        (request,) = swing.trials(options, bench)
+        yield request
+        yield replace(request, bench=other)
+
+    path = desk.write("two.toml", SWING)
+    kinds = {"swing": replace(swing, trials=two)}
+    plan = make_plan(load_protocol(path, kinds, shipped=SHIPPED), seed=1)
+    plain, varied = plan.trials
+    assert (plain.bench["axis"]["inertia"], varied.bench["axis"]["inertia"]) == (35.0, 70.0)
+    assert plain.bench["friction"] == varied.bench["friction"]
+    assert plain.fingerprint != varied.fingerprint
+    assert [(use.trial, use.margin.limit) for use in plan.breaches] == [(2, "acceleration")]
+
+
+def test_a_request_s_own_bench_is_validated(desk) -> None:
+    swing = KINDS["swing"]
+
+    def bad(options, bench):
+        (request,) = swing.trials(options, bench)
+        tree = bench.model_dump(mode="json")
+        yield replace(request, bench={**tree, "axis": {**tree["axis"], "inertia": -1.0}})
+
+    path = desk.write("bad.toml", SWING)
+    with pytest.raises(ProtocolError, match=r"swing.*axis.inertia"):
+        make_plan(load_protocol(path, {"swing": replace(swing, trials=bad)}, shipped=SHIPPED))

@@ -1,0 +1,49 @@
+"""A bench with other values, for experiments that vary the bench itself."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from campaign.experiments.common import with_changes
+from campaign.physics.bench import Bench
+
+BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench.model_validate(tomllib.loads((BENCHES / "simulink.toml").read_text()))
+
+
+def test_only_the_named_values_change(bench: Bench) -> None:
+    before = bench.model_dump(mode="json")
+    changed = with_changes(
+        bench, {"friction.load.coulomb_torque": 30.0, "controller.sample_rate": 1000.0}
+    )
+    assert changed["friction"]["load"].pop("coulomb_torque") == 30.0
+    assert changed["controller"].pop("sample_rate") == 1000.0
+    del before["friction"]["load"]["coulomb_torque"], before["controller"]["sample_rate"]
+    assert changed == before
+    assert bench.friction["load"].coulomb_torque == 26.0
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("friction.load.coulomb_torqe", "the nearest is 'friction.load.coulomb_torque'"),
+        ("friction.laod.coulomb_torque", "the nearest is 'friction.load.coulomb_torque'"),
+        ("axis.inertia.more", "the nearest is 'axis.inertia'"),
+        ("zzzzzz", "has no 'zzzzzz'"),
+    ],
+)
+def test_an_unknown_path_names_the_nearest(bench: Bench, path: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        with_changes(bench, {path: 1.0})
+
+
+def test_a_value_the_bench_refuses_says_where(bench: Bench) -> None:
+    with pytest.raises(ValueError, match=r"load.*coulomb_torque: Input should be greater than 0"):
+        with_changes(bench, {"friction.load.coulomb_torque": -1.0})
