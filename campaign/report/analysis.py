@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.experiments.interface import Experiment, TestData, bench_of
 from campaign.physics.bench import Bench
-from campaign.report.published import Published, published_values
-from campaign.report.scoreboard import Evidence
+from campaign.published.scoreboard import Evidence, evidence_of
+from campaign.published.values import Published, published_values
 from campaign.result import Result
 from campaign.trial import Outcome, Tree
 
@@ -44,21 +44,8 @@ class AnalysedTest:
         return tuple(t for t in self.trials if t.ending.outcome is not Outcome.COMPLETED)
 
     def evidence(self) -> Evidence:
-        """What it brings to the scoreboard.
-
-        A table may ask whether a number is from a simulation or from hardware: here that is
-        whether the bench's controller is continuous, or sampled as a real one is.
-        """
-        bench = self.bench
-        domain = {} if bench is None else {"domain": domain_of(bench)}
-        return Evidence(
-            self.name,
-            self.reproduces,
-            self.result.findings,
-            given=bench.given if bench else (),
-            fitted=bench.fitted if bench else (),
-            known=domain,
-        )
+        """What it brings to the scoreboard."""
+        return evidence_of(self.name, self.reproduces, self.result.findings, self.bench)
 
 
 def analyse_run(run: RunReader, experiments: Mapping[str, Experiment]) -> tuple[AnalysedTest, ...]:
@@ -74,11 +61,6 @@ def published_of(run: RunReader) -> Published:
     if not isinstance(chosen, str) or chosen not in run.header.sources:
         return published_values()
     return published_values(run.header.sources[chosen], chosen)
-
-
-def domain_of(bench: Bench) -> str:
-    """`simulation` for a continuous loop, `hardware` for a sampled one."""
-    return "simulation" if bench.controller.sample_rate is None else "hardware"
 
 
 def one_line(error: BaseException) -> str:

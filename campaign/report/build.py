@@ -11,11 +11,11 @@ from typing import Any
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
+from campaign.published.scoreboard import Scoreboard, score
 from campaign.report import page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
 from campaign.report.output import replaced_folder
 from campaign.report.palette import variables
-from campaign.report.scoreboard import Scoreboard, score
 from campaign.trial import Outcome
 
 FAILED = 200

@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.values import Cell
 from campaign.report.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS
-from campaign.report.published import Cell
-from campaign.report.scoreboard import Line, Scoreboard
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

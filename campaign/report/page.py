@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from campaign.options import Options
+from campaign.published.scoreboard import Line, Scoreboard, Status, to_csv
+from campaign.published.values import Published, PublishedTable
 from campaign.report import tables
 from campaign.report.analysis import AnalysedTest, one_line
 from campaign.report.figures import draw, inline
 from campaign.report.names import Names, figure_name
 from campaign.report.overview import cell_name, draw_overview
 from campaign.report.palette import STATUS
-from campaign.report.published import Published, PublishedTable
-from campaign.report.scoreboard import Line, Scoreboard, Status, to_csv
 from campaign.report.text import minus, number, percent, pretty_unit
 from campaign.result import Figure, Table
 from campaign.trial import canonical_json

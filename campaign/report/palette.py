@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from campaign.report.scoreboard import Status
+from campaign.published.scoreboard import Status
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from campaign.report.scoreboard import Line, Scoreboard, Status
+from campaign.published.scoreboard import Line, Scoreboard, Status
 from campaign.report.text import minus, number, pretty_unit
 from campaign.result import Column, Table, Value
 from campaign.units import convert

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from campaign.report.published import Cell, Published
+from campaign.physics.bench import Bench
+from campaign.published.values import Cell, Published
 from campaign.result import Finding, Value
 from campaign.units import convert
 
@@ -55,6 +56,20 @@ class Evidence:
     given: Sequence[str] = ()
     fitted: Sequence[str] = ()
     known: Mapping[str, Value] = field(default_factory=dict)
+
+
+def evidence_of(
+    test: str, reproduces: Sequence[str], findings: Sequence[Finding], bench: Bench | None
+) -> Evidence:
+    """What a test on `bench` brings; None when nobody knows the bench.
+
+    A table may ask whether a number is from a simulation or from hardware: here that is whether
+    the bench's controller is continuous, or sampled as a real one is.
+    """
+    if bench is None:
+        return Evidence(test, reproduces, findings)
+    domain = "simulation" if bench.controller.sample_rate is None else "hardware"
+    return Evidence(test, reproduces, findings, bench.given, bench.fitted, {"domain": domain})
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from campaign.errors import UsageError
-from campaign.report.published import Cell, published_values, read_published, thesis
+from campaign.published.values import Cell, published_values, read_published, thesis
 
 DEG = math.pi / 180
 

@@ -8,8 +8,8 @@ import math
 
 import pytest
 
-from campaign.report.published import read_published
-from campaign.report.scoreboard import COLUMNS, Evidence, Line, Scoreboard, score, to_csv
+from campaign.published.scoreboard import COLUMNS, Evidence, Line, Scoreboard, score, to_csv
+from campaign.published.values import read_published
 from campaign.result import Finding
 
 PUBLISHED = read_published(

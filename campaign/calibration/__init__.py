@@ -1,0 +1,1 @@
+"""Fitting the unknowns of a bench to published values."""
