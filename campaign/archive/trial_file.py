@@ -26,7 +26,12 @@ from campaign.trial import ChannelInfo, Ending, Event, Trial, canonical_json
 
 Array = NDArray[np.float64]
 
-TELLING = {"rate": "gyro_rate", "torque": "relative_rate"}
+TELLING = {
+    "rate": "gyro_rate",
+    "torque": "relative_rate",
+    "prescribed": "friction_torque",
+    "spring": "relative_rate",
+}
 """By a task's mode, the channel that the default plot shows; else it is the first one."""
 
 _CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
