@@ -1,0 +1,142 @@
+"""What a compensation's friction model says when one parameter differs (Figures 5.12 and 5.13).
+
+The model runs alone on a prescribed sinusoidal rate, with no plant and no loop around it: as it is,
+and with each parameter lower and higher. The parameters of presliding show around a reversal, over
+time; those of sliding show over the rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from campaign.experiments.interface import TrialData
+from campaign.physics.bench import Bench
+from campaign.result import Axis, Curve, Figure, Panel
+from campaign.signals import Sine
+from campaign.trial import Recording, Task, TrialRequest
+
+CYCLES = 1.5
+"""of the prescribed rate; the reversal that is shown is the second, when the bristles move."""
+AROUND = 0.05
+"""of a cycle, before and after that reversal."""
+SLOW = 0.35
+"""Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
+DYNAMIC = ("bristle_stiffness", "bristle_damping")
+LABELS = {
+    "bristle_stiffness": "bristle stiffness σ0",
+    "bristle_damping": "bristle damping σ1",
+    "viscous_friction": "viscous friction σ2",
+    "static_torque": "static torque Ts",
+    "coulomb_torque": "Coulomb torque Tc",
+    "stribeck_velocity": "Stribeck velocity vs",
+}
+
+
+def model_trials(
+    bench: Bench,
+    options: Any,
+    parameters: Sequence[str],
+    varied: Callable[[Bench, Any, str, float], Any],
+) -> Iterator[TrialRequest]:
+    """The model as it is, and each parameter lower and higher by `options.model_change`."""
+    amplitude = options.acceleration / (2 * np.pi * options.frequency)
+    duration = CYCLES / options.frequency
+    task = Task(
+        mode="prescribed",
+        command=Sine(amplitude=amplitude, frequency=options.frequency),
+        compensation=options.compensation,
+        duration=duration,
+        window=(0.0, duration),
+        sample_rate=options.sample_rate,
+    )
+    size = options.model_change
+    places = [("", 0.0)] + [(p, c) for p in parameters for c in (-size, size)]
+    for parameter, change in places:
+        try:
+            tree = varied(bench, options, parameter, change) if parameter else None
+        except ValueError:  # said among the skipped changes
+            continue
+        yield TrialRequest(
+            task,
+            point={"parameter": parameter, "change": change, "repetition": 1},
+            note="the model alone, at a prescribed rate",
+            bench=tree,
+        )
+
+
+def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
+    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for."""
+    runs: dict[str, dict[float, TrialData]] = {}
+    for data in measured:
+        if data.trial.task.mode == "prescribed":
+            point = data.trial.point
+            by_change = runs.setdefault(str(point["parameter"]), {})
+            by_change[float(str(point["change"]))] = data
+    plain = runs.pop("", {}).get(0.0)
+    if plain is None:
+        return
+    dynamic = [name for name in runs if name in DYNAMIC]
+    static = [name for name in runs if name not in DYNAMIC]
+    if dynamic:
+        yield Figure(
+            key="model-dynamic",
+            title=f"Output of the {compensation} model: parameters of presliding",
+            caption="Around a reversal of a sinusoidal rate. Stiffer bristles turn the torque "
+            "around sooner; more damping lets it jump when the rate changes. Away from the "
+            "reversal the curves are one.",
+            alt="Model friction torque over time around a reversal, for lower, unchanged and "
+            "higher bristle stiffness and bristle damping.",
+            panels=tuple(_panel(name, {**runs[name], 0.0: plain}, _reversal) for name in dynamic),
+            thesis=("5.12",),
+            across=2,
+        )
+    if static:
+        yield Figure(
+            key="model-static",
+            title=f"Output of the {compensation} model: parameters of sliding",
+            caption="Over one cycle of a sinusoidal rate. The Coulomb torque moves the whole "
+            "curve, the static torque only its slow part, where the Stribeck velocity says how "
+            "slow that is.",
+            alt="Model friction torque over rate, for lower, unchanged and higher values of each "
+            "static parameter, one panel per parameter.",
+            panels=tuple(_panel(name, {**runs[name], 0.0: plain}, _slow) for name in static),
+            thesis=("5.13",),
+            across=2,
+        )
+
+
+View = Callable[[Recording, float], tuple[Axis, Any, Any]]
+
+
+def _panel(name: str, runs: dict[float, TrialData], view: View) -> Panel:
+    torque = Axis("Model torque", "N m", "N m")
+    curves, axis = [], Axis("")
+    for change, data in sorted(runs.items()):
+        command = data.trial.task.command
+        frequency = command.frequency if isinstance(command, Sine) else 1.0
+        axis, x, y = view(data.recording(), frequency)
+        series = "reference" if change == 0 else ("low" if change < 0 else "high")
+        label = "unchanged" if change == 0 else f"{change:+.0%}".replace("-", "−")
+        curves.append(Curve(x, y, label, series))
+    title = LABELS.get(name, name)
+    return Panel(axis, torque, curves, title[:1].upper() + title[1:])
+
+
+def _reversal(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
+    """Torque around the reversal after half a cycle, over the time from it."""
+    middle = 0.5 / frequency
+    cut = recording.window(middle - AROUND / frequency, middle + 2 * AROUND / frequency)
+    axis = Axis("Time from the reversal", "s", "s")
+    return axis, cut.time - middle, cut["compensation_torque"]
+
+
+def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
+    """Torque over rate, one whole cycle, the slow part of it."""
+    cut = recording.window(0.5 / frequency, 1.5 / frequency)
+    rate = cut["relative_rate"]
+    largest = SLOW * float(np.max(np.abs(rate)))
+    axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
+    return axis, rate, cut["compensation_torque"]
