@@ -18,6 +18,7 @@ from campaign.experiments.common import (
     method_label,
     swept,
 )
+from campaign.experiments.comparisons import compared, preload_of
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -113,7 +114,7 @@ def _analyse(data: TestData) -> Result:
     for group in groups.values():
         measures = np.array([_measure(item) for item in group])
         error, peak, stuck = measures.mean(axis=0)
-        told = conditions(group[0], *columns)
+        told = conditions(group[0], *columns) | preload_of(group[0])
         findings.append(Finding("stabilization_error", float(error), "rad", told))
         spread = float(np.std(measures[:, 0], ddof=1)) if len(group) > 1 else None
         row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
@@ -141,22 +142,7 @@ def _analyse(data: TestData) -> Result:
         note="The error is the standard deviation of the integrated gyro rate over whole cycles.",
     )
     figures = tuple(_figures(data, [group[0] for group in groups.values()], paths, rows))
-    ratios = tuple(_reductions(findings))
-    return Result((table,), figures, tuple(findings) + ratios, failures_note(data))
-
-
-def _reductions(findings: list[Finding]) -> Iterator[Finding]:
-    """Error without compensation over error with each method, where all else is equal."""
-
-    def rest(finding: Finding) -> dict[str, object]:
-        return {k: v for k, v in finding.conditions.items() if k != "compensation"}
-
-    bare = [f for f in findings if f.conditions.get("compensation") == "none"]
-    for finding in findings:
-        for reference in bare:
-            if finding is not reference and rest(finding) == rest(reference) and finding.value > 0:
-                ratio = reference.value / finding.value
-                yield Finding("error_reduction", ratio, "", finding.conditions)
+    return Result((table,), figures, (*findings, *compared(findings)), failures_note(data))
 
 
 def _figures(
