@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.experiments.common import method_label
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.result import Axis, Curve, Figure, Panel
@@ -24,6 +25,7 @@ AROUND = 0.05
 """of a cycle, before and after that reversal."""
 SLOW = 0.35
 """Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
+FAST = ("viscous_friction",)
 DYNAMIC = ("bristle_stiffness", "bristle_damping")
 LABELS = {
     "bristle_stiffness": "bristle stiffness σ0",
@@ -83,10 +85,10 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
     if dynamic:
         yield Figure(
             key="model-dynamic",
-            title=f"Output of the {compensation} model: parameters of presliding",
-            caption="Around a reversal of a sinusoidal rate. Stiffer bristles turn the torque "
-            "around sooner; more damping lets it jump when the rate changes. Away from the "
-            "reversal the curves are one.",
+            title=f"Output of the {method_label(compensation)}: parameters of presliding",
+            caption="Around a reversal of a sinusoidal rate. Stiffer bristles forget the reversal "
+            "sooner; with more damping the torque overshoots after it. Away from the reversal "
+            "the curves are one: steady sliding knows neither parameter.",
             alt="Model friction torque over time around a reversal, for lower, unchanged and "
             "higher bristle stiffness and bristle damping.",
             panels=tuple(_panel(name, {**runs[name], 0.0: plain}, _reversal) for name in dynamic),
@@ -96,13 +98,16 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
     if static:
         yield Figure(
             key="model-static",
-            title=f"Output of the {compensation} model: parameters of sliding",
+            title=f"Output of the {method_label(compensation)}: parameters of sliding",
             caption="Over one cycle of a sinusoidal rate. The Coulomb torque moves the whole "
-            "curve, the static torque only its slow part, where the Stribeck velocity says how "
-            "slow that is.",
+            "curve, the static torque only its slow part, and the Stribeck velocity says how slow "
+            "that is. Viscous friction shows at high rates only, so its panel reaches further.",
             alt="Model friction torque over rate, for lower, unchanged and higher values of each "
             "static parameter, one panel per parameter.",
-            panels=tuple(_panel(name, {**runs[name], 0.0: plain}, _slow) for name in static),
+            panels=tuple(
+                _panel(name, {**runs[name], 0.0: plain}, _all if name in FAST else _slow)
+                for name in static
+            ),
             thesis=("5.13",),
             across=2,
         )
@@ -133,10 +138,15 @@ def _reversal(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
     return axis, cut.time - middle, cut["compensation_torque"]
 
 
-def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
-    """Torque over rate, one whole cycle, the slow part of it."""
+def _all(recording: Recording, frequency: float, share: float = 1.0) -> tuple[Axis, Any, Any]:
+    """Torque over rate, one whole cycle."""
     cut = recording.window(0.5 / frequency, 1.5 / frequency)
     rate = cut["relative_rate"]
-    largest = SLOW * float(np.max(np.abs(rate)))
+    largest = share * float(np.max(np.abs(rate)))
     axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
     return axis, rate, cut["compensation_torque"]
+
+
+def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
+    """The slow part of it."""
+    return _all(recording, frequency, SLOW)
