@@ -62,4 +62,34 @@ class Polyline(Options):
         return np.interp(time, self.times, self.values)
 
 
-Signal = Annotated[Zero | Sine | Polyline, Field(discriminator="shape")]
+class MultiSine(Options):
+    """The sum of amplitude * sin(2 pi frequency t + phase): an irregular motion, fully spelled out.
+
+    Ship motion is one, with as many components as its spectrum was cut into.
+    """
+
+    shape: Literal["multisine"] = "multisine"
+    amplitudes: tuple[float, ...] = Field(min_length=1, max_length=1000)
+    frequencies: tuple[Annotated[float, Field(gt=0)], ...]
+    phases: tuple[float, ...]
+
+    def model_post_init(self, context: object) -> None:
+        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
+            raise ValueError("a multisine needs as many frequencies and phases as amplitudes")
+
+    def sample(self, time: Array) -> Array:
+        """Values at `time` (s), shape (n,)."""
+        return self.integral(time, 0)
+
+    def integral(self, time: Array, order: int) -> Array:
+        """The `order`-th integral of zero mean at `time` (s), shape (n,); -1 is the derivative."""
+        total = np.zeros_like(time, dtype=float)
+        parts = zip(self.amplitudes, self.frequencies, self.phases, strict=True)
+        for amplitude, frequency, phase in parts:
+            omega = 2 * np.pi * frequency
+            turned = omega * time + (phase - order * np.pi / 2)
+            total += amplitude * omega**-order * np.sin(turned)
+        return total
+
+
+Signal = Annotated[Zero | Sine | Polyline | MultiSine, Field(discriminator="shape")]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.signals import Array, Polyline, Signal, Sine, Zero
+from campaign.signals import Array, MultiSine, Polyline, Signal, Sine, Zero
 
 
 def base_rate(acceleration: Signal, time: Array) -> Array:
     """Rate of the hull (rad/s) at `time` (s), shape (n,).
 
-    A sine acceleration belongs to a steady oscillation, so its rate has zero mean and the motion
-    is already under way at t = 0. Any other acceleration starts from rest.
+    A sine acceleration, or a sum of sines, belongs to a steady oscillation, so its rate has zero
+    mean and the motion is already under way at t = 0. Any other acceleration starts from rest.
     """
     match acceleration:
         case Zero():
@@ -19,6 +19,8 @@ def base_rate(acceleration: Signal, time: Array) -> Array:
         case Sine():
             omega = 2 * np.pi * acceleration.frequency
             return -acceleration.amplitude / omega * np.cos(omega * time + acceleration.phase)
+        case MultiSine():
+            return acceleration.integral(time, 1)
         case Polyline():
             return _integral(acceleration, time)
     raise TypeError(f"no base motion from {type(acceleration).__name__}")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.physics.bench import Bench
-from campaign.signals import Polyline, Signal, Sine, Zero
+from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.trial import Task
 
 Array = NDArray[np.float64]
@@ -142,6 +142,8 @@ def _grid(task: Task) -> Array:
     for signal in signals:
         if isinstance(signal, Sine):
             times.append(_sine_times(signal, duration, POINTS_PER_CYCLE if mixed else 4))
+        elif isinstance(signal, MultiSine):
+            times.append(_dense_times(signal, duration))
         elif isinstance(signal, Polyline):
             knots = np.asarray(signal.times)
             times += [knots, _zero_crossings(signal), np.linspace(0.0, duration, 1001)]
@@ -156,6 +158,12 @@ def _sine_times(sine: Sine, duration: float, per_cycle: int) -> Array:
     # Times at which 2 pi f t + phase is a multiple of a quarter turn.
     shift = (-sine.phase / (2 * math.pi)) % (1 / per_cycle)
     return np.asarray((steps / per_cycle + shift) / sine.frequency)
+
+
+def _dense_times(sines: MultiSine, duration: float) -> Array:
+    """Even times over the whole of an irregular motion: its largest swing may come anywhere."""
+    cycles = min(duration * max(sines.frequencies), MOST_CYCLES)
+    return np.linspace(0.0, duration, math.ceil(cycles * POINTS_PER_CYCLE) + 2)
 
 
 def _zero_crossings(polyline: Polyline) -> Array:
@@ -173,6 +181,8 @@ def _load_motion(command: Signal, time: Array) -> tuple[Array, Array]:
             omega = 2 * math.pi * frequency
             angle = amplitude / omega * (math.cos(phase) - np.cos(omega * time + phase))
             return command.sample(time), angle
+        case MultiSine():
+            return command.sample(time), _from_start(command, time, 1)
         case Polyline():
             return command.sample(time), _integrated(command, time)[0]
     return np.zeros_like(time), np.zeros_like(time)
@@ -181,7 +191,8 @@ def _load_motion(command: Signal, time: Array) -> tuple[Array, Array]:
 def _hull_motion(acceleration: Signal, time: Array) -> tuple[Array, Array]:
     """Rate (rad/s) and angle from the start (rad) of the hull, each shape (n,).
 
-    A sine is a steady oscillation whose rate has zero mean; anything else starts from rest.
+    A sine is a steady oscillation whose rate has zero mean, and so is a sum of sines; anything
+    else starts from rest.
     """
     match acceleration:
         case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
@@ -189,9 +200,16 @@ def _hull_motion(acceleration: Signal, time: Array) -> tuple[Array, Array]:
             rate = -amplitude / omega * np.cos(omega * time + phase)
             angle = -amplitude / omega**2 * (np.sin(omega * time + phase) - math.sin(phase))
             return rate, angle
+        case MultiSine():
+            return acceleration.integral(time, 1), _from_start(acceleration, time, 2)
         case Polyline():
             return _integrated(acceleration, time)
     return np.zeros_like(time), np.zeros_like(time)
+
+
+def _from_start(sines: MultiSine, time: Array, order: int) -> Array:
+    """An integral of a sum of sines that begins at zero."""
+    return np.asarray(sines.integral(time, order) - sines.integral(np.zeros(1), order))
 
 
 def _integrated(polyline: Polyline, time: Array) -> tuple[Array, Array]:
@@ -230,6 +248,8 @@ def _largest(signal: Signal, duration: float) -> float:
             time = np.append(_sine_times(signal, duration, 4), [0.0, duration])
             time = time[(time >= 0) & (time <= duration)]
             return float(np.max(np.abs(signal.sample(time))))
+        case MultiSine():
+            return float(np.max(np.abs(signal.sample(_dense_times(signal, duration)))))
         case Polyline():
             knots = np.asarray(signal.times)
             ends = np.array([0.0, duration])
@@ -251,6 +271,10 @@ def _steepest(command: Signal, duration: float) -> float:
                 phase=phase + math.pi / 2,
             )
             return _largest(slope, duration)
+        case MultiSine():
+            if abs(float(command.sample(np.zeros(1))[0])) > TINY_RATE:
+                return math.inf
+            return float(np.max(np.abs(command.integral(_dense_times(command, duration), -1))))
         case Polyline():
             return _steepest_line(command, duration)
     return 0.0

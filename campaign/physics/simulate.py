@@ -28,7 +28,7 @@ from campaign.physics.loop import (
 )
 from campaign.physics.step_function import address_of
 from campaign.physics.variation import as_it_is
-from campaign.signals import Sine
+from campaign.signals import MultiSine, Sine
 from campaign.trial import Task
 
 LONGEST_STEP = 0.25e-3
@@ -61,8 +61,9 @@ def make_grid(bench: Bench, task: Task, longest_step: float = LONGEST_STEP) -> G
     Raises ValueError when the recording's rate and the controller's do not divide each other.
     """
     for signal in (task.command, task.base_acceleration, task.disturbance):
-        if isinstance(signal, Sine):
-            longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * signal.frequency))
+        if isinstance(signal, Sine | MultiSine):
+            fastest = signal.frequency if isinstance(signal, Sine) else max(signal.frequencies)
+            longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * fastest))
     samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
     control_rate = bench.controller.sample_rate
     if control_rate is None or task.mode in ("prescribed", "spring"):

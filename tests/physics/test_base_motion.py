@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from campaign.physics.base_motion import base_rate
-from campaign.signals import Polyline, Sine, Zero
+from campaign.physics.simulate import make_grid
+from campaign.signals import MultiSine, Polyline, Sine, Zero
 from tests.physics.benches import bench, run, stribeck, task
 
 
@@ -64,3 +65,42 @@ def test_rate_does_not_depend_on_which_times_are_asked_together() -> None:
     parts = np.concatenate([base_rate(signal, part) for part in np.array_split(time, 7)])
     np.testing.assert_array_equal(whole, parts)
     np.testing.assert_array_equal(base_rate(Zero(), time), 0.0)
+
+
+TWO = MultiSine(amplitudes=(0.3, 0.1), frequencies=(0.2, 0.5), phases=(0.4, -1.0))
+
+
+def test_a_sum_of_sines_is_the_sum_of_its_sines() -> None:
+    time = np.linspace(0.0, 10.0, 1001)
+    one = Sine(amplitude=0.3, frequency=0.2, phase=0.4)
+    other = Sine(amplitude=0.1, frequency=0.5, phase=-1.0)
+    np.testing.assert_allclose(TWO.sample(time), one.sample(time) + other.sample(time), atol=1e-15)
+    np.testing.assert_allclose(
+        base_rate(TWO, time), base_rate(one, time) + base_rate(other, time), atol=1e-15
+    )
+
+
+def test_integrals_and_derivative_of_a_sum_of_sines() -> None:
+    """Numerical derivatives of each order are the order before; whole periods (10 s) average 0."""
+    time = np.linspace(0.0, 10.0, 100_001)
+    for order in (-1, 0, 1, 2):
+        slope = np.gradient(TWO.integral(time, order), time)[1:-1]
+        np.testing.assert_allclose(slope, TWO.integral(time, order - 1)[1:-1], atol=1e-6)
+        assert np.mean(TWO.integral(time[:-1], order)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_sum_of_sines_needs_a_whole_table() -> None:
+    with pytest.raises(ValueError, match="as many"):
+        MultiSine(amplitudes=(1.0, 2.0), frequencies=(1.0,), phases=(0.0, 0.0))
+    with pytest.raises(ValueError, match="greater than 0"):
+        MultiSine(amplitudes=(1.0,), frequencies=(0.0,), phases=(0.0,))
+
+
+def test_a_simulation_resolves_the_fastest_component() -> None:
+    slow = task(base_acceleration=TWO, duration=1.0)
+    fast = task(
+        base_acceleration=MultiSine(amplitudes=(0.1, 0.1), frequencies=(0.2, 100.0), phases=(0, 0)),
+        duration=1.0,
+    )
+    assert make_grid(bench(), slow).step == pytest.approx(0.25e-3)
+    assert make_grid(bench(), fast).step <= 1 / (80 * 100.0)

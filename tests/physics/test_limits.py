@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins, motion, worst_friction
-from campaign.signals import Polyline, Signal, Sine, Zero
+from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.trial import Task
 
 BENCH = Path(__file__).parents[2] / "protocols" / "benches" / "simulink.toml"
@@ -191,3 +191,32 @@ def test_friction_that_is_larger_backwards() -> None:
     del tree["friction"]["motor"]
     tree["friction"]["load"]["negative"] = {"static_torque": "40 N m"}
     assert worst_friction(Bench.model_validate(tree), 0.5) == pytest.approx(40 + 4 * 0.5, rel=1e-6)
+
+
+def test_irregular_motion_of_hull_and_load(bench: Bench) -> None:
+    """Against cumulative trapezoids on a grid of 1 ms; the largest swing is far from the start."""
+    sines = MultiSine(amplitudes=(0.2, 0.15, 0.1), frequencies=(0.1, 0.11, 0.23), phases=(1, 2, 3))
+    time = np.arange(0.0, 60.0, 1e-3)
+    acceleration = sum(
+        a * np.sin(2 * np.pi * f * time + p)
+        for a, f, p in zip(sines.amplitudes, sines.frequencies, sines.phases, strict=True)
+    )
+    rate = cumulative_trapezoid(acceleration, time, initial=0.0)
+    omega = 2 * np.pi * np.array(sines.frequencies)
+    rate -= np.sum(np.array(sines.amplitudes) / omega * np.cos(np.array(sines.phases)))
+    angle = cumulative_trapezoid(rate, time, initial=0.0)
+
+    hull = Task(mode="rate", base_acceleration=sines, duration=60, window=(0, 60), sample_rate=100)
+    found = motion(hull)
+    assert found.hull_acceleration == pytest.approx(np.max(np.abs(acceleration)), rel=2e-3)
+    assert found.rate == pytest.approx(np.max(np.abs(rate)), rel=2e-3)
+    assert found.angle == pytest.approx(np.max(np.abs(angle)), rel=2e-3)
+    assert found.load_acceleration == 0.0
+
+    load = Task(mode="rate", command=sines, duration=60, window=(0, 60), sample_rate=100)
+    assert motion(load).load_acceleration == math.inf  # it would start with a jump
+    level = sines.model_copy(update={"phases": (0.0, 0.0, 0.0)})
+    slope = np.gradient(level.sample(time), time)
+    smooth = motion(load.model_copy(update={"command": level}))
+    assert smooth.load_acceleration == pytest.approx(np.max(np.abs(slope)), rel=2e-3)
+    assert smooth.rate == pytest.approx(np.max(np.abs(level.sample(time))), rel=2e-3)
