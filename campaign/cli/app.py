@@ -136,6 +136,47 @@ def run(
 
 
 @app.command()
+def calibrate(
+    protocol: ProtocolArgument,
+    results: ResultsOption = RESULTS,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="FILE",
+            help="Where the result goes, with the bench beside it; a new file in --results when "
+            "absent.",
+            show_default=False,
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            metavar="N",
+            min=1,
+            max=256,
+            help="Simulations at once; one per processor if absent.",
+            show_default=False,
+        ),
+    ] = None,
+    leave_out: Annotated[
+        bool,
+        typer.Option(
+            "--leave-one-out/--no-leave-one-out",
+            help="Refit without each frequency in turn, to see how well it is predicted.",
+        ),
+    ] = True,
+) -> None:
+    """Fit a simulated bench to published cells; the result's path is the last line of output."""
+    from campaign.cli.calibrate import calibrate_protocol
+
+    raise typer.Exit(
+        calibrate_protocol(protocol, results, output, workers=workers, leave_out=leave_out)
+    )
+
+
+@app.command()
 def report(
     run: NewestRunArgument = None,
     results: ResultsOption = RESULTS,

@@ -17,7 +17,7 @@ from campaign.protocol.schema import ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
-SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test"}
+SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration"}
 
 
 @dataclass

@@ -10,6 +10,7 @@ from typing import Any
 from campaign.errors import Problem, ProtocolError
 from campaign.physics.bench import Bench
 from campaign.protocol.axes import is_large, make_axis, value_problems
+from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.collect import (
     Collected,
     Draft,
@@ -64,6 +65,7 @@ def load_protocol(
         collected.problems[:0] = top
         raise _failed(collected)
     published = loader.published(source, top.published, origin)
+    calibration = loader.calibration(source, top.calibration, origin)
     if not collected.drafts and not collected.problems:
         message = "no tests; add a [[test]], or include a protocol that has some"
         collected.problems.append(Problem(path, 1, 1, message))
@@ -80,6 +82,7 @@ def load_protocol(
         tests=tuple(tests),
         sources={name: each.text for name, each in collected.sources.items()},
         overrides=tuple(overrides),
+        calibration=calibration,
     )
 
 
@@ -118,6 +121,24 @@ class _Loader:
         found = self._read(file, name, origin, ("published",), written)
         return found.name if found is not None else written
 
+    def calibration(
+        self, source: Source, options: CalibrationOptions | None, origin: Origin
+    ) -> Calibration | None:
+        """The calibration with its bench, which all tests must use."""
+        if options is None:
+            return None
+        bench = self._bench_source(source, origin, ("calibration", "bench"), options.bench)
+        if bench is None:
+            return None
+        for draft in self.collected.drafts:
+            own = self._bench_source(
+                draft.source, draft.origin, ("bench",), draft.tree.get("bench")
+            )
+            if own is not None and own is not bench:
+                message = f"the calibration is of the bench {shown(options.bench)}; use it here too"
+                self._report(draft.origin.problem(("bench",), "value", message))
+        return Calibration(options, bench, origin)
+
     def _report(self, *problems: Problem) -> None:
         self.collected.problems += problems
 
@@ -127,7 +148,7 @@ class _Loader:
         if isinstance(entry, list):
             self._report(*entry)
         experiment = self._experiment(draft, common.get("kind"))
-        bench = self._bench_source(draft, common.get("bench"))
+        bench = self._bench_source(draft.source, draft.origin, ("bench",), common.get("bench"))
         if experiment is None:
             return None
         tree = _patched(bench.tree, draft.bench_patches) if bench is not None else None
@@ -155,19 +176,21 @@ class _Loader:
         self._report(draft.origin.problem(("kind",), "value", message))
         return None
 
-    def _bench_source(self, draft: Draft, written: Any) -> Source | None:
+    def _bench_source(
+        self, source: Source, origin: Origin, keys: Keys, written: Any
+    ) -> Source | None:
         if not isinstance(written, str):
             return None
         if "/" in written or "\\" in written or written.endswith(".toml"):
-            file, name = sibling(draft.source, written)
-            return self._read(file, name, draft.origin, ("bench",), written)
+            file, name = sibling(source, written)
+            return self._read(file, name, origin, keys, written)
         shipped = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
         if written in shipped:
             file = self.shipped / "benches" / f"{written}.toml"
-            return self._read(file, written, draft.origin, ("bench",), written)
+            return self._read(file, written, origin, keys, written)
         message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
         message += nearest(written, shipped) + ", or the path of a .toml file"
-        self._report(draft.origin.problem(("bench",), "value", message))
+        self._report(origin.problem(keys, "value", message))
         return None
 
     def _read(

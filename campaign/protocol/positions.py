@@ -39,6 +39,7 @@ class Positions:
         self._lines = encoded.split(b"\n")
         self._entries: dict[Keys, _Entry] = {}
         self._lengths: dict[Keys, int] = {}
+        self._spans: dict[Keys, tuple[int, int]] = {}
         self._read_document(_parse(encoded))
 
     def find(self, keys: Keys, aim: Aim = "value") -> Position:
@@ -48,6 +49,10 @@ class Positions:
             if entry is not None:
                 return entry.value if aim == "value" and length == len(keys) else entry.key
         return Position(1, 1)
+
+    def span(self, keys: Keys) -> tuple[int, int] | None:
+        """First byte of the value written at `keys`, and the first after it, in UTF-8."""
+        return self._spans.get(keys)
 
     def _read_document(self, root: Any) -> None:
         for node in root.children:
@@ -77,6 +82,7 @@ class Positions:
             here = self._position(part_node)
             self._entries.setdefault(keys, _Entry(here, here))
         self._entries[keys] = _Entry(self._entries[keys].key, self._position(value_node))
+        self._spans[keys] = (value_node.start_byte, value_node.end_byte)
         self._read_value(value_node, keys)
 
     def _read_value(self, node: Any, keys: Keys) -> None:

@@ -16,6 +16,7 @@ from pydantic import ConfigDict, Field
 
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
@@ -82,6 +83,8 @@ class ProtocolFile(Options):
     """Paths of protocols, relative to this file, whose tests come before this file's."""
     published: str = "thesis"
     """Published values to compare with: a path relative to this file, "none" or "thesis"."""
+    calibration: CalibrationOptions | None = None
+    """What `campaign calibrate` fits; `campaign run` does not look at it."""
     test: tuple[dict[str, Any], ...] = ()
     """The tests, each under `[[test]]`."""
 
@@ -120,6 +123,7 @@ class Protocol:
         published: "thesis", "none", or the name of a source.
         sources: verbatim text of every protocol, bench and published file, by its name as written.
         overrides: what `--set` was given.
+        calibration: what may be fitted, None when the protocol does not say.
     """
 
     path: Path
@@ -132,6 +136,7 @@ class Protocol:
     tests: tuple[Test, ...]
     sources: Mapping[str, str]
     overrides: tuple[str, ...] = ()
+    calibration: Calibration | None = None
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,0 +1,234 @@
+"""A calibration as TOML: the result, and the bench with the fitted values put in."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from campaign.calibration.leave_out import deviations
+from campaign.calibration.outcome import CalibrationOutcome
+from campaign.calibration.search import agreeing
+from campaign.calibration.space import Parameter, Space
+from campaign.calibration.targets import Target, shortest
+from campaign.calibration.uncertainty import strong
+from campaign.errors import CampaignError
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Source
+from campaign.units import convert, split_quantity
+
+HEADER = """\
+# Written by `campaign calibrate {protocol}`; docs/calibration.md says what each line means.
+# The same protocol and files give the same result, so nothing here says when it was made.
+"""
+
+
+def result_text(outcome: CalibrationOutcome, bench_name: str) -> str:
+    """The result; `bench_name` is the file that the calibrated bench goes to."""
+    problem, options = outcome.problem, outcome.problem.options
+    lines = [HEADER.format(protocol=problem.protocol.path.name)]
+    lines += _pairs(
+        {
+            "protocol": problem.protocol.path.name,
+            "bench": options.bench,
+            "calibrated_bench": bench_name,
+            "finished": not outcome.interrupted,
+            "loss": options.loss,
+            "starts": options.starts,
+            "seed": options.seed,
+            "evaluations": outcome.evaluations,
+            "cells": shortest(problem.targets, problem.published),
+        }
+    )
+    lines += ["", "[fit]", *_pairs(dict(_fit(outcome)))]
+    for start in outcome.starts:
+        named = zip(problem.space.parameters, problem.space.values(start.end), strict=True)
+        values = {parameter.name: parameter.text(value) for parameter, value in named}
+        lines += ["", "[[start]]", *_pairs({"cost": _short(start.cost), "ended": start.reason})]
+        lines += _pairs({"values": values})
+    for index in range(len(problem.space.parameters)):
+        lines += ["", "[[parameter]]", *_pairs(dict(_parameter(outcome, index)))]
+    lines += _correlation(outcome)
+    for target in problem.targets:
+        lines += ["", "[[cell]]", *_pairs(dict(_cell(outcome, target)))]
+    lines += _left_out(outcome)
+    text = "\n".join(lines) + "\n"
+    tomllib.loads(text)
+    return text
+
+
+def bench_text(source: Source, space: Space, values: Sequence[float], fitted: Iterable[str]) -> str:
+    """The bench's own text with the values in their places and `fitted` set; comments stay.
+
+    A value keeps the unit that the file writes it in.
+    """
+    content = source.text.encode()
+    edits: list[tuple[int, int, str]] = []
+    for parameter, value in zip(space.parameters, values, strict=True):
+        for path, factor in parameter.fields:
+            keys = tuple(path.split("."))
+            span = source.positions.span(keys)
+            if span is None:
+                raise CampaignError(f"{source.file}: nothing is written at {path!r}")
+            edits.append((*span, _as_written(source.tree, keys, parameter, factor * value)))
+    cells = _toml(list(fitted))
+    there = source.positions.span(("fitted",))
+    if there is not None:
+        edits.append((*there, cells))
+    else:  # a top-level key must stand before the first table; `name` does
+        end = (source.positions.span(("name",)) or (0, 0))[1]
+        line_end = content.find(b"\n", end)
+        at = len(content) if line_end < 0 else line_end
+        edits.append((at, at, f"\nfitted = {cells}"))
+    for first, last, text in sorted(edits, reverse=True):
+        content = content[:first] + text.encode() + content[last:]
+    changed = content.decode()
+    Bench.model_validate(tomllib.loads(changed))  # what is written can be read back
+    return changed
+
+
+def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: float) -> str:
+    for key in keys:
+        tree = tree[key]
+    if parameter.quantity is None:
+        return _toml(float(f"{value:.6g}"))
+    unit = split_quantity(tree)[1]
+    return _toml(f"{convert(value, parameter.quantity.si, unit):.6g} {unit}")
+
+
+def _fit(outcome: CalibrationOutcome) -> Iterator[tuple[str, Any]]:
+    problem = outcome.problem
+    found = [outcome.fitted.found.get(t.cell.path) for t in problem.targets]
+    yield "cost", _short(outcome.cost)
+    yield "cost_before", _short(outcome.cost_before)
+    yield "cells", len(problem.targets)
+    yield "parameters", len(problem.space.parameters)
+    yield from _summary(deviations(problem.targets, found))
+    yield "starts_finished", len(outcome.starts)
+    yield "starts_that_agree", agreeing(outcome.starts)
+    if outcome.uncertainty is not None:
+        yield "scatter", _short(outcome.uncertainty.scatter)
+    notes = [*problem.warnings, *dict.fromkeys(outcome.fitted.problems)]
+    if outcome.interrupted:
+        notes.insert(0, "interrupted: the best values so far, without intervals")
+    if notes:
+        yield "notes", notes
+
+
+def _summary(percent: np.ndarray[Any, np.dtype[np.float64]]) -> Iterator[tuple[str, float]]:
+    known = np.abs(percent[np.isfinite(percent)])
+    if len(known):
+        yield "median_deviation_percent", _short(float(np.median(known)))
+        yield "worst_deviation_percent", _short(float(np.max(known)))
+
+
+def _parameter(outcome: CalibrationOutcome, index: int) -> Iterator[tuple[str, Any]]:
+    parameter = outcome.problem.space.parameters[index]
+    share = float(outcome.shares[index])
+    yield "name", parameter.name
+    yield "paths", [path for path, _ in parameter.fields]
+    if any(factor != 1.0 for _, factor in parameter.fields):
+        yield "factors", [factor for _, factor in parameter.fields]
+    yield "value", parameter.text(parameter.value(share))
+    certainty = outcome.uncertainty
+    half = float(certainty.half_width[index]) if certainty is not None else math.nan
+    if math.isfinite(half) and half < 10.0:  # ten times the range says nothing
+        ends = (parameter.value(share - half), parameter.value(share + half))
+        yield "interval_95", [parameter.text(end) for end in ends]
+    yield "before", parameter.text(parameter.present)
+    yield "bounds", [parameter.text(parameter.lower), parameter.text(parameter.upper)]
+    if certainty is not None:
+        bound = certainty.bound[index]
+        yield "identified", not certainty.open[index] and not bound
+        if bound:
+            yield "note", f"at its {bound} bound; the others' intervals take it as known"
+        elif certainty.open[index]:
+            yield "note", "not determined by these cells within its bounds"
+
+
+def _correlation(outcome: CalibrationOutcome) -> list[str]:
+    certainty = outcome.uncertainty
+    if certainty is None:
+        return []
+    names = [parameter.name for parameter in outcome.problem.space.parameters]
+    pairs = strong(certainty.correlation, names)
+    matrix = [
+        [round(float(r), 3) + 0.0 if math.isfinite(r) else "" for r in row]
+        for row in certainty.correlation
+    ]
+    lines = ["", "[correlation]", *_pairs({"parameters": names})]
+    lines += ["strong = [", *(f"    {_toml([a, b, round(r, 3)])}," for a, b, r in pairs), "]"]
+    return [*lines, "matrix = [", *(f"    {_toml(row)}," for row in matrix), "]"]
+
+
+def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, Any]]:
+    found = outcome.fitted.found.get(target.cell.path)
+    before = outcome.before.found.get(target.cell.path)
+    yield "cell", target.cell.path
+    yield "unit", target.cell.unit
+    yield "published", target.cell.value
+    for name, value in (("fitted", found), ("before", before)):
+        if value is not None:
+            yield name, _short(value)
+    if found is not None and target.cell.value:
+        yield "deviation_percent", _short(100 * (found / target.cell.value - 1))
+    yield "standard_deviation", target.weight
+    yield "residual", _short(target.residual(found))
+
+
+def _left_out(outcome: CalibrationOutcome) -> list[str]:
+    if not outcome.left_out:
+        return []
+    everything = [
+        (t, f) for left in outcome.left_out for t, f in zip(left.targets, left.found, strict=True)
+    ]
+    overall = deviations([t for t, _ in everything], [f for _, f in everything])
+    beside = deviations(
+        [t for t, _ in everything],
+        [outcome.fitted.found.get(t.cell.path) for t, _ in everything],
+    )
+    condition = outcome.problem.options.leave_out
+    lines = ["", "[leave_one_out]", *_pairs({"condition": condition, **dict(_summary(overall))})]
+    lines += _pairs({f"fitted_{name}": value for name, value in _summary(beside)})
+    for left in outcome.left_out:
+        percent = deviations(left.targets, left.found)
+        shown: dict[str, Any] = {
+            "value": left.value,
+            "cells": [target.cell.path for target in left.targets],
+            "predicted": ["" if f is None else _short(f) for f in left.found],
+            "deviation_percent": [_short(p) if math.isfinite(p) else "" for p in percent],
+        }
+        lines += ["", "[[leave_one_out.without]]", *_pairs(shown)]
+    return lines
+
+
+def _pairs(values: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {_toml(value)}" for key, value in values.items()]
+
+
+def _short(value: float) -> float:
+    """To six digits, which no last bit of a sum reaches; -0 is 0."""
+    return float(f"{value:.6g}") + 0.0
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML writes it, on one line."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case str():
+            return _quoted(value)
+        case Mapping():
+            return "{ " + ", ".join(_pairs(value)) + " }"
+    return "[" + ", ".join(_toml(item) for item in value) + "]"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    safe = (c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped)
+    return '"' + "".join(safe) + '"'

@@ -1,0 +1,76 @@
+"""How well a calibration predicts what it was not fitted to: one value of a condition at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.calibration.search import Search
+from campaign.calibration.targets import Target
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One refit without the cells of one value.
+
+    Attributes:
+        value: of the condition, SI.
+        found: what the refitted bench reproduces of these cells, printed unit; None for a cell
+            that it does not find.
+    """
+
+    value: float | int | str
+    targets: tuple[Target, ...]
+    found: tuple[float | None, ...]
+
+
+def leave_one_out(search: Search, targets: Sequence[Target], optimum: Array) -> list[LeftOut]:
+    """Refit from `optimum` without each value of the condition in turn, and predict its cells."""
+    condition = search.options.leave_out
+    groups: dict[float | int | str, list[int]] = {}
+    for index, target in enumerate(targets):
+        value = target.cell.conditions.get(condition)
+        if isinstance(value, float | int | str):
+            groups.setdefault(value, []).append(index)
+    if len(groups) < 2:
+        return []
+    results = []
+    for number, (value, left) in enumerate(sorted(groups.items(), key=_order), 1):
+        mask = np.ones(len(targets), dtype=bool)
+        mask[left] = False
+        if mask.sum() < len(optimum):
+            continue
+        phase = f"without {condition} {number} of {len(groups)}"
+        end, _, _ = search.fit(optimum, phase, search.options.leave_out_evaluations, mask)
+        found = search.simulation.evaluate(search.space.values(end)).found
+        search.evaluations += 1
+        results.append(
+            LeftOut(
+                value,
+                tuple(targets[i] for i in left),
+                tuple(found.get(targets[i].cell.path) for i in left),
+            )
+        )
+    return results
+
+
+def deviations(targets: Sequence[Target], found: Sequence[float | None]) -> Array:
+    """Deviations in percent; NaN for a cell that was not found, or is zero."""
+    return np.array(
+        [
+            100 * (value / target.cell.value - 1)
+            if value is not None and target.cell.value
+            else np.nan
+            for target, value in zip(targets, found, strict=True)
+        ]
+    )
+
+
+def _order(item: tuple[float | int | str, list[int]]) -> tuple[bool, float | str]:
+    value = item[0]
+    return isinstance(value, str), value

@@ -1,0 +1,194 @@
+"""What a bench with given unknowns reproduces: its tests are simulated and analysed in memory."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.backends import backends
+from campaign.backends.interface import Backend
+from campaign.calibration.problem import CalibrationProblem
+from campaign.calibration.targets import residuals, restricted
+from campaign.errors import CampaignError, ProtocolError, UsageError
+from campaign.experiments.interface import Experiment, TestData, bench_of
+from campaign.protocol.expand import expand, seed_of
+from campaign.protocol.points import PointError
+from campaign.protocol.schema import Test
+from campaign.published.scoreboard import Evidence, evidence_of, score
+from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+
+Array = NDArray[np.float64]
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class FinishedTrial:
+    """A trial with its recording in memory, as an analysis takes it."""
+
+    trial: Trial
+    record: Recording
+
+    @property
+    def ending(self) -> Ending:
+        return self.record.ending
+
+    def recording(self) -> Recording:
+        return self.record
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What one set of values reproduces.
+
+    Attributes:
+        found: cell path to reproduced value in the printed unit; cells that no trial found are
+            absent.
+        problems: sentences on what went wrong.
+    """
+
+    found: Mapping[str, float]
+    problems: tuple[str, ...] = ()
+
+
+class Simulation:
+    """Evaluates sets of values, several trials or several sets at once."""
+
+    def __init__(
+        self, problem: CalibrationProblem, experiments: Mapping[str, Experiment], workers: int
+    ) -> None:
+        self._problem = problem
+        self._experiments = experiments
+        self._workers = workers
+        self._published = restricted(problem.published, problem.targets)
+        self._stopped = threading.Event()
+        kind = backends()["sim"]
+        step = {"longest_step": problem.options.longest_step}
+        self._backend: Backend = kind.open(kind.options.model_validate(step, context={"si": True}))
+
+    def check(self) -> Evaluation:
+        """What the bench reproduces as it is. Raises UsageError when a cell cannot be found."""
+        present = [p.present for p in self._problem.space.parameters]
+        try:
+            groups = [trials for _, trials in self._planned(present)]
+        except PointError as error:
+            raise ProtocolError(error.problems) from None
+        for trial in (trial for group in groups for trial in group):
+            why = self._backend.refuses(trial)
+            if why:
+                raise UsageError(f"{trial.name} ({trial.label}) cannot be simulated: {why}")
+        evaluation = self.evaluate(present)
+        missing = [
+            t.cell.path for t in self._problem.targets if t.cell.path not in evaluation.found
+        ]
+        if missing and not evaluation.problems:
+            raise UsageError(
+                f"no test of {self._problem.protocol.path} finds {', '.join(missing)}; "
+                "sweep what these cells need, or name them under 'without'"
+            )
+        return evaluation
+
+    def trials(self) -> int:
+        """How many trials one evaluation takes."""
+        present = [p.present for p in self._problem.space.parameters]
+        return sum(len(trials) for _, trials in self._planned(present))
+
+    def residuals(self, values: Sequence[float]) -> Array:
+        """Residual of each target, shape (n,)."""
+        return residuals(self._problem.targets, self.evaluate(values).found)
+
+    def residuals_of_all(self, sets: Sequence[Sequence[float]]) -> list[Array]:
+        """Residuals of several sets of values, as many at once as there are workers."""
+        if self._workers == 1 or len(sets) == 1:
+            return [self.residuals(values) for values in sets]
+
+        def one(values: Sequence[float]) -> Array:
+            found = self.evaluate(values, alone=False).found
+            return residuals(self._problem.targets, found)
+
+        return self._at_once(one, sets)
+
+    def evaluate(self, values: Sequence[float], *, alone: bool = True) -> Evaluation:
+        """Simulate every test with `values` (SI) and hold its findings against the targets.
+
+        Args:
+            values: in the order of the parameters.
+            alone: whether the workers are free for the trials of this evaluation.
+        """
+        try:
+            planned = list(self._planned(values))
+        except PointError as error:  # the bench does not accept these values together
+            return Evaluation({}, (str(error),))
+        flat = [trial for _, trials in planned for trial in trials]
+        if alone and self._workers > 1:
+            done = iter(self._at_once(self._execute, flat))
+        else:
+            done = map(self._execute, flat)
+        problems: list[str] = []
+        evidence = []
+        for test, trials in planned:
+            finished = tuple(next(done) for _ in trials)
+            problems += (
+                f"{item.trial.name} {item.trial.label}: {item.ending.reason}"
+                for item in finished
+                if item.ending.outcome is not Outcome.COMPLETED
+            )
+            evidence.append(self._analyse(test, finished, problems))
+        board = score(self._published, evidence)
+        found = {
+            line.cell.path: line.reproduced for line in board.lines if line.reproduced is not None
+        }
+        return Evaluation(found, (*problems, *board.problems))
+
+    def _planned(self, values: Sequence[float]) -> Iterator[tuple[Test, tuple[Trial, ...]]]:
+        calibration = self._problem.calibration
+        bench = self._problem.space.bench(calibration.bench.tree, values)
+        before = 0
+        for test in self._problem.tests:
+            seed = seed_of(test, self._problem.options.seed)
+            trials = expand(replace(test, bench=bench), seed, before, allow_large=False).trials
+            before += len(trials)
+            yield test, trials
+
+    def _execute(self, trial: Trial) -> FinishedTrial:
+        """A trial that fails is a recording like any other."""
+        recorder = MemoryRecorder()
+        try:
+            with np.errstate(all="ignore"):
+                ending = self._backend.execute(trial, recorder, self._stopped.is_set)
+        except (ArithmeticError, ValueError, CampaignError) as error:
+            ending = Ending(Outcome.FAULT, f"{type(error).__name__}: {error}")
+        return FinishedTrial(trial, recorder.recording(ending))
+
+    def _analyse(
+        self, test: Test, finished: tuple[FinishedTrial, ...], problems: list[str]
+    ) -> Evidence:
+        experiment = self._experiments[test.entry.kind]
+        name, reproduces = test.entry.name, test.entry.reproduces
+        if not finished:
+            return evidence_of(name, reproduces, (), None)
+        first = finished[0].trial
+        data = TestData(name, test.entry.kind, first.options, finished)
+        try:
+            findings = experiment.analyse(data).findings
+        except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
+            problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
+            findings = ()
+        return evidence_of(name, reproduces, findings, bench_of(first))
+
+    def _at_once(self, function: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
+        pool = ThreadPoolExecutor(self._workers)
+        try:
+            return list(pool.map(function, items))
+        except BaseException:
+            self._stopped.set()  # Ctrl-C: let running trials end
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+            self._stopped.clear()

@@ -1,0 +1,290 @@
+"""From a protocol's `[calibration]` to a problem to solve: every mistake is said, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from campaign.calibration.space import Parameter, Space
+from campaign.calibration.targets import (
+    DEFAULT_WEIGHT,
+    Target,
+    covers,
+    make_target,
+    weight_of,
+)
+from campaign.errors import Problem, ProtocolError, UsageError
+from campaign.physics.bench import Bench
+from campaign.protocol import Protocol
+from campaign.protocol.calibration import Calibration, CalibrationOptions, CalibrationParameter
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import allowed, find_faults, nearest, shown
+from campaign.protocol.schema import Test
+from campaign.protocol.shapes import shape_at
+from campaign.published.values import Cell, Published
+from campaign.units import Quantity, split_quantity
+
+MANY_PARAMETERS = 12
+"""more than these and a table of some thirty cells hardly tells them apart."""
+
+
+@dataclass(frozen=True)
+class CalibrationProblem:
+    """What is fitted to what, with which tests.
+
+    Attributes:
+        options: how.
+        tests: those that stand for a table with a cell among the targets.
+        published: all published values, for naming.
+        warnings: sentences on what is allowed but unwise.
+    """
+
+    protocol: Protocol
+    calibration: Calibration
+    space: Space
+    targets: tuple[Target, ...]
+    tests: tuple[Test, ...]
+    published: Published
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def options(self) -> CalibrationOptions:
+        return self.calibration.options
+
+
+def make_problem(protocol: Protocol, published: Published) -> CalibrationProblem:
+    """The problem that `protocol` states. Raises ProtocolError with every mistake, placed."""
+    calibration = protocol.calibration
+    if calibration is None:
+        raise UsageError(
+            f"{protocol.path} has no [calibration]; docs/calibration.md says what it holds"
+        )
+    reader = _Reader(protocol, calibration, published)
+    targets = reader.targets()
+    parameters = reader.parameters()
+    if not reader.problems:
+        reader.check_bounds(parameters)
+    if reader.problems:
+        raise ProtocolError(list(dict.fromkeys(reader.problems)))
+    tables = {target.cell.table for target in targets}
+    tests = tuple(t for t in protocol.tests if tables & set(t.entry.reproduces))
+    warnings = []
+    if len(parameters) > MANY_PARAMETERS:
+        warnings.append(
+            f"{len(parameters)} parameters; more than {MANY_PARAMETERS} are seldom told apart"
+        )
+    if len(targets) <= len(parameters):
+        warnings.append(
+            f"{len(targets)} cells for {len(parameters)} parameters; there will be no intervals"
+        )
+    return CalibrationProblem(
+        protocol, calibration, Space(parameters), targets, tests, published, tuple(warnings)
+    )
+
+
+class _Reader:
+    """Resolves the names and units of one calibration; mistakes go to `problems`."""
+
+    def __init__(self, protocol: Protocol, calibration: Calibration, published: Published) -> None:
+        self.problems: list[Problem] = []
+        self._protocol = protocol
+        self._calibration = calibration
+        self._options = calibration.options
+        self._published = published
+        self._written = calibration.bench.tree
+        self._bench: Mapping[str, Any] = Bench.model_validate(self._written).model_dump(mode="json")
+
+    def targets(self) -> tuple[Target, ...]:
+        """The cells in printed order, each with its weight."""
+        wanted = self._chosen("cells", self._options.cells)
+        left_out = self._chosen("without", self._options.without)
+        for name in self._options.weights:
+            if name.count("/") > 2 or not any(covers(name, cell) for cell in wanted.values()):
+                message = f"{shown(name)} is none of the calibration's cells"
+                self._report(("weights", name), message, aim_key=True)
+        stood_for = {name for test in self._protocol.tests for name in test.entry.reproduces}
+        targets = []
+        for path, cell in wanted.items():
+            if path in left_out:
+                continue
+            if cell.table not in stood_for:
+                message = f"no test reproduces {cell.table!r}; add it to a test's 'reproduces'"
+                self._report(("cells",), message)
+                continue
+            key = weight_of(cell, self._options.weights)
+            weight = self._options.weights[key] if key is not None else DEFAULT_WEIGHT
+            try:
+                targets.append(make_target(cell, weight))
+            except ValueError as error:
+                self._report(("weights",) if key is None else ("weights", key), str(error))
+        return tuple(targets)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The unknowns in the order they were written."""
+        parameters = []
+        names: set[str] = set()
+        driven: dict[str, str] = {}
+        for index, entry in enumerate(self._options.parameter):
+            if entry.name in names:
+                self._report(("parameter", index, "name"), f"a second {shown(entry.name)}")
+            names.add(entry.name)
+            for keys, path in _places(entry):
+                if path in driven:
+                    message = f"{shown(path)} is driven by {shown(driven[path])} already"
+                    self._report(("parameter", index, *keys), message)
+                driven[path] = entry.name
+            before = len(self.problems)
+            parameter = self._parameter(index, entry)
+            if parameter is not None and len(self.problems) == before:
+                parameters.append(parameter)
+        return tuple(parameters)
+
+    def check_bounds(self, parameters: tuple[Parameter, ...]) -> None:
+        """A bound must be a value that the bench accepts, all else being as it is."""
+        for index, parameter in enumerate(parameters):
+            for side, value in (("lower", parameter.lower), ("upper", parameter.upper)):
+                tree = Space((parameter,)).bench(self._written, (value,))
+                faults = find_faults(Bench, tree)
+                for keys, _, message in faults if isinstance(faults, list) else ():
+                    place = ".".join(str(key) for key in keys)
+                    self._report(("parameter", index, side), f"with this value, {place}: {message}")
+
+    def _chosen(self, key: str, patterns: tuple[str, ...]) -> dict[str, Cell]:
+        found: dict[str, Cell] = {}
+        for index, pattern in enumerate(patterns):
+            cells = [
+                cell
+                for table in self._published.values()
+                for cell in table.cells
+                if pattern.count("/") <= 2 and covers(pattern, cell)
+            ]
+            if not cells:
+                table = self._published.get(pattern.split("/")[0])
+                if table is None:
+                    names = list(self._published)
+                    message = f"no published table is called {shown(pattern.split('/')[0])}"
+                else:
+                    names = [cell.path for cell in table.cells]
+                    message = f"{shown(pattern)} is no cell of {table.heading}; {allowed(names)}"
+                self._report((key, index), message + nearest(pattern, names))
+            found |= {cell.path: cell for cell in cells}
+        printed = [cell.path for table in self._published.values() for cell in table.cells]
+        return {path: found[path] for path in printed if path in found}
+
+    def _parameter(self, index: int, entry: CalibrationParameter) -> Parameter | None:
+        factors = entry.factors or (1.0,) * len(entry.fields)
+        fields = []
+        for keys, path in _places(entry):
+            if not self._may_be_fitted(("parameter", index, *keys), path):
+                return None
+            fields.append((path, self._quantity(path)))
+        quantity = fields[0][1]
+        for (keys, path), (_, other) in zip(_places(entry), fields, strict=True):
+            if other != quantity:
+                message = (
+                    f"{shown(path)} is {_kind(other)}, {shown(fields[0][0])} {_kind(quantity)}"
+                )
+                self._report(("parameter", index, *keys), message)
+                return None
+        lower = self._bound(index, "lower", entry.lower, quantity)
+        upper = self._bound(index, "upper", entry.upper, quantity)
+        if lower is None or upper is None:
+            return None
+        if not lower < upper:
+            self._report(("parameter", index, "upper"), "it must be greater than 'lower'")
+            return None
+        if entry.scale == "log" and lower <= 0:
+            message = "a logarithmic scale needs a lower bound above zero"
+            self._report(("parameter", index, "lower"), message)
+            return None
+        present = float(_at(self._bench, fields[0][0])) / factors[0]
+        if not lower <= present <= upper:
+            message = (
+                f"the bench's present value, {_at(self._written, fields[0][0])}, is not between "
+                "'lower' and 'upper'; it is where the first fit starts"
+            )
+            self._report(("parameter", index, "lower"), message)
+            return None
+        unit = split_quantity(entry.lower)[1] if isinstance(entry.lower, str) else ""
+        return Parameter(
+            entry.name,
+            tuple(zip(entry.fields, factors, strict=True)),
+            quantity,
+            lower,
+            upper,
+            present,
+            unit,
+            entry.scale == "log",
+        )
+
+    def _may_be_fitted(self, place: Keys, path: str) -> bool:
+        """Whether the bench writes a number there, and no test sweeps it; said when not."""
+        keys = tuple(path.split("."))
+        numbers = dict(_numbers(self._written, self._bench))
+        if path not in numbers:
+            message = (
+                f"the bench writes no number at {shown(path)}; only what stands in its file can "
+                f"be fitted{nearest(path, numbers)}"
+            )
+            self._report(place, message)
+            return False
+        for test in self._protocol.tests:
+            if any(axis.of_bench and axis.keys == keys for axis in test.axes):
+                self._report(place, f"{shown(path)} is swept by the test '{test.entry.name}'")
+                return False
+        return True
+
+    def _quantity(self, path: str) -> Quantity | None:
+        shape = shape_at(Bench, self._bench, tuple(path.split(".")))
+        return shape.quantity if shape is not None else None
+
+    def _bound(
+        self, index: int, side: str, written: str | float, quantity: Quantity | None
+    ) -> float | None:
+        try:
+            if isinstance(quantity, Quantity):
+                if not isinstance(written, str):
+                    raise ValueError(
+                        f"{written:g} has no unit; expected a {quantity.name} such as "
+                        f"{quantity.example}"
+                    )
+                return quantity.parse(written)
+            if isinstance(written, str):
+                raise ValueError(f"{shown(written)} is text; this field is a number without a unit")
+            return float(written)
+        except ValueError as error:
+            self._report(("parameter", index, side), str(error))
+            return None
+
+    def _report(self, keys: Keys, message: str, *, aim_key: bool = False) -> None:
+        aim: Any = "key" if aim_key else "value"
+        self.problems.append(self._calibration.origin.problem(("calibration", *keys), aim, message))
+
+
+def _places(entry: CalibrationParameter) -> Iterator[tuple[Keys, str]]:
+    """Each path with where it stands in its table."""
+    if entry.path:
+        yield ("path",), entry.path
+    for index, path in enumerate(entry.paths):
+        yield ("paths", index), path
+
+
+def _kind(quantity: Quantity | None) -> str:
+    return f"a {quantity.name}" if isinstance(quantity, Quantity) else "a number without a unit"
+
+
+def _numbers(written: Any, valid: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every number that stands in a bench file; text with a unit too."""
+    if isinstance(written, Mapping):
+        for key, value in written.items():
+            below = valid.get(key) if isinstance(valid, Mapping) else None
+            yield from _numbers(value, below, f"{prefix}.{key}" if prefix else str(key))
+    elif isinstance(valid, float):
+        yield prefix, written
+
+
+def _at(tree: Any, path: str) -> Any:
+    for key in path.split("."):
+        tree = tree[key]
+    return tree

@@ -1,0 +1,140 @@
+"""The published cells a bench is fitted to, and what a deviation from each of them counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.published.values import Cell, Published
+from campaign.units import convert, split_quantity
+
+WORST = 30.0
+"""standard deviations: what a cell counts that could not be found, and the most that any counts."""
+DEFAULT_WEIGHT = "10 %"
+
+
+@dataclass(frozen=True)
+class Target:
+    """One cell with its standard deviation.
+
+    Attributes:
+        relative: whether `sigma` is a share of the cell, or a difference in its printed unit.
+    """
+
+    cell: Cell
+    sigma: float
+    relative: bool
+
+    def residual(self, found: float | None) -> float:
+        """Deviation of `found` (printed unit) in standard deviations, at most WORST either way.
+
+        Relative ones are logarithms of the ratio, so that twice and half count the same. A cell
+        that says `at most` or `at least` asks for no more than that.
+        """
+        if found is None or not math.isfinite(found):
+            return WORST
+        if self.relative:
+            ratio = found / self.cell.value
+            if ratio <= 0:
+                return WORST
+            deviation = math.log(ratio) / self.sigma
+        else:
+            deviation = (found - self.cell.value) / self.sigma
+        if self.cell.relation == "at most":
+            deviation = max(0.0, deviation)
+        elif self.cell.relation == "at least":
+            deviation = min(0.0, deviation)
+        return min(max(deviation, -WORST), WORST)
+
+    @property
+    def weight(self) -> str:
+        """Its standard deviation, for people."""
+        if self.relative:
+            return f"{100 * self.sigma:.6g} %"
+        return f"{self.sigma:.6g} {self.cell.unit}".strip()
+
+
+def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> NDArray[np.float64]:
+    """Residual of each target, shape (n,)."""
+    return np.array([target.residual(found.get(target.cell.path)) for target in targets])
+
+
+def covers(pattern: str, cell: Cell) -> bool:
+    """Whether `table`, `table/row` or `table/row/column` means the cell; * stands for any name."""
+    parts = (cell.table, cell.row, cell.column)
+    return all(
+        wanted in ("*", part) for wanted, part in zip(pattern.split("/"), parts, strict=False)
+    )
+
+
+def restricted(published: Published, targets: Sequence[Target]) -> Published:
+    """The published tables with no cells but the targets: a fit sees no others."""
+    wanted = {target.cell.path for target in targets}
+    tables = {}
+    for name, table in published.items():
+        cells = tuple(cell for cell in table.cells if cell.path in wanted)
+        if cells:
+            tables[name] = replace(table, cells=cells)
+    return tables
+
+
+def weight_of(cell: Cell, weights: Mapping[str, str | float]) -> str | None:
+    """The name among `weights` that means the cell most closely; None when none does."""
+    matching = [name for name in weights if name.count("/") <= 2 and covers(name, cell)]
+    return max(matching, key=_closeness, default=None)
+
+
+def make_target(cell: Cell, weight: str | float) -> Target:
+    """A cell with a weight as written. Raises ValueError with a message for the user."""
+    number, unit = split_quantity(weight) if isinstance(weight, str) else (float(weight), "")
+    if not (math.isfinite(number) and number > 0):
+        raise ValueError(f"{weight!r} is no standard deviation; it must be positive")
+    if unit == "%":
+        if cell.value == 0:
+            raise ValueError(f"{cell.path} is 0, so its weight cannot be relative")
+        return Target(cell, number / 100, relative=True)
+    try:
+        sigma = float(convert(number, unit, cell.unit))
+    except Exception:  # noqa: BLE001 (pint raises whatever its parser meets)
+        wanted = f"in {cell.unit}" if cell.unit else "a bare number"
+        raise ValueError(
+            f"{weight!r} is no standard deviation of {cell.path}; write it {wanted} or in %"
+        ) from None
+    return Target(cell, sigma, relative=False)
+
+
+def shortest(targets: Sequence[Target], published: Published) -> tuple[str, ...]:
+    """The cells as a bench's `fitted` names them: whole tables and rows where all is used."""
+    wanted = {target.cell.path for target in targets}
+    names: list[str] = []
+    for table in published.values():
+        names += _shortest_of(table.cells, wanted, "table")
+    return tuple(names)
+
+
+def _shortest_of(
+    cells: Sequence[Cell], wanted: set[str], level: Literal["table", "row"]
+) -> list[str]:
+    used = [cell for cell in cells if cell.path in wanted]
+    if not used:
+        return []
+    if len(used) == len(cells):
+        return [used[0].table if level == "table" else f"{used[0].table}/{used[0].row}"]
+    if level == "row":
+        return [cell.path for cell in used]
+    rows = dict.fromkeys(cell.row for cell in cells)
+    return [
+        name
+        for row in rows
+        for name in _shortest_of([c for c in cells if c.row == row], wanted, "row")
+    ]
+
+
+def _closeness(name: str) -> tuple[int, int]:
+    parts = name.split("/")
+    return sum(part != "*" for part in parts), len(parts)

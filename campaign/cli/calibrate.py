@@ -1,0 +1,147 @@
+"""`campaign calibrate`: fit a bench's unknowns to published cells, and write what came of it."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.text import Text
+
+from campaign.archive.files import why, write_atomically
+from campaign.calibration.document import bench_text, result_text
+from campaign.calibration.outcome import CalibrationOutcome, calibrate
+from campaign.calibration.problem import make_problem
+from campaign.calibration.search import Display, Progress, agreeing
+from campaign.calibration.targets import shortest
+from campaign.cli.output import error_console, print_line, print_note, print_table
+from campaign.cli.prepare import find_protocol
+from campaign.errors import ExitCode, UsageError
+from campaign.experiments import experiments
+from campaign.protocol import Protocol, load_protocol
+from campaign.published.values import Published, published_values
+from campaign.resources import protocols_folder
+
+PLAIN_INTERVAL = 10.0  # s between plain lines of one phase
+
+
+def calibrate_protocol(
+    name: str, results: Path, output: Path | None, *, workers: int | None, leave_out: bool
+) -> ExitCode:
+    """Fit, and write the result and the bench; the result's path is the last line of output."""
+    path = find_protocol(name)
+    protocol = load_protocol(path, experiments(), shipped=protocols_folder())
+    problem = make_problem(protocol, _published(protocol))
+    for warning in problem.warnings:
+        print_note(warning, style="yellow")
+    result, bench = _files(path, results, output)
+    with _display(error_console()) as display:
+        outcome = calibrate(
+            problem,
+            experiments(),
+            workers=workers or os.cpu_count() or 1,
+            display=display,
+            leave_out=leave_out,
+        )
+    fitted = shortest(problem.targets, problem.published)
+    source = problem.calibration.bench
+    _write(bench, bench_text(source, problem.space, outcome.values, fitted))
+    _write(result, result_text(outcome, bench.name))
+    _say(outcome)
+    print_note(f"bench: {bench}")
+    print_line(str(result))
+    return ExitCode.INTERRUPTED if outcome.interrupted else ExitCode.DONE
+
+
+def _published(protocol: Protocol) -> Published:
+    if protocol.published == "none":
+        raise UsageError(f"{protocol.path}: a calibration needs published values, not 'none'")
+    if protocol.published == "thesis":
+        return published_values()
+    return published_values(protocol.sources[protocol.published], protocol.published)
+
+
+def _files(path: Path, results: Path, output: Path | None) -> tuple[Path, Path]:
+    """Where result and bench go; earlier ones are only overwritten where --output says so."""
+    if output is not None:
+        pair = output, output.with_name(f"{output.stem}-bench.toml")
+    else:
+        number = 1
+        while True:
+            stem = f"{path.stem}-calibration{'' if number == 1 else f'-{number}'}"
+            pair = results / f"{stem}.toml", results / f"{stem}-bench.toml"
+            if not any(file.exists() for file in pair):
+                break
+            number += 1
+    try:
+        pair[0].parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{pair[0].parent}: {why(error)}") from None
+    if pair[0].is_dir() or not os.access(pair[0].parent, os.W_OK):
+        raise UsageError(f"{pair[0]}: cannot be written; name another file with --output")
+    return pair
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_atomically(path, text)
+    except OSError as error:
+        raise UsageError(f"{path}: {why(error)}") from None
+
+
+@contextmanager
+def _display(console: Console) -> Iterator[Display]:
+    """A line redrawn in place on a terminal; elsewhere one when a phase begins, and now and then."""
+    if console.is_terminal and not console.is_dumb_terminal:
+        with console.status("evaluating the bench as it is") as status:
+            yield lambda progress: status.update(Text(_line(progress)))
+        return
+    phase, printed = "", 0.0
+
+    def display(progress: Progress) -> None:
+        nonlocal phase, printed
+        now = time.monotonic()
+        if progress.phase != phase or now - printed >= PLAIN_INTERVAL:
+            phase, printed = progress.phase, now
+            console.print(Text(_line(progress)), soft_wrap=True)
+
+    yield display
+
+
+def _line(progress: Progress) -> str:
+    return (
+        f"{progress.phase}: {progress.evaluations} evaluations, cost {progress.cost:.4g}, "
+        f"best {progress.best:.4g}"
+    )
+
+
+def _say(outcome: CalibrationOutcome) -> None:
+    problem = outcome.problem
+    print_table(("parameter", "value", "95 % interval", "note"), _rows(outcome))
+    if outcome.interrupted:
+        print_note("interrupted: the best values so far are kept, without intervals", "yellow")
+    print_note(
+        f"cost {outcome.cost_before:.4g} before, {outcome.cost:.4g} now, on "
+        f"{len(problem.targets)} cells; {agreeing(outcome.starts)} of {len(outcome.starts)} "
+        f"starts agree; {outcome.evaluations} evaluations"
+    )
+
+
+def _rows(outcome: CalibrationOutcome) -> Iterator[tuple[str, ...]]:
+    certainty = outcome.uncertainty
+    for index, parameter in enumerate(outcome.problem.space.parameters):
+        share = float(outcome.shares[index])
+        interval, note = "", ""
+        if certainty is not None:
+            half = float(certainty.half_width[index])
+            if half == half and half < 10.0:
+                ends = (parameter.value(share - half), parameter.value(share + half))
+                interval = " to ".join(str(parameter.text(end)) for end in ends)
+            if certainty.bound[index]:
+                note = f"at its {certainty.bound[index]} bound"
+            elif certainty.open[index]:
+                note = "not determined"
+        yield parameter.name, str(parameter.text(parameter.value(share))), interval, note

@@ -1,0 +1,96 @@
+"""What a protocol says about fitting its bench: the `[calibration]` table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from campaign.options import Options
+from campaign.protocol.files import Origin, Source
+from campaign.units import Time
+
+Number = str | float
+"""Text with a unit, or a bare number for what has none."""
+
+
+class CalibrationParameter(Options):
+    """One `[[calibration.parameter]]`: an unknown of the bench."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
+    """What the result calls it."""
+    path: str = ""
+    """The field of the bench that it is, e.g. axis.inertia."""
+    paths: tuple[str, ...] = ()
+    """Instead of `path`: several fields that it drives together."""
+    factors: tuple[float, ...] = ()
+    """What each of `paths` is multiplied by; 1 when absent."""
+    lower: Number
+    """Smallest value, with its unit."""
+    upper: Number
+    """Largest value, with its unit."""
+    scale: Literal["log", "linear"] = "linear"
+    """Whether steps and random starts are even in its logarithm, or in itself."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if bool(self.path) == bool(self.paths):
+            raise ValueError("give one of 'path' and 'paths'")
+        if self.factors and len(self.factors) != len(self.fields):
+            raise ValueError(f"{len(self.factors)} factors for {len(self.fields)} paths")
+        if 0.0 in self.factors:
+            raise ValueError("a factor of 0 leaves nothing to fit")
+        return self
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """All fields it drives."""
+        return self.paths or (self.path,)
+
+
+class CalibrationOptions(Options):
+    """`[calibration]`: what of the bench is fitted to which published cells, and how."""
+
+    bench: str
+    """The bench that is fitted; every test of the protocol uses it."""
+    cells: tuple[str, ...] = Field(min_length=1)
+    """What it is fitted to: `table`, `table/row` or `table/row/column`; * for any row."""
+    without: tuple[str, ...] = ()
+    """Which of these are left out, in the same form."""
+    parameter: tuple[CalibrationParameter, ...] = Field(min_length=1)
+    """The unknowns."""
+    weights: dict[str, Number] = {}
+    """Standard deviation of the cells: "6 %", or in their unit, "0.3 Hz"; the closest name wins."""
+    starts: int = Field(default=4, ge=1, le=1000)
+    """Fits from different places: the first from the bench as it is, the others at random."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """Of the random starts, and of tests without a seed of their own."""
+    max_evaluations: int = Field(default=60, ge=1, le=100_000)
+    """Steps of each fit at most; those that only take derivatives are not counted."""
+    loss: Literal["linear", "soft_l1", "huber", "cauchy", "arctan"] = "soft_l1"
+    """How a deviation counts: linear is plain least squares, the others curb outliers."""
+    tolerance: float = Field(default=1e-4, gt=0, lt=1)
+    """Relative change of cost or parameters below which a fit has converged."""
+    difference_step: float = Field(default=0.005, gt=0, le=0.1)
+    """Step of the numerical derivatives, as a share of the range from lower to upper."""
+    longest_step: Time = Field(default=0.25e-3, gt=0, le=0.01)
+    """Longest integration step of the simulation."""
+    leave_out: str = "frequency"
+    """The condition whose values are left out in turn to see how well the others predict them."""
+    leave_out_evaluations: int = Field(default=5, ge=1, le=100_000)
+    """Steps of each of these refits at most; they begin at the optimum."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The `[calibration]` of a loaded protocol.
+
+    Attributes:
+        bench: the source of the bench that is fitted.
+        origin: of the protocol's top level, for problems found later.
+    """
+
+    options: CalibrationOptions
+    bench: Source
+    origin: Origin
