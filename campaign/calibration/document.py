@@ -182,14 +182,10 @@ def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, An
 def _left_out(outcome: CalibrationOutcome) -> list[str]:
     if not outcome.left_out:
         return []
-    everything = [
-        (t, f) for left in outcome.left_out for t, f in zip(left.targets, left.found, strict=True)
-    ]
-    overall = deviations([t for t, _ in everything], [f for _, f in everything])
-    beside = deviations(
-        [t for t, _ in everything],
-        [outcome.fitted.found.get(t.cell.path) for t, _ in everything],
-    )
+    targets = [target for left in outcome.left_out for target in left.targets]
+    overall = deviations(targets, [value for left in outcome.left_out for value in left.found])
+    fitted = [outcome.fitted.found.get(target.cell.path) for target in targets]
+    beside = deviations(targets, fitted)
     condition = outcome.problem.options.leave_out
     lines = ["", "[leave_one_out]", *_pairs({"condition": condition, **dict(_summary(overall))})]
     lines += _pairs({f"fitted_{name}": value for name, value in _summary(beside)})

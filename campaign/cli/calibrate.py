@@ -94,7 +94,7 @@ def _write(path: Path, text: str) -> None:
 
 @contextmanager
 def _display(console: Console) -> Iterator[Display]:
-    """A line redrawn in place on a terminal; elsewhere one when a phase begins, and now and then."""
+    """A line redrawn in place on a terminal; elsewhere one per phase, and one now and then."""
     if console.is_terminal and not console.is_dumb_terminal:
         with console.status("evaluating the bench as it is") as status:
             yield lambda progress: status.update(Text(_line(progress)))
