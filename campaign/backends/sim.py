@@ -18,6 +18,7 @@ from campaign.trial import (
     Outcome,
     Recorder,
     SafeState,
+    Task,
     Trial,
 )
 from campaign.units import Time, convert
@@ -35,6 +36,14 @@ CHANNELS = (
     ChannelInfo("friction_torque", "N m", "True friction torque", "N m", measured=False),
     ChannelInfo("load_rate", "rad/s", "True rate of the load", "deg/s", measured=False),
 )
+
+COMMANDS = {
+    "rate": ChannelInfo("command", "rad/s", "Commanded rate", "deg/s"),
+    "torque": ChannelInfo("command", "N m", "Commanded torque", "N m"),
+    "prescribed": ChannelInfo("command", "rad/s", "Prescribed relative rate", "deg/s"),
+    "spring": ChannelInfo("command", "rad", "Angle of the spring's far end", "deg"),
+}
+"""What the command channel holds, by the mode of the task."""
 
 
 class SimOptions(Options):
@@ -75,26 +84,19 @@ class SimBackend:
         from campaign.physics.simulate import simulate
 
         bench, task = _bench(trial), trial.task
-        command = ChannelInfo(
-            "command",
-            *(
-                ("rad/s", "Commanded rate", "deg/s")
-                if task.mode == "rate"
-                else ("N m", "Commanded torque", "N m")
-            ),
-        )
-        recorder.start((command, *CHANNELS[1:]))
+        recorder.start((COMMANDS[task.mode], *CHANNELS[1:]))
         for time, out in simulate(bench, task, trial.seed, self._options.longest_step):
             gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
+            command = task.command.sample(time)
             block = np.stack(
                 [
-                    task.command.sample(time),
+                    command,
                     base_rate(task.base_acceleration, time),
                     gyro,
                     relative,
                     angle,
                     current,
-                    current * bench.torque_per_current,
+                    _drive_torque(bench, task, command, angle, current),
                     pointing,
                     compensation,
                     friction,
@@ -124,6 +126,13 @@ class SimBackend:
 
 def _bench(trial: Trial) -> Bench:
     return Bench.model_validate(trial.bench, context={"si": True})
+
+
+def _drive_torque(bench: Bench, task: Task, command: Array, angle: Array, current: Array) -> Array:
+    """What pulls the load (N m): the motor, or the spring that stands in for it."""
+    if task.mode == "spring":
+        return task.spring_stiffness * (command - angle)
+    return current * bench.torque_per_current
 
 
 def _first_beyond(samples: Array, bound: float | None) -> int:

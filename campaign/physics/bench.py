@@ -302,6 +302,14 @@ class Bench(Options):
         }
         return {**tree, "compensation": named}
 
+    @model_validator(mode="after")
+    def _leave_friction(self) -> Bench:
+        """A preload below its nominal one must not take more friction away than there is."""
+        from campaign.physics.variation import preloaded
+
+        preloaded(self)
+        return self
+
     @property
     def torque_per_current(self) -> float:
         """N Kt: torque at the load per ampere (N m/A)."""

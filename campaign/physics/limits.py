@@ -2,7 +2,8 @@
 
 The motion is the commanded one: the load follows its command exactly, and where the hull moves
 under it the relative motion is the difference. Torque and current follow from a rigid body with the
-worst of the true friction. What the loop does beyond its command is watched during the trial.
+worst of the true friction. What the loop does beyond its command is watched during the trial. Where
+there is no motor, its torque and current are zero, and a spring pulls with what it is stretched by.
 """
 
 from __future__ import annotations
@@ -73,15 +74,13 @@ class Extremes:
 def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     """What `task` comes to beside each limit of `bench`.
 
-    In torque mode the motion is not predicted, because friction decides it: the angle counts as
-    the start angle and the rate as zero, and only the trial itself can tell.
+    In torque mode and behind a spring the motion is not predicted, because friction decides it: the
+    angle counts as the start angle (or how far the spring's end goes) and the rate as zero, and
+    only the trial itself can tell.
     """
     extremes = motion(task)
-    if task.mode == "torque":
-        torque = _largest(task.command, task.duration)
-    else:
-        torque = bench.axis.inertia * extremes.load_acceleration
-        torque += worst_friction(bench, extremes.rate)
+    torque = _drive_torque(bench, task, extremes)
+    current = 0.0 if task.mode in ("prescribed", "spring") else torque / bench.torque_per_current
     limits = bench.limits
     acceleration = max(extremes.load_acceleration, extremes.hull_acceleration)
     return (
@@ -89,19 +88,45 @@ def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
         Margin("rate", extremes.rate, limits.rate, "rad/s"),
         Margin("acceleration", acceleration, limits.acceleration, "rad/s^2"),
         Margin("torque", torque, limits.torque, "N m"),
-        Margin("current", torque / bench.torque_per_current, limits.current, "A"),
+        Margin("current", current, limits.current, "A"),
         Margin("duration", task.duration, limits.duration, "s"),
     )
 
 
+def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float:
+    """Largest torque (N m) that motor or spring has to give at the load."""
+    match task.mode:
+        case "prescribed":  # the motion is given; nothing drives it
+            return 0.0
+        case "spring":  # as if the load never moved
+            return task.spring_stiffness * _stretch(task)
+        case "torque":
+            return _largest(task.command, task.duration)
+    rigid = bench.axis.inertia * extremes.load_acceleration + worst_friction(bench, extremes.rate)
+    return rigid + _largest(task.disturbance, task.duration)
+
+
+def _stretch(task: Task) -> float:
+    """How far the spring's end goes from where the load stands at the start (rad)."""
+    match task.command:
+        case Polyline(times=times, values=values):
+            from_start = tuple(value - task.start_angle for value in values)
+            return _largest(Polyline(times=times, values=from_start), task.duration)
+    return _largest(task.command, task.duration) + abs(task.start_angle)
+
+
 def motion(task: Task) -> Extremes:
-    """The commanded motion of load against hull; of a torque task only what the hull does."""
-    hull_acceleration = _largest(task.base_acceleration, task.duration)
-    if task.mode == "torque":
-        return Extremes(abs(task.start_angle), 0.0, 0.0, hull_acceleration)
+    """The commanded motion of load against hull; where friction decides it, what is known."""
+    # A prescribed motion is relative to the hull, whatever that does.
+    hull = Zero() if task.mode == "prescribed" else task.base_acceleration
+    hull_acceleration = _largest(hull, task.duration)
+    if task.mode in ("torque", "spring"):
+        pulled = task.mode == "spring" and task.spring_stiffness > 0
+        reach = _largest(task.command, task.duration) if pulled else 0.0
+        return Extremes(max(abs(task.start_angle), reach), 0.0, 0.0, hull_acceleration)
     time = _grid(task)
     rate, angle = _load_motion(task.command, time)
-    hull_rate, hull_angle = _hull_motion(task.base_acceleration, time)
+    hull_rate, hull_angle = _hull_motion(hull, time)
     return Extremes(
         angle=float(np.max(np.abs(task.start_angle + angle - hull_angle))),
         rate=float(np.max(np.abs(rate - hull_rate))),
@@ -114,21 +139,22 @@ def worst_friction(bench: Bench, rate: float) -> float:
     """Largest friction torque at the load (N m) of sliding up to `rate` (rad/s); 0 at rest.
 
     The largest of the curve without its viscous part, which is the static torque where a model has
-    one, plus the viscous part at `rate`, in the worse of both directions. What acts at the motor
-    counts N times.
+    one, plus the viscous part at `rate`, in the worse of both directions and at the worst position,
+    on the bench's day and under its preload. What acts at the motor counts N times.
     """
     from campaign.physics.friction import friction_models
+    from campaign.physics.variation import of_its_day
 
     if rate == 0:
         return 0.0
     total = 0.0
-    for friction in bench.friction.values():
+    for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
         speed = rate * (bench.gear.ratio if friction.velocity == "motor" else 1.0)
         speeds = _SPEEDS * speed
         viscous = model.viscous(friction)
-        dry = np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds))
-        torque = float(dry) + viscous * speed
+        dry = float(np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds)))
+        torque = dry * (1.0 + friction.ripple.amplitude) + viscous * speed
         total += torque * (bench.gear.ratio if friction.side == "motor" else 1.0)
     return total
 

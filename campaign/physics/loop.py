@@ -129,6 +129,7 @@ def make_spring(bench: Bench, stiffness: float) -> Loop:
     order = _plant_order(bench)
     a, b = _plant(bench, order)
     a[RATE, CURRENT] = 0.0
+    a[CURRENT], b[CURRENT] = 0.0, 0.0  # no motor: nor does back-EMF drive a current
     inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
     a[RATE, RELATIVE_ANGLE] -= stiffness / inertia
     b[RATE, DRIVE] += stiffness / inertia
