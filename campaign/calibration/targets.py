@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from campaign.published.values import Cell, Published
 from campaign.units import convert, split_quantity
 
-WORST = 30.0
-"""standard deviations: what a cell counts that could not be found, and the most that any counts."""
+WORST = 100.0
+"""How far off a cell counts that could not be found, and the farthest that any counts: by this
+factor, or, where the weight is absolute, by this many times the cell or its standard deviation.
+Nothing that was found may look worse than nothing, and a fit needs a slope wherever it starts."""
 DEFAULT_WEIGHT = "10 %"
 
 
@@ -31,25 +33,31 @@ class Target:
     relative: bool
 
     def residual(self, found: float | None) -> float:
-        """Deviation of `found` (printed unit) in standard deviations, at most WORST either way.
+        """Deviation of `found` (printed unit) in standard deviations, at most `worst` either way.
 
         Relative ones are logarithms of the ratio, so that twice and half count the same. A cell
         that says `at most` or `at least` asks for no more than that.
         """
         if found is None or not math.isfinite(found):
-            return WORST
-        if self.relative:
-            ratio = found / self.cell.value
-            if ratio <= 0:
-                return WORST
-            deviation = math.log(ratio) / self.sigma
-        else:
+            return self.worst
+        if not self.relative:
             deviation = (found - self.cell.value) / self.sigma
+        elif found / self.cell.value > 0:
+            deviation = math.log(found / self.cell.value) / self.sigma
+        else:
+            return self.worst
         if self.cell.relation == "at most":
             deviation = max(0.0, deviation)
         elif self.cell.relation == "at least":
             deviation = min(0.0, deviation)
-        return min(max(deviation, -WORST), WORST)
+        return min(max(deviation, -self.worst), self.worst)
+
+    @property
+    def worst(self) -> float:
+        """The residual of a cell that could not be found."""
+        if self.relative:
+            return math.log(WORST) / self.sigma
+        return WORST * max(1.0, abs(self.cell.value) / self.sigma)
 
     @property
     def weight(self) -> str:
