@@ -7,12 +7,14 @@ default and a meaning. Validation, error messages and documentation all come fro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from dataclasses import field as attribute
 from typing import Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict
-from pydantic_core import PydanticUndefined
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import PydanticUndefined, core_schema
 
 from campaign.units import Quantity
 
@@ -23,6 +25,44 @@ class Options(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+
+@dataclass(frozen=True)
+class TextFile:
+    """An option that names a text file, such as a CSV: the path in TOML, its text when validated.
+
+    Whoever loads the protocol reads the file, relative to the protocol, and keeps its text among
+    the sources. Normalised options hold only name and digest, and read back without the text.
+
+    Attributes:
+        name: as written, among the sources of the protocol.
+        text: None when it is not at hand.
+    """
+
+    name: str
+    text: str | None = attribute(default=None, repr=False)
+
+    def __str__(self) -> str:
+        if self.text is None:
+            return self.name
+        digest = hashlib.sha256(self.text.encode()).hexdigest()
+        return f"{self.name} (SHA-256 {digest[:16]})"
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            cls._validate, serialization=core_schema.to_string_ser_schema()
+        )
+
+    @classmethod
+    def _validate(cls, value: Any, info: ValidationInfo) -> TextFile:
+        if isinstance(value, TextFile):
+            return value
+        if isinstance(value, str) and isinstance(info.context, Mapping) and info.context.get("si"):
+            return cls(value)
+        raise ValueError("not the path of a text file, in quotes")
 
 
 @dataclass(frozen=True)
@@ -86,7 +126,13 @@ def _leaf_types(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-_PLAIN = {str: "text", int: "whole number", float: "number", bool: "true or false"}
+_PLAIN: dict[Any, str] = {
+    str: "text",
+    int: "whole number",
+    float: "number",
+    bool: "true or false",
+    TextFile: "path of a file",
+}
 
 
 def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> str:

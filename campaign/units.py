@@ -170,6 +170,7 @@ CURRENT_GAIN = _quantity("current-to-voltage gain", "V/A", "V/A", "mV/A")
 CURRENT_INTEGRAL_GAIN = _quantity("integral current-to-voltage gain", "V/A/s", "V/A/s", "V/(A s)")
 RATE_INTEGRAL_GAIN = _quantity("integral rate-to-current gain", "A/rad", "A/rad", "A/deg")
 INVERSE_TIME = _quantity("inverse time", "1/s", "1/s")
+LENGTH = _quantity("length", "m", "m", "mm", "cm", "km", "ft")
 
 Angle = Annotated[float, ANGLE]
 AngularRate = Annotated[float, ANGULAR_RATE]
@@ -192,3 +193,4 @@ CurrentGain = Annotated[float, CURRENT_GAIN]
 CurrentIntegralGain = Annotated[float, CURRENT_INTEGRAL_GAIN]
 RateIntegralGain = Annotated[float, RATE_INTEGRAL_GAIN]
 InverseTime = Annotated[float, INVERSE_TIME]
+Length = Annotated[float, LENGTH]

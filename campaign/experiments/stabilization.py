@@ -1,12 +1,13 @@
 """Stabilization under base motion: how still the load stays in space, by compensation method.
 
-The hull swings with a sinusoidal acceleration, the rate command is zero, and the standard deviation
-of the integrated gyro rate over whole cycles is the stabilization error (sections 5.2 and 5.3).
+The hull swings, the rate command is zero, and the standard deviation of the integrated gyro rate is
+the stabilization error (sections 5.2 and 5.3): over whole cycles where the motion is sinusoidal,
+over the whole window where it is a measured series or a ship's roll.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +20,7 @@ from campaign.experiments.common import (
     swept,
 )
 from campaign.experiments.comparisons import compared, preload_of
+from campaign.experiments.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -34,6 +36,8 @@ SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
 SHOWN_CYCLES = 1.5
 """of the base motion in a time history; more cycles only make the reversals smaller."""
+SHOWN_TIME = 60.0
+"""s; of a motion that is not sinusoidal."""
 ZOOM_RATE = 0.12
 """Half height of the zoom on a reversal, as a share of the largest relative rate."""
 ZOOM_SPAN = 0.02
@@ -43,6 +47,8 @@ ZOOM_SPAN = 0.02
 class StabilizationOptions(Options):
     """Options of a stabilization test."""
 
+    motion: Motion = SineMotion()
+    """How the hull moves; frequency, acceleration and cycles are those of a sine."""
     frequency: Frequency = Field(default=0.24, gt=0)
     """Frequency of the base motion."""
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
@@ -57,7 +63,13 @@ class StabilizationOptions(Options):
     """Rate of the recording."""
 
 
+OF_A_SINE = ("frequency", "acceleration", "cycles", "settle_cycles")
+
+
 def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialRequest]:
+    if not isinstance(options.motion, SineMotion):
+        yield _irregular(options, options.motion)
+        return
     if options.sample_rate < SAMPLES_PER_CYCLE * options.frequency:
         raise ValueError(
             f"a recording at {options.sample_rate:.4g} Hz shows fewer than {SAMPLES_PER_CYCLE} "
@@ -76,6 +88,26 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
         ),
         note=f"{options.cycles} cycles measured after {options.settle_cycles} to settle",
     )
+
+
+def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion) -> TrialRequest:
+    """The trial of a motion that is no sine: all of it is measured once it has settled."""
+    given = [name for name in OF_A_SINE if name in options.model_fields_set]
+    if given:
+        raise ValueError(
+            f"{', '.join(given)}: for a sinusoidal motion only, and this one is of kind "
+            f"'{motion.kind}'; remove one or the other"
+        )
+    signal, start, stop = motion.signal()
+    task = Task(
+        mode="rate",
+        base_acceleration=signal,
+        compensation=options.compensation,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=options.sample_rate,
+    )
+    return TrialRequest(task, note=f"{stop - start:.4g} s measured after {start:.4g} s to settle")
 
 
 def stabilization_error(recording: Recording, frequency: float) -> float:
@@ -97,12 +129,21 @@ def _measure(data: TrialData) -> tuple[float, float, float]:
     """Error (rad, 1 sigma), largest deviation from the mean (rad), stuck share of one trial."""
     recording = data.recording().window(*data.trial.task.window)
     signal = data.trial.task.base_acceleration
-    frequency = (
-        signal.frequency if isinstance(signal, Sine) else 1.0 / float(np.ptp(recording.time))
-    )
     position = recording["pointing_error"]
     peak = float(np.max(np.abs(position - np.mean(position))))
-    return stabilization_error(recording, frequency), peak, stuck_share(recording)
+    whole = float(np.std(position))
+    error = stabilization_error(recording, signal.frequency) if isinstance(signal, Sine) else whole
+    return error, peak, stuck_share(recording)
+
+
+def _told(data: TrialData, columns: Sequence[str]) -> dict[str, Value]:
+    """Conditions of the trial; an irregular motion has its kind, not a sine's numbers."""
+    motion = data.trial.options.get("motion")
+    kind = motion.get("kind", "sine") if isinstance(motion, Mapping) else "sine"
+    if kind == "sine":
+        return conditions(data, *columns)
+    told = conditions(data, "compensation")
+    return {**told, "motion": str(kind)}
 
 
 def _analyse(data: TestData) -> Result:
@@ -114,19 +155,28 @@ def _analyse(data: TestData) -> Result:
     for group in groups.values():
         measures = np.array([_measure(item) for item in group])
         error, peak, stuck = measures.mean(axis=0)
-        told = conditions(group[0], *columns) | preload_of(group[0])
+        told = _told(group[0], columns) | preload_of(group[0])
         findings.append(Finding("stabilization_error", float(error), "rad", told))
         spread = float(np.std(measures[:, 0], ddof=1)) if len(group) > 1 else None
         row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
         rows.append(row | {"repeats": len(group), "spread": spread})
     extra = [path for path in paths if path not in columns]
+    sines = any("frequency" in row for row in rows)
+    irregular = any("motion" in row for row in rows)
     table = Table(
         key="stabilization-error",
         title="Stabilization error by compensation method",
         columns=(
             Column("compensation", "Compensation"),
-            Column("frequency", "Frequency", "Hz", "Hz"),
-            Column("acceleration", "Base acceleration", "rad/s^2", "deg/s^2"),
+            *((Column("motion", "Motion"),) if irregular else ()),
+            *(
+                (
+                    Column("frequency", "Frequency", "Hz", "Hz"),
+                    Column("acceleration", "Base acceleration", "rad/s^2", "deg/s^2"),
+                )
+                if sines
+                else ()
+            ),
             *(Column(path, path) for path in extra),
             Column("error", "Error (1σ)", "rad", "mrad"),
             Column("peak", "Largest error", "rad", "mrad"),
@@ -139,7 +189,8 @@ def _analyse(data: TestData) -> Result:
         ),
         rows=tuple(rows),
         thesis=("5.2", "5.8"),
-        note="The error is the standard deviation of the integrated gyro rate over whole cycles.",
+        note="The error is the standard deviation of the integrated gyro rate over "
+        + ("the measured time." if irregular else "whole cycles."),
     )
     figures = tuple(_figures(data, [group[0] for group in groups.values()], paths, rows))
     return Result((table,), figures, (*findings, *compared(findings)), failures_note(data))
@@ -184,8 +235,8 @@ def _cut(data: TrialData) -> Recording:
     task = data.trial.task
     signal = task.base_acceleration
     start, stop = task.window
-    if isinstance(signal, Sine):
-        stop = min(stop, start + SHOWN_CYCLES / signal.frequency)
+    shown = SHOWN_CYCLES / signal.frequency if isinstance(signal, Sine) else SHOWN_TIME
+    stop = min(stop, start + shown)
     cut = data.recording().window(start, stop)
     return Recording(cut.time - start, cut.channels, cut.events, cut.ending)
 
@@ -305,7 +356,7 @@ def _sweep_figure(path: str, rows: list[dict[str, Value]]) -> Figure:
 
 EXPERIMENT = Experiment(
     name="stabilization",
-    summary="stabilization error under sinusoidal base motion (Tables 5.2 and 5.8)",
+    summary="stabilization error under base motion, by compensation (Tables 5.2 and 5.8)",
     options=StabilizationOptions,
     trials=_trials,
     analyse=_analyse,

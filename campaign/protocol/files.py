@@ -138,9 +138,7 @@ def read_text(file: Path) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         raise UnreadableError(f"cannot be read: {reason}") from None
     if len(content) > LARGEST_FILE:
-        raise UnreadableError(
-            f"larger than {LARGEST_FILE // 2**20} MiB; a protocol or bench is small"
-        )
+        raise UnreadableError(f"larger than {LARGEST_FILE // 2**20} MiB, the most that is read")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from campaign.errors import Problem, ProtocolError
+from campaign.options import TextFile
 from campaign.physics.bench import Bench
+from campaign.protocol.attachments import Read, attach, attach_values
 from campaign.protocol.axes import is_large, make_axis, value_problems
 from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.collect import (
@@ -19,7 +21,15 @@ from campaign.protocol.collect import (
     sibling,
     top_level,
 )
-from campaign.protocol.files import Origin, Patched, Source, UnreadableError, Within, read_source
+from campaign.protocol.files import (
+    Origin,
+    Patched,
+    Source,
+    UnreadableError,
+    Within,
+    read_source,
+    read_text,
+)
 from campaign.protocol.matrix import Axis
 from campaign.protocol.overrides import Override, parse_overrides
 from campaign.protocol.positions import Keys
@@ -158,6 +168,7 @@ class _Loader:
         if isinstance(valid, list):
             self._report(*valid)
         known = valid.model_dump(mode="json") if isinstance(valid, Bench) else None
+        options = self._attached(draft, experiment, options)
         axes = self._axes(draft, experiment, options, known)
         self._options(draft, experiment, options, axes)
         if isinstance(entry, list) or known is None or tree is None or bench is None:
@@ -215,6 +226,31 @@ class _Loader:
         self.collected.sources[name] = source
         return source
 
+    def _attached(
+        self, draft: Draft, experiment: ExperimentKind, options: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """The options with the files that they name."""
+        return attach(experiment.options, options, self._reader(draft, draft.origin))
+
+    def _reader(self, draft: Draft, origin: Origin) -> Read:
+        """Reads a file beside the draft's protocol and keeps its text among the sources."""
+
+        def read(keys: Keys, written: str) -> TextFile:
+            file, name = sibling(draft.source, written)
+            known = self.collected.sources.get(name)
+            if known is None or known.file != file:
+                name = name if known is None else str(file)
+                try:
+                    known = Source(file, name, read_text(file), {})
+                except UnreadableError as error:
+                    message = f"{shown(written)}: {error} (looked for {file})"
+                    self._report(origin.problem(keys, "value", message))
+                    return TextFile(written)
+                self.collected.sources[name] = known
+            return TextFile(known.name, known.text)
+
+        return read
+
     def _axes(
         self, draft: Draft, experiment: ExperimentKind, options: Any, bench: Any
     ) -> tuple[Axis, ...]:
@@ -223,7 +259,10 @@ class _Loader:
             if path.split(".")[0] == "bench" and bench is None:
                 continue  # the bench must be right before its fields can be swept
             trees = {"options": options, "bench": bench}
-            axis = make_axis(path, written, origin, experiment.options, trees)
+            read = self._reader(draft, origin)
+            keys = tuple(path.split("."))
+            listed = attach_values(experiment.options, options, keys, written, read)
+            axis = make_axis(path, listed, origin, experiment.options, trees)
             if isinstance(axis, list):
                 self._report(*axis)
                 continue

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from campaign.options import Options
+from campaign.options import Options, TextFile
 from campaign.protocol.files import Origin
 from campaign.protocol.positions import Keys
 from campaign.units import split_quantity
@@ -109,7 +109,7 @@ class Axis:
         """What is swept as plain data, a range unexpanded: for comparing protocols."""
         if isinstance(self.values, Range):
             return {key: getattr(self.values, key) for key in Range.__dataclass_fields__}
-        return list(self.values)
+        return [str(v) if isinstance(v, TextFile) else v for v in self.values]
 
     def value_origin(self, index: int) -> Origin:
         """Where that value stands; all values of a range stand at the range."""

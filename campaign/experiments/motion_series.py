@@ -1,0 +1,124 @@
+"""A measured motion of the hull as a signal: from the text of a CSV file to its acceleration.
+
+Whatever was measured is met exactly at every sample. A rate is a straight line from sample to
+sample, so its acceleration is a staircase; an angle is a natural-ended cubic spline, whose second
+derivative is a polyline; an acceleration is a polyline itself. Before the series, the hull is
+brought from rest to the rate with which it begins.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+
+from campaign.signals import Array, Polyline
+from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME
+
+MOST_ROWS = 100_000
+"""of a series; a trial carries all of them."""
+KINDS = {"angle": ANGLE, "rate": ANGULAR_RATE, "acceleration": ANGULAR_ACCELERATION}
+Kind = Literal["angle", "rate", "acceleration"]
+
+
+def kind_of(unit: str) -> Kind:
+    """What a column in `unit` measures. Raises ValueError naming the units there are."""
+    for kind, quantity in KINDS.items():
+        try:
+            quantity.parse(f"1 {unit}")
+        except ValueError:
+            continue
+        return kind  # type: ignore[return-value]
+    known = "; ".join(f"{kind}: {', '.join(q.accepts)}" for kind, q in KINDS.items())
+    raise ValueError(f"{unit!r} is no unit of a motion; allowed are {known}")
+
+
+def read_series(
+    text: str, name: str, time_column: str, value_column: str, time_unit: str, value_unit: str
+) -> tuple[Array, Array]:
+    """Times (s, from 0) and values (SI), each shape (n,), of a CSV text with a header line.
+
+    Separated by commas, or by semicolons where the header has any; empty lines and lines that
+    begin with # are left out. Raises ValueError with `name` and line for whatever is wrong.
+    """
+    time_factor = TIME.parse(f"1 {time_unit}")
+    value_factor = KINDS[kind_of(value_unit)].parse(f"1 {value_unit}")
+    rows = _rows(text, name)
+    line, header = next(rows, (1, []))
+    columns = [cell.strip() for cell in header]
+    places = []
+    for column in (time_column, value_column):
+        if columns.count(column) != 1:
+            how = "no column" if column not in columns else "more than one column"
+            there = ", ".join(columns) or "none"
+            raise ValueError(f"{name}:{line}: {how} '{column}'; the columns are {there}")
+        places.append(columns.index(column))
+    times: list[float] = []
+    values: list[float] = []
+    for line, row in rows:
+        if len(row) != len(columns):
+            raise ValueError(f"{name}:{line}: {len(row)} values under {len(columns)} columns")
+        if len(times) == MOST_ROWS:
+            raise ValueError(f"{name}:{line}: more than {MOST_ROWS} rows; resample the series")
+        time, value = (_number(row[place], name, line) for place in places)
+        if times and time <= times[-1]:
+            raise ValueError(f"{name}:{line}: the time {time:g} does not come after {times[-1]:g}")
+        times.append(time)
+        values.append(value)
+    if len(times) < 2:
+        raise ValueError(f"{name}: a series needs at least two rows under its header")
+    return (np.array(times) - times[0]) * time_factor, np.array(values) * value_factor
+
+
+def motion_signal(time: Array, value: Array, kind: Kind, lead_in: float) -> Polyline:
+    """Acceleration of the hull (rad/s^2) that makes the series happen from `lead_in` (s) on.
+
+    An acceleration says nothing about the rate it begins with: the one that makes the mean rate of
+    the series zero is taken, as of a hull that swings.
+    """
+    if kind == "rate":
+        slope = np.diff(value) / np.diff(time)
+        knots, levels = np.repeat(time, 2)[1:-1], np.repeat(slope, 2)
+        first = float(value[0])
+    elif kind == "angle":
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(time, value, bc_type="natural")
+        knots, levels, first = time, spline(time, 2), float(spline(0.0, 1))
+    else:
+        steps = np.diff(time)
+        rate = np.concatenate([[0.0], np.cumsum(0.5 * steps * (value[1:] + value[:-1]))])
+        # The mean over time of a rate that is a parabola between the samples.
+        parabola = rate[:-1] + steps * (2 * value[:-1] + value[1:]) / 6
+        knots, levels, first = time, value, -float(np.sum(steps * parabola) / time[-1])
+    ramp = first / lead_in if lead_in > 0 else 0.0
+    return Polyline(
+        times=(0.0, lead_in, *(lead_in + knots).tolist()),
+        values=(ramp, ramp, *levels.tolist()),
+    )
+
+
+def _rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
+    lines = text.splitlines()
+    head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    separator = ";" if ";" in head else ","
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        try:
+            yield number, next(csv.reader([line], delimiter=separator, strict=True))
+        except (csv.Error, StopIteration) as error:
+            raise ValueError(f"{name}:{number}: not readable as CSV: {error}") from None
+
+
+def _number(text: str, name: str, line: int) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise ValueError(f"{name}:{line}: {text.strip()[:40]!r} is not a number") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{name}:{line}: {text.strip()[:40]!r} is not a finite number")
+    return number
