@@ -160,8 +160,9 @@ def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
 
 def _statistics(readings: list[Reading]) -> dict[str, float]:
     """Mean and standard deviation (N m); of these very readings, so divided by their number."""
-    torques = [reading.torque for reading in readings]
-    return {"mean": float(np.mean(torques)), "standard deviation": float(np.std(torques))}
+    torques = np.array([reading.torque for reading in readings])
+    spread = float(np.std(torques - torques[0]))  # equal readings have none, not a rounding error
+    return {"mean": float(np.mean(torques)), "standard deviation": spread}
 
 
 def _findings(readings: list[Reading], planned: set[str]) -> Iterator[Finding]:

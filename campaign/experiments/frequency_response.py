@@ -62,14 +62,15 @@ class FrequencyResponseOptions(Options):
     """Closed loop: the amplitude falls with frequency so that the command does not exceed this;
     absent: nine tenths of what the bench's limits of acceleration, torque and current allow."""
     torque: Torque = Field(default=60.0, gt=0)
-    """Open loop: amplitude of the torque at the load; above the breakaway torque."""
+    """Open loop: amplitude of the torque at the load; above the breakaway torque. Friction that
+    differs by direction lets the load creep towards the easier one while it swings."""
     cycles: int = Field(default=16, ge=1, le=10_000)
     """Whole cycles that are measured at each frequency."""
     settle_cycles: int = Field(default=3, ge=0, le=1_000)
     """Whole cycles before them, at least, for the transient to pass ..."""
-    settle_time: Time = Field(default=0.5, ge=0)
+    settle_time: Time = Field(default=0.3, ge=0)
     """... and as many more as last this long."""
-    samples_per_cycle: int = Field(default=40, ge=8, le=10_000)
+    samples_per_cycle: int = Field(default=20, ge=8, le=10_000)
     """of the recording, as far as a sampled controller has them."""
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
@@ -292,7 +293,7 @@ def _closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
             "phase_margin_error": found.phase_margin_error,
             "gain_crossover": found.phase.frequency,
             "phase_crossover": found.gain.frequency,
-            "crossover": "extrapolated" if found.gain.extrapolated else "measured",
+            "crossover": _read(found),
         }
         rows.append({key: _or_none(value) for key, value in row.items()})
     yield Table(
@@ -307,15 +308,24 @@ def _closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
             Column("gain_margin_error", "± (1σ)", "dB"),
             Column("phase_margin", "Phase margin", "rad", "deg"),
             Column("phase_margin_error", "± (1σ)", "rad", "deg"),
-            Column("gain_crossover", "Gain crossover", "Hz", "Hz"),
-            Column("phase_crossover", "Phase crossover", "Hz", "Hz"),
-            Column("crossover", "Phase crossover is"),
         ),
         rows=tuple(rows),
         thesis=("5.3", "5.9"),
         note="Bandwidth is where the gain of the closed loop falls to -3 dB of unity, which its "
         "integral action gives it at zero frequency. Margins are of the open loop T / (1 - T). "
         "Deviations are those of the noise, not of friction from trial to trial.",
+    )
+    yield Table(
+        key="crossovers",
+        title="Where the margins were read",
+        columns=(
+            Column("compensation", "Compensation"),
+            *(Column(path, path) for path in extra),
+            Column("gain_crossover", "Gain crossover", "Hz", "Hz"),
+            Column("phase_crossover", "Phase crossover", "Hz", "Hz"),
+            Column("crossover", "Phase crossover is"),
+        ),
+        rows=tuple(rows),
     )
     changes = [
         {**{k: sweep.place.get(k) for k in ("compensation", *extra)}, **_difference(bare, sweep)}
@@ -333,6 +343,12 @@ def _closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
             rows=tuple(changes),
             note="Against the same loop without compensation.",
         )
+
+
+def _read(found: ServoCharacteristics) -> str | None:
+    if not math.isfinite(found.gain.margin):
+        return None
+    return "extrapolated" if found.gain.extrapolated else "measured"
 
 
 def _difference(bare: Sweep, sweep: Sweep) -> dict[str, Value]:

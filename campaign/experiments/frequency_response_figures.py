@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from campaign.identification.frequency_response import (
     Continuation,
     Response,
-    characteristics,
     margins,
     open_loop,
 )
@@ -30,7 +30,6 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
     named = [(label, label if several else series, r) for label, series, r in sweeps]
     methods = {series for _, series, _ in sweeps}
     observed, modelled = "observer" in methods, bool(methods & {"lugre", "static"})
-    found = characteristics_of_first(sweeps)
     yield _bode(
         "closed-loop",
         "Closed-loop response, rate command to gyro rate",
@@ -40,7 +39,7 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
         Axis("Gain", "dB"),
         [(label, series, r, r.level, _turned(r)) for label, series, r in named],
         thesis=_chosen(("5.5", modelled), ("5.19", observed)),
-        level_marks=(Mark("-3 dB", y=-3.0), *found),
+        level_marks=(Mark("-3 dB", y=-3.0),),
     )
     loops = [(label, series, open_loop(r)) for label, series, r in named]
     yield _bode(
@@ -52,7 +51,7 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
         "Gain and phase of the open loop over frequency, one curve per compensation, with the "
         "0 dB and -180° lines.",
         Axis("Gain", "dB"),
-        [(label, series, r, r.level, _loop_phase(r)) for label, series, r in loops],
+        [(label, series, r, r.level, _turned(r)) for label, series, r in loops],
         thesis=_chosen(("5.6", modelled), ("5.20", observed)),
         level_marks=(Mark("0 dB", y=0.0),),
         phase_marks=(Mark("-180°", y=-np.pi),),
@@ -61,27 +60,37 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
 
 
 def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
-    """Figure 4.5: drive torque to gyro rate."""
+    """Figure 4.5: drive torque to gyro rate, and the inertia that it looks like."""
     several = len(sweeps) != len({series for _, series, _ in sweeps})
-    marks = tuple(
-        Mark(f"elastic mode, {mode.value:.3g} Hz", x=mode.value) for mode in list(modes)[:1]
-    )
-    return _bode(
+    named = [(label, label if several else series, r) for label, series, r in sweeps]
+    found = [mode.value for mode in modes][:1]
+    bode = _bode(
         "torque-to-rate",
         "Open-loop response, drive torque to gyro rate",
         "A rigid axis falls by 20 dB per decade with the phase at -90°; friction lifts the phase "
         "and flattens the gain at low frequencies. An elastic mode is a dip and a peak side by "
-        "side.",
-        "Gain and phase from drive torque to gyro rate over frequency.",
-        Axis("Gain, dB of 1 rad/s per N m", ""),
-        [
-            (label, label if several else series, r, r.level, _turned(r))
-            for label, series, r in sweeps
-        ],
+        "side: in the inertia that torque over acceleration amounts to, a peak and a dip on top "
+        "of the axis' own.",
+        "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
+        Axis("Gain, dB of 1 rad/s per N m"),
+        [(label, series, r, r.level, _turned(r)) for label, series, r in named],
         thesis=("4.5",),
-        level_marks=marks,
-        phase_marks=tuple(Mark("", x=mark.x) for mark in marks),
+        level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
+        phase_marks=tuple(Mark("", x=value) for value in found),
     )
+    inertia = Panel(
+        FREQUENCY,
+        Axis("Apparent inertia", "kg m^2", "kg m^2"),
+        [Curve(r.frequency, _apparent_inertia(r), label, series) for label, series, r in named],
+        marks=tuple(Mark("", x=value) for value in found),
+    )
+    return replace(bode, panels=(*bode.panels, inertia))
+
+
+def _apparent_inertia(response: Response) -> Array:
+    """Torque over acceleration (kg m^2), shape (n,): what a rigid free axis would have."""
+    omega = 2.0 * np.pi * response.frequency
+    return np.asarray(1.0 / (omega * np.maximum(np.abs(response.values), 1e-300)))
 
 
 def _chosen(*numbers: tuple[str, bool]) -> tuple[str, ...]:
@@ -89,21 +98,11 @@ def _chosen(*numbers: tuple[str, bool]) -> tuple[str, ...]:
     return tuple(number for number, holds in numbers if holds) or tuple(n for n, _ in numbers)
 
 
-def characteristics_of_first(sweeps: Sequence[Named]) -> tuple[Mark, ...]:
-    """The bandwidth of the first curve, as a mark."""
-    width = characteristics(sweeps[0][2]).bandwidth
-    return (Mark(f"{width:.3g} Hz", x=width),) if np.isfinite(width) else ()
-
-
 def _turned(response: Response) -> Array:
     """Phase (rad) with its median within half a turn of -90°."""
     phase = response.phase
     turns = np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
     return np.asarray(phase - 2.0 * np.pi * turns)
-
-
-def _loop_phase(loop: Response) -> Array:
-    return _turned(loop)
 
 
 def _continued(loops: Sequence[Named]) -> Iterator[tuple[Curve, Curve]]:
@@ -114,7 +113,7 @@ def _continued(loops: Sequence[Named]) -> Iterator[tuple[Curve, Curve]]:
         if beyond is None or not gain.extrapolated:
             continue
         at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency, 60)
-        shift = _loop_phase(loop)[-1] - loop.phase[-1]
+        shift = _turned(loop)[-1] - loop.phase[-1]
         label = "extrapolated" if number == 0 else ""
         yield (
             Curve(at, beyond.level(at), label, series, "thin"),

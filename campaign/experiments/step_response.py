@@ -195,8 +195,8 @@ def _figure(steps: list[Step]) -> Figure:
     curves += [Curve(step.time, step.rate, step.label, step.series) for step in steps]
     band = first.options.band
     marks = [
-        Mark(f"+{100 * band:g} %", y=height * (1 + band)),
-        Mark(f"-{100 * band:g} %", y=height * (1 - band)),
+        Mark(f"±{100 * band:g} %", y=height * (1 + band)),
+        Mark("", y=height * (1 - band)),
     ]
     if math.isfinite(first.found.settling_time):
         marks.append(Mark("settled", x=first.found.settling_time))

@@ -1,0 +1,101 @@
+"""Each friction interface on its own, read with a sensor of finite resolution."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaign.experiments.interface import bench_of
+from campaign.result import Result
+from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
+from tests.physics.benches import RATIO, bench
+
+KIND = "component_friction"
+
+
+def three(tree: dict[str, Any]) -> None:
+    """Motor, gearbox and load, with friction like Table 4.1's."""
+    motor = tree["friction"]["motor"] | {"bristle_stiffness": "100 N m/rad"}
+    tree["friction"]["motor"] = motor | {"static_torque": "0.033 N m"}
+    tree["friction"]["gearbox"] = motor | {"static_torque": "0.0375 N m"}
+    tree["friction"]["load"] |= {"static_torque": "21.4 N m", "coulomb_torque": "18 N m"}
+
+
+def scattering(tree: dict[str, Any]) -> None:
+    three(tree)
+    tree["variation"] = {"seed": 3, "trial": 0.07}
+
+
+def result_of(edit: Any, **options: Any) -> Result:
+    return analyse(KIND, execute(trials(KIND, bench(edit), options)))
+
+
+def test_a_perfect_sensor_reads_each_components_own_static_torque() -> None:
+    result = result_of(three, measurements=1, sensor_resolution="0 N m", torque_rate="1 N m/s")
+    for component, expected in (
+        ("load", 21.4),
+        ("motor", RATIO * 0.033),
+        ("gearbox", RATIO * 0.0375),
+    ):
+        found = finding(result, "breakaway_torque", component=component, statistic="mean").value
+        assert 0.96 * expected < found <= 1.001 * expected
+
+
+def test_motor_side_readings_are_multiples_of_one_count_seen_through_the_gear() -> None:
+    """0.01 N m times 141.176 is 1.41 N m: 0.033 N m reads 0.03, and 0.0375 reads 0.04."""
+    result = result_of(three, measurements=1)
+    motor = finding(result, "breakaway_torque", component="motor", statistic="mean").value
+    gearbox = finding(result, "breakaway_torque", component="gearbox", statistic="mean").value
+    load = finding(result, "breakaway_torque", component="load", statistic="mean").value
+    assert motor == pytest.approx(3 * 0.01 * RATIO)
+    assert gearbox == pytest.approx(4 * 0.01 * RATIO)
+    assert load * 100 == pytest.approx(round(load * 100))
+
+
+def test_sum_and_share_follow_from_the_means() -> None:
+    result = result_of(three, measurements=2)
+    means = {
+        name: finding(result, "breakaway_torque", component=name, statistic="mean").value
+        for name in ("motor", "gearbox", "load")
+    }
+    total = finding(result, "breakaway_torque", component="sum").value
+    assert total == pytest.approx(sum(means.values()))
+    assert finding(result, "load_share").value == pytest.approx(means["load"] / total)
+
+
+def test_trials_scatter_and_the_deviation_is_theirs() -> None:
+    result = result_of(scattering, components=["load"], measurements=10)
+    readings = [
+        float(str(row["load"]))
+        for row in table(result, "component-friction").rows
+        if isinstance(row["measurement"], int)
+    ]
+    assert len(readings) == 10
+    deviation = finding(result, "breakaway_torque", statistic="standard deviation").value
+    assert deviation == pytest.approx(np.sqrt(np.mean((readings - np.mean(readings)) ** 2)))
+    assert 0.03 < deviation / np.mean(readings) < 0.12  # ten draws of 7 %
+    assert not [f for f in result.findings if f.quantity == "load_share"]
+
+
+def test_only_one_component_is_on_the_bench() -> None:
+    planned = trials(KIND, bench(three), {"measurements": 3})
+    assert len(planned) == 9
+    for trial in planned:
+        assert list(bench_of(trial).friction) == [trial.point["component"]]
+
+
+def test_a_component_the_bench_does_not_have() -> None:
+    with pytest.raises(ValueError, match="no friction interface 'gearbox'; it has load, motor"):
+        trials(KIND, bench(), {"components": ["gearbox"]})
+
+
+def test_a_component_that_was_not_measured_makes_no_sum() -> None:
+    done = [
+        failed(item) if item.trial.point["component"] == "motor" else item
+        for item in execute(trials(KIND, bench(three), {"measurements": 1}))
+    ]
+    result = analyse(KIND, done)
+    assert not [f for f in result.findings if f.conditions.get("component") in ("sum", "motor")]
+    assert finding(result, "breakaway_torque", component="load", statistic="mean").value > 18
