@@ -17,6 +17,9 @@ DEBUG = "CAMPAIGN_DEBUG"
 
 def main() -> None:
     """Run the command line and exit with its documented code."""
+    # Our matrices are tiny, and trials already take a thread each: threads inside BLAS would only
+    # wait for one another (8 ms for an exponential that takes 15 us). Read when numpy is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app(prog_name="campaign")
     except ProtocolError as error:  # as it is: editors jump to file:line:column
