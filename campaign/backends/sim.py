@@ -103,7 +103,8 @@ class SimBackend:
                     load_rate,
                 ]
             )
-            reached = _first_beyond(relative, task.stop_rate)
+            # By the gyro: the angle sensor, differenced, is too coarse for slow motion.
+            reached = _first_beyond(gyro - block[1], task.stop_rate)
             end, ending = _first_violation(bench.limits, time[:reached], block[:, :reached])
             recorder.append(time[:end], block[:, :end])
             if ending is not None:

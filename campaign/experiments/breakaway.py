@@ -19,6 +19,7 @@ from campaign.identification.presliding import (
     Presliding,
     breakaway_torque,
     damping_by_ratio,
+    fine_angle,
     fit_presliding,
     presliding_curve,
 )
@@ -44,6 +45,7 @@ from campaign.units import (
     Angle,
     AngularRate,
     Frequency,
+    Inertia,
     RotationalDamping,
     Time,
     Torque,
@@ -76,6 +78,8 @@ class BreakawayOptions(Options):
     """The presliding curve is fitted up to this share of the breakaway torque."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
     """Assumed damping ratio of presliding, from which sigma1 follows (Eq. 4.12)."""
+    inertia: Inertia | None = Field(default=None, gt=0)
+    """J that Eq. 4.12 takes; absent: that of the bench."""
     viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
     """sigma2 that Eq. 4.12 takes off; absent: that of the bench's load side."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
@@ -123,8 +127,8 @@ def _evaluate(data: TrialData) -> Ramp:
     recording = data.recording()
     torque, rate = recording["drive_torque"], recording["gyro_rate"]
     before = recording.time <= options.rest
-    zero = float(np.mean(recording["relative_angle"][before]))
-    angle = recording["relative_angle"] - zero
+    angle = fine_angle(recording.time, rate, recording["relative_angle"])
+    angle = angle - float(np.mean(angle[before]))
     sign = 1.0 if options.peak_torque > 0 else -1.0
     breakaway, at = breakaway_torque(
         recording.time, rate, torque, bench.axis.inertia, options.sliding_rate
@@ -137,7 +141,8 @@ def _evaluate(data: TrialData) -> Ramp:
         viscous = sum(
             models[f.model].viscous(f) for f in bench.friction.values() if f.side == "load"
         )
-    damping = damping_by_ratio(found.stiffness, bench.axis.inertia, viscous, options.damping_ratio)
+    inertia = options.inertia or bench.axis.inertia
+    damping = damping_by_ratio(found.stiffness, inertia, viscous, options.damping_ratio)
     return Ramp(conditions(data), recording.time, angle, torque, rate, found, damping)
 
 

@@ -17,6 +17,11 @@ from campaign.identification.least_squares import Array, Fit, Parameter, fit
 
 SMOOTHING = 0.1
 """s; window over which the acceleration is taken: short against a ramp of many seconds."""
+SLACK = 0.03
+"""relative uncertainty of the measured breakaway torque as the curve's asymptote: the peak of a
+ramp lies a little below it."""
+FITTED_SAMPLES = 4000
+"""that a presliding curve is fitted to, at most."""
 SMALLEST_SHARE = 0.02
 """of the breakaway torque that a second interface must carry to be believed: the ramp's own start
 (the load must first be accelerated) bends the curve by less."""
@@ -83,6 +88,20 @@ def breakaway_torque(
     return float(np.max(np.abs(inner))), int(np.argmax(moving))
 
 
+def fine_angle(time: Array, rate: Array, angle: Array) -> Array:
+    """Angle relative to a hull at rest, from gyro and angle sensor together, shape (n,).
+
+    The integrated gyro rate (rad/s) has the resolution that an encoder (rad) lacks, the encoder
+    knows no drift: the straight line between the two is taken off the integral.
+    """
+    interval = float(np.ptp(time)) / max(len(time) - 1, 1)
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * interval
+    if len(time) < 3:
+        return angle
+    drift = np.polynomial.Polynomial.fit(time, angle - integral, 1)
+    return np.asarray(integral + drift(time))
+
+
 def presliding_curve(angle: Array, values: Mapping[str, float]) -> Array:
     """Sum of Tb (1 - exp(-sigma0 q / Tb)) over interfaces 1, 2 ... present in `values`; (n,)."""
     total = np.zeros_like(angle)
@@ -125,44 +144,46 @@ def _fit_window(
         raise ValueError(
             f"only {len(q)} samples lie between {window[0]:.3g} and {window[1]:.3g} N m"
         )
-    # Evenly in torque: a slow ramp has far more samples than information.
-    pick = np.unique(np.linspace(0, len(q) - 1, min(len(q), 400)).astype(int))
+    # Evenly spread: a slow ramp has far more samples than information.
+    pick = np.unique(np.linspace(0, len(q) - 1, min(len(q), FITTED_SAMPLES)).astype(int))
     q, t = q[pick], t[pick]
     slope = max(float(np.polyfit(q, t, 1)[0]), 1e-6)
     first = max(float((t[3] - t[0]) / max(q[3] - q[0], 1e-12)), slope)
-    one = fit(
-        presliding_curve,
-        q,
-        t,
-        [
-            Parameter("stiffness_1", 0.01 * slope, 1e4 * slope, (slope, first)),
-            Parameter("torque_1", 0.3 * breakaway, 30.0 * breakaway, (breakaway,)),
-        ],
-    )
+    # All interfaces together carry the breakaway torque; it is measured, so it is nearly known.
+    total = Parameter("total", (1 - SLACK) * breakaway, (1 + SLACK) * breakaway, (breakaway,))
+    stiffness = Parameter("stiffness_1", 0.01 * slope, 1e4 * slope, (slope, first))
+    one = fit(_one_interface, q, t, [stiffness, total])
     two = fit(
-        presliding_curve,
+        _two_interfaces,
         q,
         t,
         [
-            Parameter("stiffness_1", 0.01 * slope, 1e4 * slope, (slope,)),
-            Parameter("torque_1", 0.3 * breakaway, 30.0 * breakaway, (0.8 * breakaway,)),
+            stiffness,
+            total,
             Parameter("stiffness_2", 0.01 * slope, 1e4 * slope, (first, 5.0 * first)),
             Parameter("torque_2", SMALLEST_SHARE * breakaway, 0.5 * breakaway, (0.15 * breakaway,)),
         ],
     )
-    return (two if two.bic < one.bic - 10.0 and not two.doubts else one), slope
+    # How stiff the weaker interface is may stay open (it slips within the sensor's resolution),
+    # and the total may lean on its measurement; the rest may not.
+    certain = all(doubt.startswith(("stiffness_2", "total")) for doubt in two.doubts)
+    return (two if certain and two.bic < one.bic - 10.0 else one), slope
+
+
+def _one_interface(angle: Array, values: Mapping[str, float]) -> Array:
+    return presliding_curve(angle, {**values, "torque_1": values["total"]})
+
+
+def _two_interfaces(angle: Array, values: Mapping[str, float]) -> Array:
+    return presliding_curve(angle, {**values, "torque_1": values["total"] - values["torque_2"]})
 
 
 def _interfaces(found: Fit) -> tuple[tuple[float, float, float], ...]:
-    rows = [
-        (
-            found.values[f"stiffness_{k}"],
-            found.errors[f"stiffness_{k}"],
-            found.values[f"torque_{k}"],
-        )
-        for k in (1, 2)
-        if f"stiffness_{k}" in found.values
-    ]
+    values, errors = found.values, found.errors
+    weaker = values.get("torque_2", 0.0)
+    rows = [(values["stiffness_1"], errors["stiffness_1"], values["total"] - weaker)]
+    if "stiffness_2" in values:
+        rows.append((values["stiffness_2"], errors["stiffness_2"], weaker))
     return tuple(sorted(rows, key=lambda row: -row[2]))
 
 
