@@ -1,0 +1,357 @@
+"""The gain of the disturbance observer: what more of it gives, and what it costs (5.3.2 to 5.3.4).
+
+Three things are measured at every gain, beside what the linear theory says of the same bench:
+the stabilization error under base motion; how much of a disturbance torque comes through as rate
+(Equation 5.4); and how much of the gyro's noise does (Equation 5.5). A gain at which a trial runs
+into a limit or diverges is a result too: the loop is unstable there.
+
+The gain is told by the corner frequency N K0 / (2 pi J') of the observer, which means the same on
+every bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import Field, JsonValue
+
+from campaign.experiments.common import with_changes
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
+from campaign.experiments.stabilization import stabilization_error
+from campaign.options import Options
+from campaign.physics import observer_loop as theory
+from campaign.physics.bench import Bench
+from campaign.result import Array, Column, Figure, Finding, Result, Table, Value
+from campaign.signals import Sine
+from campaign.trial import Outcome, Recording, Task, Tree, TrialRequest
+from campaign.units import AngularAcceleration, Frequency, Time, Torque
+
+CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
+SETTLE = 2.0
+"""s; at least, before a disturbance or noise is measured."""
+
+
+class ObserverGainOptions(Options):
+    """Options of a study of the observer's gain."""
+
+    observer: str = "observer"
+    """The disturbance observer, by its name on the bench."""
+    corners: tuple[Frequency, ...] = Field(default=CORNERS, min_length=1, max_length=1000)
+    """Corner frequencies N K0 / (2 pi J') to try; the bench's own is always among them."""
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the base motion."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
+    """Amplitude of the base's angular acceleration."""
+    cycles: int = Field(default=3, ge=1, le=10_000)
+    """Whole cycles of the base motion that are measured."""
+    settle_cycles: int = Field(default=1, ge=0, le=1_000)
+    """Cycles before them, for the transient to pass."""
+    noise_time: Time = Field(default=20.0, ge=0)
+    """Time over which the noise is measured; 0 for not at all."""
+    disturbance: Torque = Field(default=5.0, gt=0)
+    """Amplitude of the disturbance torque on the load."""
+    disturbance_frequencies: tuple[Frequency, ...] = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+    """Of the disturbance torque; none: rejection is not measured."""
+    disturbance_cycles: int = Field(default=8, ge=1, le=10_000)
+    """Whole cycles of it that are measured."""
+    without_friction: bool = True
+    """Measure noise and rejection on the bench without its friction, as the equations are: in
+    simulation only. Else as it is: a stuck load neither follows nor shakes as they say."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def _own(bench: Bench, name: str) -> tuple[float, float | None]:
+    """Corner frequency (Hz) of the bench's observer, and the inertia it assumes (kg m^2)."""
+    if name not in bench.compensation:
+        named = ", ".join(bench.compensation) or "none"
+        raise ValueError(f"the bench has no compensation '{name}'; it has {named}")
+    observer = bench.compensation[name]
+    if observer.method != "observer":
+        raise ValueError(f"'{name}' is no disturbance observer: its method is '{observer.method}'")
+    return theory.corner_frequency(bench, observer.gain, observer.inertia), observer.inertia
+
+
+def _benches(options: ObserverGainOptions, bench: Bench) -> Iterator[tuple[float, Bench]]:
+    """Each corner frequency (Hz; 0 is without observer) with the bench tuned to it."""
+    own, inertia = _own(bench, options.observer)
+    yield 0.0, bench
+    for corner in sorted({*options.corners, own}):
+        if corner <= 0:
+            raise ValueError("corner frequencies are positive; 0 is always measured, too")
+        gain = theory.gain_for(bench, corner, inertia)
+        tree = with_changes(bench, {f"compensation.{options.observer}.gain": gain})
+        yield corner, Bench.model_validate(tree, context={"si": True})
+
+
+def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest]:
+    for corner, tuned in _benches(options, bench):
+        name = options.observer if corner else "none"
+        plain = tuned.model_dump(mode="json")
+        linear = with_changes(tuned, {"friction": {}}) if options.without_friction else plain
+        yield _request(_error_task(options, name), plain, corner, "error")
+        if options.noise_time and _is_noisy(bench):
+            yield _request(_noise_task(options, name), linear, corner, "noise")
+        for frequency in options.disturbance_frequencies:
+            task = _rejection_task(options, name, frequency)
+            yield _request(task, linear, corner, "rejection", disturbance_frequency=frequency)
+
+
+def _request(task: Task, bench: Tree, corner: float, measured: str, **more: float) -> TrialRequest:
+    point: dict[str, JsonValue] = {"measured": measured, "corner": corner, **more}
+    return TrialRequest(task, point=point, bench=bench)
+
+
+def _is_noisy(bench: Bench) -> bool:
+    return bench.controller.sample_rate is not None and bench.sensors.gyro.noise > 0
+
+
+def _error_task(options: ObserverGainOptions, name: str) -> Task:
+    start = options.settle_cycles / options.frequency
+    stop = start + options.cycles / options.frequency
+    motion = Sine(amplitude=options.acceleration, frequency=options.frequency)
+    return _task(options, name, start, stop, base_acceleration=motion)
+
+
+def _noise_task(options: ObserverGainOptions, name: str) -> Task:
+    return _task(options, name, SETTLE, SETTLE + options.noise_time)
+
+
+def _rejection_task(options: ObserverGainOptions, name: str, frequency: float) -> Task:
+    start = max(SETTLE, 2.0 / frequency)
+    stop = start + options.disturbance_cycles / frequency
+    disturbance = Sine(amplitude=options.disturbance, frequency=frequency)
+    return _task(options, name, start, stop, disturbance=disturbance)
+
+
+def _task(
+    options: ObserverGainOptions, name: str, start: float, stop: float, **signals: Sine
+) -> Task:
+    return Task(
+        mode="rate",
+        compensation=name,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=options.sample_rate,
+        **signals,
+    )
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What was found at one gain, SI; None where it was not measured, or not stable.
+
+    Attributes:
+        corner: Hz; 0 is without observer.
+        gain: N K0, N m s/rad at the load.
+        error, error_theory: stabilization error (rad).
+        noise, noise_theory: true rate of the load from the gyro's noise (rad/s, 1 sigma).
+        rejection: frequency (Hz), measured and theoretical |w/Td| (rad/s per N m), shape (n, 3).
+        unstable: why its trials ended early; empty when they did not.
+    """
+
+    corner: float
+    gain: float
+    error: float | None
+    error_theory: float | None
+    noise: float | None
+    noise_theory: float | None
+    rejection: Array
+    unstable: str
+
+
+def amplitude(recording: Recording, channel: str, frequency: float) -> float:
+    """Amplitude of a channel at `frequency` (Hz), by least squares with a mean."""
+    turned = 2 * np.pi * frequency * recording.time
+    regressors = np.stack([np.sin(turned), np.cos(turned), np.ones_like(turned)], axis=1)
+    sine, cosine, _ = np.linalg.lstsq(regressors, recording[channel], rcond=None)[0]
+    return float(np.hypot(sine, cosine))
+
+
+def predicted_error(
+    recording: Recording, bench: Bench, corner: float, inertia: float | None
+) -> float:
+    """Error (rad, 1 sigma) that Eq. 5.4 makes of the friction of a recording of whole cycles.
+
+    The true friction is the disturbance; its spectrum through w/Td and the integration to an angle
+    gives the error. A simulator alone knows it.
+    """
+    time = recording.time
+    count = len(time)
+    step = float(np.ptp(time)) / (count - 1)
+    frequency: Array = np.fft.rfftfreq(count, step)[1:].astype(float)
+    torque = np.fft.rfft(recording["friction_torque"])[1:] / count
+    s = 2j * np.pi * frequency
+    high_pass = 2 * np.pi * bench.controller.pointing_high_pass
+    angle = torque * theory.rejection(bench, corner, inertia, frequency) / (s + high_pass)
+    twice = np.full(len(angle), 2.0)
+    if count % 2 == 0:
+        twice[-1] = 1.0
+    return float(np.sqrt(np.sum(twice * np.abs(angle) ** 2)))
+
+
+def _analyse(data: TestData) -> Result:
+    if not data.trials:
+        return Result()
+    options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
+    bench = bench_of(data.trials[0].trial)
+    own, inertia = _own(bench, options.observer)
+    groups: dict[float, list[TrialData]] = {}
+    for item in data.trials:
+        groups.setdefault(float(str(item.trial.point["corner"])), []).append(item)
+    gains = [_gain(c, group, options, inertia) for c, group in sorted(groups.items())]
+    figures: list[Figure] = [
+        *error_figure(gains, own),
+        *rejection_figure(gains, own),
+        *noise_figure(gains, own),
+    ]
+    limit = theory.stability_limit(bench, inertia)
+    findings = tuple(_findings(gains, own, inertia or bench.axis.inertia, options))
+    notes = tuple(_notes(gains, data, limit, options))
+    return Result((_table(gains),), tuple(figures), findings, notes)
+
+
+def _gain(
+    corner: float, group: list[TrialData], options: ObserverGainOptions, inertia: float | None
+) -> Gain:
+    ended = [i for i in group if i.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)]
+    by_kind: dict[str, list[TrialData]] = {}
+    for item in group:
+        if item.ending.outcome is Outcome.COMPLETED:
+            by_kind.setdefault(str(item.trial.point["measured"]), []).append(item)
+    bench = bench_of(group[0].trial)
+    found: dict[str, float | None] = dict.fromkeys(("error", "error_theory", "noise"))
+    for item in by_kind.get("error", [])[:1]:
+        cut = item.recording().window(*item.trial.task.window)
+        found["error"] = stabilization_error(cut, options.frequency)
+        if "friction_torque" in cut.channels:
+            found["error_theory"] = predicted_error(cut, bench, corner, inertia)
+    for item in by_kind.get("noise", [])[:1]:
+        cut = item.recording().window(*item.trial.task.window)
+        found["noise"] = float(np.std(cut["load_rate"])) if "load_rate" in cut.channels else None
+    points = []
+    for item in by_kind.get("rejection", []):
+        frequency = float(str(item.trial.point["disturbance_frequency"]))
+        cut = item.recording().window(*item.trial.task.window)
+        measured = amplitude(cut, "gyro_rate", frequency) / options.disturbance
+        expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
+        points.append((frequency, measured, float(expected)))
+    return Gain(
+        corner=corner,
+        gain=2 * np.pi * corner * (inertia or bench.axis.inertia),
+        noise_theory=theory.noise_rate(bench, corner, inertia) if _is_noisy(bench) else None,
+        rejection=np.array(sorted(points)).reshape(-1, 3),
+        unstable=ended[0].ending.reason if ended else "",
+        **found,
+    )
+
+
+def measured_corner(gain: Gain, without: Gain) -> float | None:
+    """Corner frequency (Hz) that explains by how much the observer reduced |w/Td|.
+
+    By Eq. 5.4 the ratio of the two is s / (s + a), so that (1 / ratio)^2 - 1 = (a / w)^2.
+    """
+    known = {row[0]: row[1] for row in without.rejection}
+    pairs = [(f, known[f] / m) for f, m, _ in gain.rejection if known.get(f) and m > 0]
+    corners = [f * np.sqrt(ratio**2 - 1) for f, ratio in pairs if ratio > 1]
+    return float(np.median(corners)) if corners else None
+
+
+def _findings(
+    gains: list[Gain], own: float, inertia: float, options: ObserverGainOptions
+) -> Iterator[Finding]:
+    motion: dict[str, Value] = {
+        "frequency": options.frequency,
+        "acceleration": options.acceleration,
+    }
+    for gain in gains:
+        where: dict[str, Value] = {"corner": gain.corner, "observer": options.observer}
+        if gain.error is not None:
+            yield Finding("stabilization_error_at_gain", gain.error, "rad", {**motion, **where})
+        if gain.noise is not None:
+            yield Finding("noise_rate", gain.noise, "rad/s", where)
+        for frequency, measured, _ in gain.rejection:
+            there = {**where, "disturbance_frequency": float(frequency)}
+            yield Finding("disturbance_rejection", float(measured), "rad/s/(N m)", there)
+    first = _first_unstable(gains)
+    if first is not None:
+        yield Finding("unstable_corner_frequency", first.corner, "Hz", {})
+    chosen = [g for g in gains if np.isclose(g.corner, own)]
+    corner = measured_corner(chosen[0], gains[0]) if chosen and gains[0].corner == 0 else None
+    if corner is not None:
+        told: dict[str, Value] = {"compensation": options.observer}
+        yield Finding("observer_corner_frequency", corner, "Hz", told)
+        load_gain = 2 * np.pi * corner * inertia
+        yield Finding("observer_gain", load_gain, "N m s/rad", told)
+
+
+def _first_unstable(gains: list[Gain]) -> Gain | None:
+    return next((gain for gain in gains if gain.unstable), None)
+
+
+def _notes(
+    gains: list[Gain], data: TestData, limit: float | None, options: ObserverGainOptions
+) -> Iterator[str]:
+    first = _first_unstable(gains)
+    expected = (
+        f"the linear loop with its delays predicts {limit:.3g} Hz"
+        if limit is not None
+        else "the linear loop is stable at any gain, because nothing in it is delayed"
+    )
+    if first is not None:
+        yield (
+            f"Unstable from K0 = {first.gain:.4g} N m s/rad at the load (corner "
+            f"{first.corner:.4g} Hz): {first.unstable}. A result, not a failure; {expected}."
+        )
+    else:
+        yield f"Stable at every gain that was tried; {expected}."
+    others = [d for d in data.trials if d.ending.outcome in (Outcome.FAULT, Outcome.INTERRUPTED)]
+    if others:
+        yield f"{len(others)} of {len(data.trials)} trials were not executed and are not analysed."
+    if not any(d.trial.point["measured"] == "noise" for d in data.trials):
+        yield "No noise was measured: the bench is not sampled, or its gyro has none."
+    if options.without_friction:
+        yield (
+            "Noise and rejection are measured on the bench without its friction, as Equations 5.4 "
+            "and 5.5 are derived."
+        )
+
+
+def _table(gains: list[Gain]) -> Table:
+    rows: list[Mapping[str, Any]] = []
+    for gain in gains:
+        row = {key: value for key, value in vars(gain).items() if key != "rejection"}
+        ratios = gain.rejection[:, 1] / gain.rejection[:, 2] if len(gain.rejection) else None
+        worst = None if ratios is None else float(ratios[np.argmax(np.abs(ratios - 1))])
+        state = "unstable" if gain.unstable else "stable"
+        rows.append({**row, "worst": worst, "state": state if gain.corner else "no observer"})
+    return Table(
+        key="observer-gain",
+        title="What the observer's gain gives and costs",
+        columns=(
+            Column("corner", "Corner frequency", "Hz", "Hz"),
+            Column("gain", "K0 at the load", "N m s/rad", "N m s/rad"),
+            Column("error", "Error (1σ)", "rad", "mrad"),
+            Column("error_theory", "by Eq. 5.4", "rad", "mrad"),
+            Column("noise", "Rate from noise (1σ)", "rad/s", "deg/s"),
+            Column("noise_theory", "by Eq. 5.5", "rad/s", "deg/s"),
+            Column("worst", "|ω/T| over Eq. 5.4, worst"),
+            Column("state", "Loop"),
+        ),
+        rows=tuple(rows),
+        note="The error by Eq. 5.4 is what it makes of the friction that acted in the same trial. "
+        "Equations 5.4 and 5.5 are taken with the bench's PI controller in place of a constant.",
+    )
+
+
+EXPERIMENT = Experiment(
+    name="observer_gain",
+    summary="error, disturbance rejection and noise over the observer's gain (Eq. 5.4 and 5.5)",
+    options=ObserverGainOptions,
+    trials=_trials,
+    analyse=_analyse,
+)

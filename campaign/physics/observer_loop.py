@@ -1,0 +1,130 @@
+"""What a disturbance observer does to the linear loop: Equations 5.4 and 5.5 with a PI controller.
+
+The thesis derives both for a rate controller that is one constant G_cv. A bench has a PI, and may
+give its observer an inertia J' of its own. Without delay and with an ideal current loop, with
+G(s) = N Kt (Kp + Ki / s) and a = N K0 / J', in terms of the readings y = w + n:
+
+    motor torque     Tm = -G y - T'          T' = a / (s + a) (J' s y - Tm)         (Eq. 5.1)
+    hence            Tm = -C y               C  = G + a J' + a G / s
+    rejection        w / Td = 1 / (J s + C)                                         (Eq. 5.4)
+    noise coupling   w / n  = -C / (J s + C)                                        (Eq. 5.5)
+
+For J' = J the first is s / ((J s + G)(s + a)), which is Eq. 5.4 with G for G_cv, and the second is
+Eq. 5.5. With D(s), the delay and the current loop between command and torque, C = G + a (J' s + D
+G) / (s + a (1 - D)), and the loop that must be stable is D C / (J s).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.physics.bench import Bench
+from campaign.signals import Array
+
+Complex = NDArray[Any]
+"""complex128"""
+TWO_PI = 2.0 * np.pi
+
+
+def corner_frequency(bench: Bench, gain: float, inertia: float | None = None) -> float:
+    """N K0 / (2 pi J') in Hz, of the gain K0 (N m s/rad at the motor)."""
+    return bench.gear.ratio * gain / (TWO_PI * (inertia or bench.axis.inertia))
+
+
+def gain_for(bench: Bench, corner: float, inertia: float | None = None) -> float:
+    """The gain K0 (N m s/rad at the motor) with this corner frequency (Hz)."""
+    return TWO_PI * corner * (inertia or bench.axis.inertia) / bench.gear.ratio
+
+
+def rejection(bench: Bench, corner: float, inertia: float | None, frequency: Array) -> Complex:
+    """Rejection w / Td (rad/s per N m) at `frequency` (Hz), shape (n,); corner 0: no observer."""
+    s = 2j * np.pi * frequency
+    return np.asarray(1.0 / (bench.axis.inertia * s + _controller(bench, corner, inertia, s)))
+
+
+def noise_coupling(bench: Bench, corner: float, inertia: float | None, frequency: Array) -> Complex:
+    """Noise coupling w / n at `frequency` (Hz), shape (n,)."""
+    s = 2j * np.pi * frequency
+    controller = _controller(bench, corner, inertia, s)
+    return np.asarray(-controller * rejection(bench, corner, inertia, frequency))
+
+
+def noise_rate(bench: Bench, corner: float, inertia: float | None) -> float:
+    """Standard deviation (rad/s) of the load's rate that the gyro's noise causes.
+
+    The integral of |w/n|^2 over the noise's spectrum: white from sample to sample, and held in
+    between, 2 sigma^2 T (sin(pi f T) / (pi f T))^2 per hertz. Rounding to a count q adds q^2 / 12.
+    0 for a continuous controller, which sees everything exactly.
+    """
+    rate = bench.controller.sample_rate
+    if rate is None:
+        return 0.0
+    gyro = bench.sensors.gyro
+    variance = gyro.noise**2 + gyro.resolution**2 / 12.0
+    frequency = np.geomspace(1e-5 * rate, 10.0 * rate, 40_001)
+    spectrum = 2.0 * variance / rate * np.sinc(frequency / rate) ** 2
+    power = np.abs(noise_coupling(bench, corner, inertia, frequency)) ** 2 * spectrum
+    return float(np.sqrt(np.trapezoid(power, frequency)))
+
+
+def stability_limit(bench: Bench, inertia: float | None, highest: float = 1000.0) -> float | None:
+    """The smallest corner frequency (Hz) at which the loop is unstable; None below `highest`.
+
+    From the phase at the last gain crossover, with the delays of gyro and controller, half a sample
+    for the hold, and the current loop. Friction and elastic parts are left out.
+    """
+    if phase_margin(bench, highest, inertia) > 0:
+        return None
+    low, high = 0.0, highest
+    while high - low > 1e-4 * highest:
+        middle = 0.5 * (low + high)
+        if phase_margin(bench, middle, inertia) > 0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def phase_margin(bench: Bench, corner: float, inertia: float | None) -> float:
+    """Phase (rad) over -180 deg at the last gain crossover of the rate loop with its observer."""
+    frequency = np.geomspace(1e-2, 1e4, 20_001)
+    s = 2j * np.pi * frequency
+    output, sensor = _delays(bench)
+    drive = np.exp(-s * output) * _current_loop(bench, s)
+    loop = _controller(bench, corner, inertia, s, drive) * drive * np.exp(-s * sensor)
+    loop = loop / (bench.axis.inertia * s)
+    phase = np.unwrap(np.angle(loop))
+    if phase[0] > 0:  # three integrators: -270 deg, not +90 deg
+        phase -= TWO_PI
+    last = int(np.flatnonzero(np.abs(loop) > 1.0)[-1])
+    return float(phase[last] + np.pi)
+
+
+def _controller(
+    bench: Bench, corner: float, inertia: float | None, s: Any, drive: Any = 1.0
+) -> Any:
+    """C(s), N m at the load per rad/s of gyro rate."""
+    rate = bench.controller.rate
+    g = bench.torque_per_current * (rate.proportional + rate.integral_gain / s)
+    a = TWO_PI * corner
+    assumed = inertia or bench.axis.inertia
+    return g + a * (assumed * s + drive * g) / (s + a * (1.0 - drive))
+
+
+def _delays(bench: Bench) -> tuple[float, float]:
+    """Of the output, the hold among it, and of the gyro (s)."""
+    rate = bench.controller.sample_rate
+    if rate is None:
+        return 0.0, 0.0
+    output = np.ceil(bench.controller.delay * rate - 1e-9) + 0.5
+    return float(output / rate), float(round(bench.sensors.gyro.delay * rate) / rate)
+
+
+def _current_loop(bench: Bench, s: Any) -> Any:
+    """Current over commanded current, the motor at rest."""
+    gains, motor = bench.controller.current, bench.motor
+    controller = gains.proportional + gains.integral_gain / s
+    return controller / (controller + motor.resistance + motor.inductance * s)
