@@ -82,7 +82,9 @@ def bench_text(source: Source, space: Space, values: Sequence[float], fitted: It
         end = (source.positions.span(("name",)) or (0, 0))[1]
         line_end = content.find(b"\n", end)
         at = len(content) if line_end < 0 else line_end
-        edits.append((at, at, f"\nfitted = {cells}"))
+        at -= content[:at].endswith(b"\r")
+        newline = "\r\n" if b"\r\n" in content else "\n"
+        edits.append((at, at, f"{newline}fitted = {cells}"))
     for first, last, text in sorted(edits, reverse=True):
         content = content[:first] + text.encode() + content[last:]
     changed = content.decode()

@@ -99,25 +99,29 @@ class _Reader:
         """The cells in printed order, each with its weight."""
         wanted = self._chosen("cells", self._options.cells)
         left_out = self._chosen("without", self._options.without)
-        for name in self._options.weights:
+        for name in self._options.weights if not self.problems else ():
             if name.count("/") > 2 or not any(covers(name, cell) for cell in wanted.values()):
                 message = f"{shown(name)} is none of the calibration's cells"
                 self._report(("weights", name), message, aim_key=True)
         stood_for = {name for test in self._protocol.tests for name in test.entry.reproduces}
         targets = []
+        refused: set[str | None] = set()
         for path, cell in wanted.items():
             if path in left_out:
                 continue
             if cell.table not in stood_for:
                 message = f"no test reproduces {cell.table!r}; add it to a test's 'reproduces'"
-                self._report(("cells",), message)
+                index = next(i for i, p in enumerate(self._options.cells) if covers(p, cell))
+                self._report(("cells", index), message)
                 continue
             key = weight_of(cell, self._options.weights)
             weight = self._options.weights[key] if key is not None else DEFAULT_WEIGHT
             try:
                 targets.append(make_target(cell, weight))
             except ValueError as error:
-                self._report(("weights",) if key is None else ("weights", key), str(error))
+                if key not in refused:  # once for all cells that it is meant for
+                    self._report(("weights",) if key is None else ("weights", key), str(error))
+                refused.add(key)
         return tuple(targets)
 
     def parameters(self) -> tuple[Parameter, ...]:

@@ -76,7 +76,9 @@ class Positions:
                 self._read_pair(child, keys)
 
     def _read_pair(self, node: Any, keys: Keys) -> None:
-        key_node, value_node = node.children[0], node.children[-1]
+        key_node = node.children[0]
+        # A comment behind the value is a child of the pair as well.
+        value_node = next((c for c in node.children[1:] if c.type in _VALUES), node.children[-1])
         for part, part_node in _key_parts(key_node):
             keys = (*keys, part)
             here = self._position(part_node)

@@ -10,7 +10,7 @@ TEXT = """\
 # comment
 a.b."c d" = { x.y = 1, z = [1, "ä", { q = 2 }] }
 [plain]
-n = 1
+n = 1  # one
 [[test]]
 n = 1
 [test.matrix]
@@ -40,6 +40,7 @@ w = true
         (("a", "b", "c d", "z", 2, "q"), "value", (2, 43)),
         (("plain",), "value", (3, 1)),
         (("plain",), "key", (3, 2)),
+        (("plain", "n"), "value", (4, 5)),
         (("test", 0), "value", (5, 1)),
         (("test", 0, "n"), "value", (6, 5)),
         (("test", 0, "matrix"), "value", (7, 1)),
