@@ -138,7 +138,8 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     return Run(speed, options.rest, ramp, cruise, wanted, rule)
 
 
-def _trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
+def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
+    """The warm-up, then one trial out and back for each speed."""
     start_angle = -0.5 * options.max_travel
     if options.warm_up_cycles:
         yield _warm_up(options, start_angle)
@@ -202,7 +203,8 @@ class MapPoint:
     rule: str
 
 
-def _points(data: TrialData) -> Iterator[MapPoint]:
+def map_points(data: TrialData) -> Iterator[MapPoint]:
+    """The two points of one trial, out and back."""
     options = VelocityMapOptions.model_validate(data.trial.options, context={"si": True})
     run = plan_run(float(str(data.trial.point["speed"])), options)
     inertia = bench_of(data.trial).axis.inertia
@@ -232,7 +234,8 @@ class DirectionFit:
     fixed: Fit
 
 
-def _fit(points: list[MapPoint], direction: float) -> DirectionFit:
+def fit_direction(points: list[MapPoint], direction: float) -> DirectionFit:
+    """Fits of the points in one direction (+1, -1). Raises ValueError where there are too few."""
     chosen = sorted((p for p in points if p.rate * direction > 0), key=lambda p: abs(p.rate))
     rate = np.array([abs(p.rate) for p in chosen])
     torque = np.array([p.torque * direction for p in chosen])
@@ -247,13 +250,13 @@ def _analyse(data: TestData) -> Result:
     maps: list[tuple[dict[str, JsonValue], list[MapPoint]]] = []
     for group in grouped(data.completed(), own=("speed",)).values():
         place = {k: v for k, v in group[0].trial.point.items() if k != "speed"}
-        maps.append((place, [point for item in group for point in _points(item)]))
+        maps.append((place, [point for item in group for point in map_points(item)]))
     for number, (place, points) in enumerate(maps, start=1):
         suffix = f"-{number}" if len(maps) > 1 else ""
         where = ", ".join(f"{k} = {v}" for k, v in place.items())
         tables.append(_point_table(points, suffix, where))
         try:
-            fits = {name: _fit(points, sign) for name, sign in DIRECTIONS.items()}
+            fits = {name: fit_direction(points, sign) for name, sign in DIRECTIONS.items()}
         except ValueError as error:
             notes.append(f"No fit{f' for {where}' if where else ''}: {error}.")
             continue
@@ -445,6 +448,6 @@ EXPERIMENT = Experiment(
     name="velocity_map",
     summary="friction torque over constant velocity, and its Stribeck fit (Table 4.3)",
     options=VelocityMapOptions,
-    trials=_trials,
+    trials=map_trials,
     analyse=_analyse,
 )
