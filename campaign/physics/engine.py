@@ -386,6 +386,26 @@ def _linear(
     return torque
 
 
+@inlined
+def _rub_at(
+    elements: Elements,
+    memory: Memory,
+    e: int,
+    angle: float,
+    v0: float,
+    v1: float,
+    step: float,
+    line: Array,
+) -> float:
+    """Advance one element over a step at a prescribed rate; its torque where the step begins."""
+    before = elements.last[e]
+    _ask(elements, e, angle, v0, v1, step, 0.0, line)
+    after = line[0] - 0.5 * line[1]
+    if memory.counters[0] == 0:
+        before = after
+    return 0.5 * (before + after) + elements.viscous[e] * v0
+
+
 @compiled
 def drive(
     friction: Elements,
@@ -399,18 +419,20 @@ def drive(
     """Move friction and compensation at a prescribed relative rate, without plant or motor.
 
     rate: (steps + 1,) rad/s at the step grid.   out: (8, steps / every), rows as OUTPUTS; both
-    rates are the prescribed one and there is no current.
+    rates are the prescribed one and there is no current. The torque recorded at an instant is the
+    mean of the lines that end and begin there, so that it lags the rate by nothing.
     """
     line = np.zeros(2)
     for k in range(rate.shape[0] - 1):
         angle = memory.x[0]
         friction_now, compensation_now = 0.0, 0.0
         for e in range(friction.last.shape[0]):
-            _ask(friction, e, angle, rate[k], rate[k + 1], step, 0.0, line)
-            friction_now += line[0] - 0.5 * line[1] + friction.viscous[e] * rate[k]
+            friction_now += _rub_at(friction, memory, e, angle, rate[k], rate[k + 1], step, line)
         for e in range(compensation.last.shape[0]):
-            _ask(compensation, e, angle, rate[k], rate[k + 1], step, 0.0, line)
-            compensation_now += line[0] - 0.5 * line[1] + compensation.viscous[e] * rate[k]
+            compensation_now += _rub_at(
+                compensation, memory, e, angle, rate[k], rate[k + 1], step, line
+            )
+        memory.counters[0] += 1
         if k % every == 0:
             column = k // every
             out[:, column] = 0.0

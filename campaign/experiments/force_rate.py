@@ -1,0 +1,182 @@
+"""Breakaway against the rate of the applied force: the faster the push, the lower the peak.
+
+A torque ramp acts on the free load from outside, as an ideal force would: there is no drive. The
+breakaway torque is the largest friction before the load slides. Static models know no rate; in the
+LuGre model the bristles have less time to reach their static deflection. Figure 2.8, after Johannes
+et al. as Canudas de Wit et al. (1995) show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pydantic import Field
+
+from campaign.experiments.common import failures_note
+from campaign.experiments.friction_models import Place, in_models, model_series, places
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
+from campaign.signals import Polyline
+from campaign.trial import Task, TrialRequest
+from campaign.units import AngularRate, Torque, TorqueRate
+
+OWN = ("torque_rate",)
+SAMPLES = 4000
+"""of the shortest ramp: its peak is then known to a part in thousands."""
+SLOWEST_RECORDING = 1000.0
+"""Hz, for the slow ramps: the breakaway itself is as quick there."""
+STOP_FACTOR = 4.0
+"""Rate that ends the trial, over the rate that counts as sliding."""
+
+
+class ForceRateOptions(Options):
+    """Options of a force-rate test."""
+
+    torque_rates: tuple[TorqueRate, ...] = Field(
+        default=(3.0, 10.0, 30.0, 100.0, 300.0, 1000.0), min_length=1, max_length=1000
+    )
+    """Slopes of the ramps."""
+    peak_torque: Torque = Field(default=60.0, gt=0)
+    """Where a ramp ends if the load has not moved; above the breakaway torque expected."""
+    sliding_rate: AngularRate = Field(default=0.01, gt=0)
+    """Rate at which the load counts as sliding; the peak is looked for before it."""
+    models: tuple[str, ...] = ()
+    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+
+
+def _trials(options: ForceRateOptions, bench: Bench) -> Iterator[TrialRequest]:
+    for point, tree in in_models(bench, options.models):
+        for rate in options.torque_rates:
+            if rate <= 0:
+                raise ValueError("torque rates are positive")
+            duration = options.peak_torque / rate
+            yield TrialRequest(
+                Task(
+                    mode="spring",  # of no stiffness: a load that nothing but the ramp pushes
+                    disturbance=Polyline(times=(0.0, duration), values=(0.0, options.peak_torque)),
+                    duration=duration,
+                    window=(0.0, duration),
+                    sample_rate=max(SAMPLES / duration, SLOWEST_RECORDING),
+                    stop_rate=STOP_FACTOR * options.sliding_rate,
+                ),
+                point={**point, "torque_rate": rate},
+                note="ends early, once the load slides",
+                bench=tree,
+            )
+
+
+def _peak(data: TrialData) -> tuple[float, float]:
+    """Largest friction before sliding (N m), and the torque applied at that moment (N m)."""
+    options = ForceRateOptions.model_validate(data.trial.options, context={"si": True})
+    recording = data.recording()
+    sliding = np.abs(recording["load_rate"]) > options.sliding_rate
+    if not sliding.any():
+        raise ValueError("the load did not slide; raise peak_torque or lower sliding_rate")
+    friction = recording["friction_torque"][: max(int(np.argmax(sliding)), 1)]
+    at = int(np.argmax(friction))
+    applied = data.trial.task.disturbance.sample(recording.time[at : at + 1])
+    return float(friction[at]), float(applied[0])
+
+
+def _rows(place: Place, notes: list[str]) -> Iterator[dict[str, float]]:
+    for item in place.trials:
+        try:
+            peak, applied = _peak(item)
+        except ValueError as error:
+            notes.append(f"{item.trial.label}: {error}.")
+            continue
+        rate = float(str(item.trial.point["torque_rate"]))
+        yield {"torque_rate": rate, "breakaway": peak, "applied": applied}
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    found = places(data.completed(), OWN)
+    rows = {place.label: (place, list(_rows(place, notes))) for place in found}
+    findings = tuple(
+        Finding(
+            "breakaway_torque",
+            row["breakaway"],
+            "N m",
+            {**place.point, "torque_rate": row["torque_rate"]},
+        )
+        for place, own in rows.values()
+        for row in own
+    )
+    if not findings:
+        return Result(notes=tuple(notes))
+    listed: list[dict[str, Value]] = [
+        {**place.point, **row} for place, own in rows.values() for row in own
+    ]
+    table = Table(
+        key="force-rate",
+        title="Breakaway torque by rate of the applied torque",
+        columns=(
+            *found[0].columns,
+            Column("torque_rate", "Rate of the applied torque", "N m/s", "N m/s"),
+            Column("breakaway", "Breakaway torque", "N m", "N m"),
+            Column("applied", "Applied torque at that moment", "N m", "N m"),
+        ),
+        rows=tuple(listed),
+        note="The breakaway torque is the largest friction torque before the load slides.",
+    )
+    return Result((table,), (_figure(rows),), findings, tuple(notes))
+
+
+def _figure(rows: dict[str, tuple[Place, list[dict[str, float]]]]) -> Figure:
+    peaks, histories = [], []
+    for label, (place, own) in rows.items():
+        series = model_series(str(place.point.get("model", label or "measured")))
+        points = np.array(sorted((row["torque_rate"], row["breakaway"]) for row in own))
+        if len(points):
+            peaks.append(Curve(points[:, 0], points[:, 1], label, series, "line+points"))
+            histories += list(_histories(place, own, label, series))
+    top = max(float(curve.y.max()) for curve in peaks)
+    applied = Axis("Applied torque", "N m", "N m", limits=(0.0, 1.6 * top))
+    friction = Axis("Friction torque", "N m", "N m", limits=(0.0, 1.15 * top))
+    line = np.array([0.0, 1.6 * top])
+    histories.append(Curve(line, line, "friction holds the load", "reference", "thin"))
+    return Figure(
+        key="force-rate",
+        title="Breakaway torque over the rate of the applied torque",
+        caption="Left: a dynamic model lets go earlier the faster the torque rises; a static one "
+        "always at its static torque. Right: friction follows the applied torque, on the dotted "
+        "line, until the load slides; the slowest and the fastest ramp of each model.",
+        alt="Breakaway torque over torque rate on a logarithmic axis, and friction torque over "
+        "applied torque for the slowest and the fastest ramp.",
+        panels=(
+            Panel(
+                Axis("Rate of the applied torque", "N m/s", "N m/s", scale="log"),
+                Axis("Breakaway torque", "N m", "N m", limits=(0.0, 1.15 * top)),
+                peaks,
+                "Breakaway",
+            ),
+            Panel(applied, friction, histories, "Slowest and fastest ramp"),
+        ),
+        thesis=("2.8",),
+        across=2,
+    )
+
+
+def _histories(
+    place: Place, rows: list[dict[str, float]], label: str, series: str
+) -> Iterator[Curve]:
+    """Friction over applied torque of the slowest and the fastest ramp."""
+    rates = sorted(row["torque_rate"] for row in rows)
+    for item in place.trials:
+        if item.trial.point["torque_rate"] in (rates[0], rates[-1]):
+            recording = item.recording()
+            applied = item.trial.task.disturbance.sample(recording.time)
+            yield Curve(applied, recording["friction_torque"], label, series)
+
+
+EXPERIMENT = Experiment(
+    name="force_rate",
+    summary="breakaway torque against the rate of an applied torque (Figure 2.8)",
+    options=ForceRateOptions,
+    trials=_trials,
+    analyse=_analyse,
+)

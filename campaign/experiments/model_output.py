@@ -1,0 +1,330 @@
+"""What friction models say to a prescribed sinusoidal rate, without a plant (Figures 4.10, 4.14).
+
+The load is moved exactly as prescribed, so nothing but the model decides the torque. The friction
+of the bench can be described by several models, its compensators run on the same rate, and each
+parameter can be varied (Figures 5.12 and 5.13).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from pydantic import Field, JsonValue
+
+from campaign.experiments.common import conditions, failures_note, method_label, with_changes
+from campaign.experiments.friction_models import in_models, model_label, model_series, places
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.steady_friction import steady_friction
+from campaign.result import (
+    Array,
+    Axis,
+    Column,
+    Curve,
+    Figure,
+    Finding,
+    Mark,
+    Panel,
+    Result,
+    Style,
+    Table,
+    Value,
+)
+from campaign.signals import Sine
+from campaign.trial import Recording, Task, Tree, TrialRequest
+from campaign.units import AngularRate, Frequency
+
+OWN = ("model", "compensation", "parameter", "factor")
+RATE = Axis("Rate", "rad/s", "deg/s")
+TORQUE = Axis("Friction torque", "N m", "N m")
+CYCLES = 2
+"""of the prescribed rate; the first brings the bristles into their cycle, the last is shown."""
+NEAR_ZERO = 0.08
+"""Share of the amplitude that is shown around zero rate."""
+SYMBOLS = {
+    "bristle_stiffness": "bristle stiffness σ0",
+    "bristle_damping": "bristle damping σ1",
+    "viscous_friction": "viscous friction σ2",
+    "static_torque": "static torque Ts",
+    "coulomb_torque": "Coulomb torque Tc",
+    "stribeck_velocity": "Stribeck velocity vs",
+    "stribeck_exponent": "Stribeck exponent δ",
+}
+
+
+class ModelOutputOptions(Options):
+    """Options of a model-output test."""
+
+    amplitude: AngularRate = Field(default=0.2, gt=0)
+    """Amplitude of the prescribed rate."""
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the prescribed rate."""
+    models: tuple[str, ...] = ("stribeck", "lugre")
+    """Friction models to describe the bench's friction by, beside each other; none: its own."""
+    compensation: tuple[str, ...] = ()
+    """Compensations of the bench with a friction model inside, shown beside the friction."""
+    vary: tuple[str, ...] = ()
+    """Parameters of the bench's friction to vary, one at a time."""
+    factors: tuple[float, ...] = Field(default=(0.5, 1.5), max_length=100)
+    """What each varied parameter is multiplied by."""
+    sample_rate: Frequency = Field(default=2000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]:
+    for point, tree in in_models(bench, options.models):
+        yield _request(options, point, tree)
+    for name in options.compensation:
+        if name not in bench.compensation:
+            raise ValueError(
+                f"the bench '{bench.name}' has no compensation '{name}'; it has "
+                f"{', '.join(bench.compensation) or 'none'}"
+            )
+        if not getattr(bench.compensation[name], "friction", None):
+            raise ValueError(f"the compensation '{name}' has no friction model to show")
+        yield _request(options, {"compensation": name}, None, name)
+    for parameter in options.vary:
+        for factor in options.factors:
+            varied = with_changes(bench, _scaled(bench, parameter, factor))
+            yield _request(options, {"parameter": parameter, "factor": factor}, varied)
+    if options.vary:
+        yield _request(options, {"parameter": "", "factor": 1.0}, None)
+
+
+def _request(
+    options: ModelOutputOptions,
+    point: dict[str, JsonValue],
+    bench: Tree | None,
+    compensation: str = "none",
+) -> TrialRequest:
+    duration = CYCLES / options.frequency
+    return TrialRequest(
+        Task(
+            mode="prescribed",
+            command=Sine(amplitude=options.amplitude, frequency=options.frequency),
+            compensation=compensation,
+            duration=duration,
+            window=(duration - 1.0 / options.frequency, duration),
+            sample_rate=options.sample_rate,
+            start_angle=-options.amplitude / (2.0 * np.pi * options.frequency),
+        ),
+        point=point,
+        bench=bench,
+    )
+
+
+def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
+    """Values (SI) by dotted path: the parameter in every interface and direction that has it."""
+    changes = {}
+    for name, friction in bench.friction.items():
+        for path, holder in (("", friction), ("negative.", getattr(friction, "negative", None))):
+            value = getattr(holder, parameter, None)
+            if isinstance(value, float):
+                changes[f"friction.{name}.{path}{parameter}"] = value * factor
+    if not changes:
+        raise ValueError(f"no friction of the bench '{bench.name}' has a '{parameter}' to vary")
+    return changes
+
+
+def _analyse(data: TestData) -> Result:
+    figures: list[Figure] = []
+    rows: list[dict[str, Value]] = []
+    findings: list[Finding] = []
+    found = places(data.completed(), OWN)
+    for number, place in enumerate(found, start=1):
+        suffix = f"-{number}" if len(found) > 1 else ""
+        plain = [item for item in place.trials if "parameter" not in item.trial.point]
+        varied = [item for item in place.trials if "parameter" in item.trial.point]
+        if plain:
+            figures += [_static_figure(plain[0], suffix), _sine_figure(plain, suffix)]
+        figures += _variation_figures(varied, suffix)
+        for item in place.trials:
+            row = _row(item)
+            rows.append({**place.point, **row})
+            for quantity in ("peak", "at_reversal"):
+                value = float(str(row[quantity]))
+                findings.append(Finding(f"model_{quantity}", value, "N m", conditions(item)))
+    if not rows:
+        return Result(notes=failures_note(data))
+    table = Table(
+        key="model-output",
+        title="Output of the models at a sinusoidal rate",
+        columns=(
+            *found[0].columns,
+            Column("source", "Model"),
+            Column("peak", "Largest torque", "N m", "N m"),
+            Column("at_amplitude", "At the largest rate", "N m", "N m"),
+            Column("at_reversal", "Where the rate falls through zero", "N m", "N m"),
+        ),
+        rows=tuple(rows),
+        note="Where the rate falls through zero a static model jumps, and a dynamic one still "
+        "holds the torque of its bristles.",
+    )
+    return Result((table,), tuple(figures), tuple(findings), failures_note(data))
+
+
+def _cycle(data: TrialData) -> tuple[Recording, Array]:
+    """The last cycle, and the torque that this trial is about: of friction or of compensation."""
+    cut = data.recording().window(*data.trial.task.window)
+    chosen = "friction_torque" if data.trial.task.compensation == "none" else "compensation_torque"
+    return cut, cut[chosen]
+
+
+def _source(data: TrialData) -> str:
+    point = data.trial.point
+    if "compensation" in point:
+        return f"{method_label(str(point['compensation']))} (compensation)"
+    if point.get("parameter"):
+        return f"{_symbol(str(point['parameter']))} × {point['factor']}"
+    return model_label(str(point["model"])) if "model" in point else "friction of the bench"
+
+
+def _symbol(parameter: str) -> str:
+    return SYMBOLS.get(parameter, parameter.replace("_", " "))
+
+
+def _row(data: TrialData) -> dict[str, Value]:
+    cut, torque = _cycle(data)
+    rate = cut["load_rate"]
+    falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
+    reversal = float(torque[falling[0]]) if len(falling) else float("nan")
+    return {
+        "source": _source(data),
+        "peak": float(np.max(torque)),
+        "at_amplitude": float(torque[np.argmax(rate)]),
+        "at_reversal": reversal,
+    }
+
+
+def _static_figure(data: TrialData, suffix: str) -> Figure:
+    options = ModelOutputOptions.model_validate(data.trial.options, context={"si": True})
+    bench = bench_of(data.trial)
+    half = np.geomspace(1e-5 * options.amplitude, options.amplitude, 400)
+    rate = np.concatenate([-half[::-1], half])
+    dry, viscous = steady_friction(bench, rate)
+    gap = np.where(np.arange(len(rate)) == len(half), np.nan, 1.0)  # no line through the jump
+    return Figure(
+        key=f"static-curve{suffix}",
+        title="Friction of steady sliding and its parts",
+        caption="The Stribeck part s(v) falls from static to Coulomb friction, the viscous part "
+        "rises with the rate; their sum is what every model here comes to at a constant rate.",
+        alt="Friction torque over rate in both directions: the Stribeck part, the straight viscous "
+        "part, and their sum, with a jump at zero rate.",
+        panels=(
+            Panel(
+                RATE,
+                TORQUE,
+                [
+                    Curve(rate, (dry + viscous) * gap, "s(v) sgn(v) + σ2 v", "fit"),
+                    Curve(rate, dry * gap, "Stribeck part s(v) sgn(v)", "static"),
+                    Curve(rate, viscous, "viscous part σ2 v", "reference"),
+                ],
+            ),
+        ),
+        thesis=("4.10",),
+    )
+
+
+def _sine_figure(trials: list[TrialData], suffix: str) -> Figure:
+    compensated = any("compensation" in item.trial.point for item in trials)
+    curves = []
+    for item in trials:
+        cut, torque = _cycle(item)
+        point = item.trial.point
+        name = str(point.get("compensation", model_series(str(point.get("model", "none")))))
+        thin = compensated and "compensation" not in point
+        style: Style = "thin" if thin else "line"
+        curves.append(Curve(*_closed(cut["load_rate"], torque), _source(item), name, style))
+    near = NEAR_ZERO * float(max(np.max(curve.x) for curve in curves))
+    zoom = Axis(RATE.label, "rad/s", "deg/s", limits=(-near, near))
+    mark = (Mark("", x=0.0),)
+    return Figure(
+        key=f"sine{suffix}",
+        title="Output of the models over a sinusoidal rate",
+        caption="A static model jumps where the rate changes its sign. In a dynamic one the "
+        "bristles have to turn around first, so the torque comes late and without a jump, on "
+        "another branch for rising than for falling rate.",
+        alt="Torque over rate for each model in one cycle of a sinusoidal rate, and the same near "
+        "zero rate, where the static model jumps and the dynamic one makes a loop.",
+        panels=(
+            Panel(RATE, TORQUE, curves, "Whole cycle"),
+            Panel(zoom, TORQUE, curves, "Near zero rate", marks=mark),
+        ),
+        thesis=("4.14",),
+        across=2,
+    )
+
+
+def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:
+    return np.append(rate, rate[0]), np.append(torque, torque[0])
+
+
+def _variation_figures(trials: list[TrialData], suffix: str) -> Iterator[Figure]:
+    """Parameters that steady sliding does not show (Figure 5.12), and the others (5.13)."""
+    plain = [item for item in trials if not item.trial.point["parameter"]]
+    by_parameter: dict[str, list[TrialData]] = {}
+    for item in trials:
+        if item.trial.point["parameter"]:
+            by_parameter.setdefault(str(item.trial.point["parameter"]), []).append(item)
+    dynamic = {name: items for name, items in by_parameter.items() if _is_dynamic(items, plain)}
+    static = {name: items for name, items in by_parameter.items() if name not in dynamic}
+    if dynamic:
+        yield Figure(
+            key=f"dynamic-parameters{suffix}",
+            title="Output of the model for variations of its dynamic parameters",
+            caption="Near zero rate only, because steady sliding does not know these parameters: "
+            "they decide how the torque turns around.",
+            alt="Torque over rate near zero for lower, unchanged and higher values, one panel per "
+            "dynamic parameter.",
+            panels=tuple(_variation(name, items, plain, True) for name, items in dynamic.items()),
+            thesis=("5.12",),
+            across=2,
+        )
+    if static:
+        yield Figure(
+            key=f"static-parameters{suffix}",
+            title="Output of the model for variations of its static parameters",
+            caption="Torques move the whole curve, viscous friction its slope, and the Stribeck "
+            "velocity only the fall at low rates.",
+            alt="Torque over rate for lower, unchanged and higher values, one panel per static "
+            "parameter.",
+            panels=tuple(_variation(name, items, plain, False) for name, items in static.items()),
+            thesis=("5.13",),
+            across=2,
+        )
+
+
+def _is_dynamic(varied: list[TrialData], plain: list[TrialData]) -> bool:
+    """Whether steady sliding is the same for all values of a parameter."""
+    rate = np.linspace(1e-6, 1.0, 50) * float(np.max(varied[0].recording()["load_rate"]))
+    curves = [np.add(*steady_friction(bench_of(item.trial), rate)) for item in (*plain, *varied)]
+    return all(np.allclose(curve, curves[0], rtol=1e-12) for curve in curves)
+
+
+def _variation(
+    parameter: str, varied: list[TrialData], plain: list[TrialData], near_zero: bool
+) -> Panel:
+    ordered = sorted((*varied, *plain), key=lambda item: float(str(item.trial.point["factor"])))
+    curves = []
+    for item in ordered:
+        factor = float(str(item.trial.point["factor"]))
+        cut, torque = _cycle(item)
+        series = "reference" if factor == 1.0 else f"factor {factor:g}"
+        label = "unchanged" if factor == 1.0 else f"× {factor:g}"
+        curves.append(Curve(*_closed(cut["load_rate"], torque), label, series))
+    largest = float(np.max(curves[0].x))
+    shown = NEAR_ZERO * largest if near_zero else largest
+    axis = Axis(RATE.label, "rad/s", "deg/s", limits=(-1.02 * shown, 1.02 * shown))
+    return Panel(axis, TORQUE, curves, _symbol(parameter))
+
+
+EXPERIMENT = Experiment(
+    name="model_output",
+    summary="friction models at a prescribed sinusoidal rate, without a plant (Figures 4.10, 4.14)",
+    options=ModelOutputOptions,
+    trials=_trials,
+    analyse=_analyse,
+)

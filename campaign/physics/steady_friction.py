@@ -1,0 +1,31 @@
+"""Friction of steady sliding, summed over all interfaces of a bench, as the load meets it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.physics.bench import Bench
+
+Array = NDArray[np.float64]
+
+
+def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
+    """Torque at the load (N m) at constant relative `rate` (rad/s): dry part, viscous part; (n,).
+
+    The dry part carries the sign of the rate: it is s(v) sgn(v) of Equation 4.6. It is the friction
+    of the bench's day and preload, at the mean of its ripple over position.
+    """
+    from campaign.physics.friction import friction_models
+    from campaign.physics.variation import of_its_day
+
+    dry, viscous = np.zeros_like(rate), np.zeros_like(rate)
+    for friction in of_its_day(bench).friction.values():
+        model = friction_models()[friction.model]
+        ratio = bench.gear.ratio
+        torque = ratio if friction.side == "motor" else 1.0
+        speed = rate * (ratio if friction.velocity == "motor" else 1.0)
+        linear = model.viscous(friction) * speed
+        viscous += torque * linear
+        dry += torque * (model.steady_state(friction, speed) - linear)
+    return dry, viscous
