@@ -1,14 +1,16 @@
 """Breakaway torque of each component on its own: motor, gearbox, load (section 4.2.1, Table 4.1).
 
-The component is demounted and turned by hand through a torque sensor, on a bench that is simulated
-by a slow torque ramp with every other friction taken away. What is motor-side is measured at the
-motor shaft, so one count of the sensor counts as many times at the load as the gear reduces.
+The component is demounted and turned by hand through a torque sensor, to one side and to the other
+in turn. On a simulated bench that is a slow torque ramp with every other friction taken away. What
+is motor-side is measured at the motor shaft, so one count of the sensor counts as many times at the
+load as the gear reduces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +19,7 @@ from campaign.experiments.common import conditions, failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.presliding import breakaway_torque
 from campaign.options import Options
-from campaign.physics.bench import Bench
+from campaign.physics.bench import Bench, VariationOptions
 from campaign.physics.limits import worst_friction
 from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
 from campaign.signals import Polyline
@@ -36,11 +38,16 @@ class ComponentFrictionOptions(Options):
 
     components: tuple[str, ...] = ()
     """Interfaces of the bench's friction that are measured one by one; without any, all of them."""
+    direction: Literal["alternating", "positive", "negative"] = "alternating"
+    """Which way the component is turned; friction may differ by direction."""
+    scatter: float | None = Field(default=None, ge=0, le=0.3)
+    """Relative standard deviation of friction from one measurement to the next, of a simulated
+    bench: a part in the hand scatters more than one in its place. Absent: as the bench says."""
     measurements: int = Field(default=10, ge=1, le=1000)
     """How often each is measured."""
     sensor_resolution: Torque = Field(default=0.01, ge=0)
     """One count of the torque sensor, at the shaft it sits on; 0 for a perfect one."""
-    torque_rate: TorqueRate = Field(default=2.0, gt=0)
+    torque_rate: TorqueRate = Field(default=1.0, gt=0)
     """Slope of the ramp, at the load."""
     peak_torque: Torque | None = Field(default=None, gt=0)
     """Where the ramp ends if nothing moves; absent: twice the friction that the bench describes."""
@@ -63,18 +70,19 @@ def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRe
             raise ValueError(
                 f"the bench '{bench.name}' has no friction interface '{component}'; it has {known}"
             )
-        alone = _alone(bench, component)
+        alone = _alone(bench, component, options.scatter)
         peak = options.peak_torque or REACH * worst_friction(alone, stop_rate)
         if peak <= 0:
             raise ValueError(f"friction '{component}' is zero: there is nothing to measure")
         tree: Tree = alone.model_dump(mode="json")
         stop = options.rest + peak / options.torque_rate
         for number in range(1, options.measurements + 1):
+            way = _way(options.direction, number)
             yield TrialRequest(
                 Task(
                     mode="torque",
                     command=Polyline(
-                        times=(0.0, options.rest, stop), values=(0.0, 0.0, float(peak))
+                        times=(0.0, options.rest, stop), values=(0.0, 0.0, way * float(peak))
                     ),
                     duration=stop,
                     window=(options.rest, stop),
@@ -87,9 +95,20 @@ def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRe
             )
 
 
-def _alone(bench: Bench, component: str) -> Bench:
-    """The bench with the friction of one component only."""
-    return bench.model_copy(update={"friction": {component: bench.friction[component]}})
+def _way(direction: str, number: int) -> float:
+    """Sign of the torque of a measurement; alternating ones begin with the positive."""
+    if direction == "alternating":
+        return 1.0 if number % 2 else -1.0
+    return 1.0 if direction == "positive" else -1.0
+
+
+def _alone(bench: Bench, component: str, scatter: float | None) -> Bench:
+    """The bench with the friction of one component only, and its scatter from trial to trial."""
+    update: dict[str, object] = {"friction": {component: bench.friction[component]}}
+    if scatter is not None:
+        variation = bench.variation or VariationOptions()
+        update["variation"] = variation.model_copy(update={"trial": scatter})
+    return bench.model_copy(update=update)
 
 
 @dataclass(frozen=True)
@@ -122,7 +141,7 @@ def _read(data: TrialData) -> Reading:
     )
     count = options.sensor_resolution
     shown = round(true / ratio / count) * count if count > 0 else true / ratio
-    history = recording["drive_torque"], recording["gyro_rate"]
+    history = np.abs(recording["drive_torque"]), np.abs(recording["gyro_rate"])
     number = int(str(place["measurement"]))
     return Reading(place, component, number, side, shown * ratio, shown, history)
 

@@ -79,6 +79,31 @@ def test_trials_scatter_and_the_deviation_is_theirs() -> None:
     assert not [f for f in result.findings if f.quantity == "load_share"]
 
 
+def test_both_directions_are_measured_in_turn() -> None:
+    def lopsided(tree: dict[str, Any]) -> None:
+        tree["friction"]["load"] |= {"negative": {"static_torque": "40 N m"}}
+
+    options = {"components": ["load"], "measurements": 2}
+    result = result_of(lopsided, **options)
+    first, second = (
+        finding(result, "breakaway_torque", measurement=number).value for number in (1, 2)
+    )
+    assert 0.96 * 32 < first < 32.01
+    assert 0.96 * 40 < second < 40.01
+    only = result_of(lopsided, **options, direction="negative")
+    assert finding(only, "breakaway_torque", measurement=1).value == pytest.approx(second, abs=0.02)
+
+
+def test_scatter_may_be_the_tests_own() -> None:
+    (trial, _) = trials(KIND, bench(three), {"components": ["load"], "measurements": 2})
+    assert bench_of(trial).variation is None
+    options = {"components": ["load"], "measurements": 10, "scatter": 0.05}
+    deviation = finding(
+        result_of(three, **options), "breakaway_torque", statistic="standard deviation"
+    )
+    assert 0.02 * 21.4 < deviation.value < 0.09 * 21.4
+
+
 def test_only_one_component_is_on_the_bench() -> None:
     planned = trials(KIND, bench(three), {"measurements": 3})
     assert len(planned) == 9
