@@ -196,6 +196,7 @@ def _analyse(data: TestData) -> Result:
                 points.append(_point(item))
             except ValueError as error:
                 notes.append(f"{item.trial.label}: {error}.")
+        notes += _falling_amplitude(group)
         if points:
             sweeps.append(_sweep(group[0], make_response(points), paths))
     closed = [sweep for sweep in sweeps if sweep.loop == "closed"]
@@ -227,6 +228,25 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     others = [f"{path} = {_told(place.get(path))}" for path in paths if path != "compensation"]
     found = characteristics(response) if loop == "closed" else None
     return Sweep(place, loop, ", ".join([label, *others]), response, found)
+
+
+def _falling_amplitude(group: tuple[TrialData, ...]) -> Iterator[str]:
+    """A sentence where limits lowered the amplitude of a rate command along the sweep."""
+    sines = [i.trial.task.command for i in group if i.trial.task.mode == "rate"]
+    full = [s for s in sines if isinstance(s, Sine)]
+    if not full:
+        return
+    largest = max(sine.amplitude for sine in full)
+    lowered = [sine for sine in full if sine.amplitude < largest * (1 - 1e-9)]
+    if lowered:
+        first = min(lowered, key=lambda sine: sine.frequency)
+        least = max(lowered, key=lambda sine: sine.frequency)
+        yield (
+            f"The command's amplitude was {np.rad2deg(largest):.3g} deg/s below "
+            f"{first.frequency:.4g} Hz; from there on its acceleration was kept, down to "
+            f"{np.rad2deg(least.amplitude):.3g} deg/s at {least.frequency:.4g} Hz. Where friction "
+            "matters, other amplitudes give other responses."
+        )
 
 
 def _told(value: Value) -> str:

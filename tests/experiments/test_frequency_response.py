@@ -134,6 +134,14 @@ def test_friction_narrows_the_band_the_more_the_smaller_the_amplitude() -> None:
     assert widths[0] < widths[1] - 0.3
 
 
+def test_where_limits_lower_the_amplitude_is_told() -> None:
+    """360 deg/s^2 allow 30 deg/s up to 1.91 Hz, and 2.86 deg/s at 20 Hz."""
+    notes = " ".join(sweep(frictionless, highest="20 Hz").notes)
+    assert "30 deg/s below 2 Hz" in notes
+    assert "2.86 deg/s at 20 Hz" in notes
+    assert "amplitude was" not in " ".join(sweep(frictionless, highest="1 Hz").notes)
+
+
 def test_what_compensation_changes_is_told() -> None:
     matrix = [{"compensation": "none"}, {"compensation": "lugre"}]
     result = sweep(matrix=matrix, highest="20 Hz")
