@@ -60,6 +60,13 @@ def result_text(outcome: CalibrationOutcome, bench_name: str) -> str:
     return text
 
 
+def interruption(outcome: CalibrationOutcome) -> str:
+    """What an interrupted calibration lacks."""
+    if outcome.uncertainty is None:
+        return "interrupted: the best values so far are kept, without intervals"
+    return "interrupted: the fit is whole, the leave-one-out error is not"
+
+
 def bench_text(source: Source, space: Space, values: Sequence[float], fitted: Iterable[str]) -> str:
     """The bench's own text with the values in their places and `fitted` set; comments stay.
 
@@ -115,7 +122,7 @@ def _fit(outcome: CalibrationOutcome) -> Iterator[tuple[str, Any]]:
         yield "scatter", _short(outcome.uncertainty.scatter)
     notes = [*problem.warnings, *dict.fromkeys(outcome.fitted.problems)]
     if outcome.interrupted:
-        notes.insert(0, "interrupted: the best values so far, without intervals")
+        notes.insert(0, interruption(outcome))
     if notes:
         yield "notes", notes
 

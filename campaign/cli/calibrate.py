@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from campaign.archive.files import why, write_atomically
-from campaign.calibration.document import bench_text, result_text
+from campaign.calibration.document import bench_text, interruption, result_text
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
 from campaign.calibration.search import Display, Progress, agreeing
@@ -26,6 +26,7 @@ from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
 
 PLAIN_INTERVAL = 10.0  # s between plain lines of one phase
+SHOWN_PROBLEMS = 5  # of the simulation; the result has them all
 
 
 def calibrate_protocol(
@@ -122,7 +123,9 @@ def _say(outcome: CalibrationOutcome) -> None:
     problem = outcome.problem
     print_table(("parameter", "value", "95 % interval", "note"), _rows(outcome))
     if outcome.interrupted:
-        print_note("interrupted: the best values so far are kept, without intervals", "yellow")
+        print_note(interruption(outcome), "yellow")
+    for problem_text in outcome.fitted.problems[:SHOWN_PROBLEMS]:
+        print_note(f"with these values: {problem_text}", "yellow")
     print_note(
         f"cost {outcome.cost_before:.4g} before, {outcome.cost:.4g} now, on "
         f"{len(problem.targets)} cells; {agreeing(outcome.starts)} of {len(outcome.starts)} "

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictFloat, StrictInt, StrictStr, model_validator
 
 from campaign.options import Options
 from campaign.protocol.files import Origin, Source
 from campaign.units import Time
 
-Number = str | float
+Number = StrictStr | StrictFloat | StrictInt
 """Text with a unit, or a bare number for what has none."""
 
 
