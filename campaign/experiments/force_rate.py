@@ -143,8 +143,8 @@ def _figure(rows: dict[str, tuple[Place, list[dict[str, float]]]]) -> Figure:
         key="force-rate",
         title="Breakaway torque over the rate of the applied torque",
         caption="Left: a dynamic model lets go earlier the faster the torque rises; a static one "
-        "always at its static torque. Right: friction follows the applied torque, on the dotted "
-        "line, until the load slides; the slowest and the fastest ramp of each model.",
+        "always at its static torque. Right: the slowest and the fastest ramp of each model. On "
+        "the dotted line friction holds the load; below it the load gains speed.",
         alt="Breakaway torque over torque rate on a logarithmic axis, and friction torque over "
         "applied torque for the slowest and the fastest ramp.",
         panels=(

@@ -7,7 +7,7 @@ parameter can be varied (Figures 5.12 and 5.13).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,9 @@ from campaign.signals import Sine
 from campaign.trial import Recording, Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency
 
-OWN = ("model", "compensation", "parameter", "factor")
+OWN = ("model", "compensation")
+VARIED = ("parameter", "factor")
+UNCHANGED = "unchanged"
 RATE = Axis("Rate", "rad/s", "deg/s")
 TORQUE = Axis("Friction torque", "N m", "N m")
 CYCLES = 2
@@ -75,8 +77,21 @@ class ModelOutputOptions(Options):
 
 
 def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]:
+    known: set[str] = set()
     for point, tree in in_models(bench, options.models):
-        yield _request(options, point, tree)
+        if not options.vary:
+            yield _request(options, point, tree)
+            continue
+        own = bench if tree is None else Bench.model_validate(tree, context={"si": True})
+        yield _request(options, {**point, "parameter": UNCHANGED, "factor": 1.0}, tree)
+        for parameter in options.vary:
+            for factor in options.factors:
+                if changes := _scaled(own, parameter, factor):
+                    known.add(parameter)
+                    varied = {**point, "parameter": parameter, "factor": factor}
+                    yield _request(options, varied, with_changes(own, changes))
+    if missing := [name for name in options.vary if name not in known]:
+        raise ValueError(f"no friction of the bench '{bench.name}' has a '{missing[0]}' to vary")
     for name in options.compensation:
         if name not in bench.compensation:
             raise ValueError(
@@ -86,12 +101,6 @@ def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]
         if not getattr(bench.compensation[name], "friction", None):
             raise ValueError(f"the compensation '{name}' has no friction model to show")
         yield _request(options, {"compensation": name}, None, name)
-    for parameter in options.vary:
-        for factor in options.factors:
-            varied = with_changes(bench, _scaled(bench, parameter, factor))
-            yield _request(options, {"parameter": parameter, "factor": factor}, varied)
-    if options.vary:
-        yield _request(options, {"parameter": "", "factor": 1.0}, None)
 
 
 def _request(
@@ -124,36 +133,38 @@ def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
             value = getattr(holder, parameter, None)
             if isinstance(value, float):
                 changes[f"friction.{name}.{path}{parameter}"] = value * factor
-    if not changes:
-        raise ValueError(f"no friction of the bench '{bench.name}' has a '{parameter}' to vary")
     return changes
 
 
 def _analyse(data: TestData) -> Result:
-    figures: list[Figure] = []
+    measured = list(data.completed())
     rows: list[dict[str, Value]] = []
     findings: list[Finding] = []
-    found = places(data.completed(), OWN)
-    for number, place in enumerate(found, start=1):
-        suffix = f"-{number}" if len(found) > 1 else ""
-        plain = [item for item in place.trials if "parameter" not in item.trial.point]
-        varied = [item for item in place.trials if "parameter" in item.trial.point]
-        if plain:
-            figures += [_static_figure(plain[0], suffix), _sine_figure(plain, suffix)]
-        figures += _variation_figures(varied, suffix)
+    plain = places((item for item in measured if "parameter" not in item.trial.point), OWN)
+    varied = places((item for item in measured if "parameter" in item.trial.point), VARIED)
+    for place in (*plain, *varied):
         for item in place.trials:
             row = _row(item)
             rows.append({**place.point, **row})
             for quantity in ("peak", "at_reversal"):
                 value = float(str(row[quantity]))
                 findings.append(Finding(f"model_{quantity}", value, "N m", conditions(item)))
+    figures: list[Figure] = []
+    for number, place in enumerate(plain, start=1):
+        suffix = f"-{number}" if len(plain) > 1 else ""
+        figures += [
+            _static_figure(place.trials[0], suffix),
+            _sine_figure(place.trials, suffix),
+        ]
+    for number, place in enumerate(varied, start=1):
+        figures += _variation_figures(place.trials, f"-{number}" if len(varied) > 1 else "")
     if not rows:
         return Result(notes=failures_note(data))
     table = Table(
         key="model-output",
         title="Output of the models at a sinusoidal rate",
         columns=(
-            *found[0].columns,
+            *(*plain, *varied)[0].columns,
             Column("source", "Model"),
             Column("peak", "Largest torque", "N m", "N m"),
             Column("at_amplitude", "At the largest rate", "N m", "N m"),
@@ -177,8 +188,10 @@ def _source(data: TrialData) -> str:
     point = data.trial.point
     if "compensation" in point:
         return f"{method_label(str(point['compensation']))} (compensation)"
-    if point.get("parameter"):
-        return f"{_symbol(str(point['parameter']))} × {point['factor']}"
+    if "parameter" in point:
+        parameter = str(point["parameter"])
+        same = parameter == UNCHANGED
+        return parameter if same else f"{_symbol(parameter)} × {point['factor']}"
     return model_label(str(point["model"])) if "model" in point else "friction of the bench"
 
 
@@ -191,9 +204,12 @@ def _row(data: TrialData) -> dict[str, Value]:
     rate = cut["load_rate"]
     falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
     reversal = float(torque[falling[0]]) if len(falling) else float("nan")
+    peak = float(np.max(torque))
+    if abs(reversal) < 1e-9 * peak:  # a sine's zero is not quite zero, and a jump goes through it
+        reversal = 0.0
     return {
         "source": _source(data),
-        "peak": float(np.max(torque)),
+        "peak": peak,
         "at_amplitude": float(torque[np.argmax(rate)]),
         "at_reversal": reversal,
     }
@@ -228,7 +244,7 @@ def _static_figure(data: TrialData, suffix: str) -> Figure:
     )
 
 
-def _sine_figure(trials: list[TrialData], suffix: str) -> Figure:
+def _sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
     compensated = any("compensation" in item.trial.point for item in trials)
     curves = []
     for item in trials:
@@ -251,7 +267,7 @@ def _sine_figure(trials: list[TrialData], suffix: str) -> Figure:
         "zero rate, where the static model jumps and the dynamic one makes a loop.",
         panels=(
             Panel(RATE, TORQUE, curves, "Whole cycle"),
-            Panel(zoom, TORQUE, curves, "Near zero rate", marks=mark),
+            Panel(zoom, TORQUE, [_near(c, near) for c in curves], "Near zero rate", marks=mark),
         ),
         thesis=("4.14",),
         across=2,
@@ -262,13 +278,25 @@ def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:
     return np.append(rate, rate[0]), np.append(torque, torque[0])
 
 
-def _variation_figures(trials: list[TrialData], suffix: str) -> Iterator[Figure]:
+def _near(curve: Curve, rate: float) -> Curve:
+    """The parts of a curve at rates up to twice `rate`, with gaps between them.
+
+    A drawing shows so many points of a curve: this way it shows them where it looks.
+    """
+    inside = np.flatnonzero(np.abs(curve.x) <= 2.0 * rate)
+    parts = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
+    gap = np.array([np.nan])
+    x = np.concatenate([np.append(curve.x[part], gap) for part in parts])
+    y = np.concatenate([np.append(curve.y[part], gap) for part in parts])
+    return Curve(x, y, curve.label, curve.series, curve.style)
+
+
+def _variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figure]:
     """Parameters that steady sliding does not show (Figure 5.12), and the others (5.13)."""
-    plain = [item for item in trials if not item.trial.point["parameter"]]
     by_parameter: dict[str, list[TrialData]] = {}
     for item in trials:
-        if item.trial.point["parameter"]:
-            by_parameter.setdefault(str(item.trial.point["parameter"]), []).append(item)
+        by_parameter.setdefault(str(item.trial.point["parameter"]), []).append(item)
+    plain = by_parameter.pop(UNCHANGED, [])
     dynamic = {name: items for name, items in by_parameter.items() if _is_dynamic(items, plain)}
     static = {name: items for name, items in by_parameter.items() if name not in dynamic}
     if dynamic:
@@ -313,11 +341,13 @@ def _variation(
         factor = float(str(item.trial.point["factor"]))
         cut, torque = _cycle(item)
         series = "reference" if factor == 1.0 else f"factor {factor:g}"
-        label = "unchanged" if factor == 1.0 else f"× {factor:g}"
+        label = UNCHANGED if factor == 1.0 else f"× {factor:g}"
         curves.append(Curve(*_closed(cut["load_rate"], torque), label, series))
     largest = float(np.max(curves[0].x))
     shown = NEAR_ZERO * largest if near_zero else largest
     axis = Axis(RATE.label, "rad/s", "deg/s", limits=(-1.02 * shown, 1.02 * shown))
+    if near_zero:
+        curves = [_near(curve, shown) for curve in curves]
     return Panel(axis, TORQUE, curves, _symbol(parameter))
 
 

@@ -131,7 +131,7 @@ def _analyse(data: TestData) -> Result:
             Column("curve", "Stribeck curve", "N m", "N m"),
         ),
         rows=tuple(rows),
-        note=f"The largest deviation from the model's curve is {worst:.1e} of it.",
+        note=f"Measured torque and curve agree within {max(worst, 1e-12):.0e} of the torque.",
     )
     figure = Figure(
         key="stribeck-curve",

@@ -403,7 +403,7 @@ def _rub_at(
     after = line[0] - 0.5 * line[1]
     if memory.counters[0] == 0:
         before = after
-    return 0.5 * (before + after) + elements.viscous[e] * v0
+    return float(0.5 * (before + after) + elements.viscous[e] * v0)
 
 
 @compiled
