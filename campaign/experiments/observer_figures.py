@@ -102,11 +102,12 @@ def rejection_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
     if not usable:
         return
     curves = []
-    for number, gain in enumerate(_spread(usable, own)):
+    for gain in _spread(usable, own):
         if not gain.corner:
             label, series = "no observer", "none"
         else:
-            label, series = f"corner {gain.corner:.3g} Hz", f"gain {number}"
+            label = f"corner {gain.corner:.3g} Hz"
+            series = label
         frequency, measured, expected = gain.rejection.T
         curves.append(Curve(frequency, expected, label, series))
         curves.append(Curve(frequency, measured, "", series, "points"))
@@ -117,7 +118,8 @@ def rejection_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
         title="Disturbance rejection for several gains of the observer",
         caption="Rate of the load per disturbance torque: dots measured, lines Equation 5.4 with "
         "the bench's PI controller. Below its corner frequency the observer gains a decade per "
-        "decade over the loop without it.",
+        "decade over the loop without it. Delays, which the equation leaves out, show at high "
+        "gains.",
         alt="Rate per torque over frequency, both logarithmic, one line with dots on it for each "
         "gain; higher gains lie lower.",
         panels=(Panel(x, y, curves),),

@@ -10,8 +10,7 @@ G(s) = N Kt (Kp + Ki / s) and a = N K0 / J', in terms of the readings y = w + n:
     noise coupling   w / n  = -C / (J s + C)                                        (Eq. 5.5)
 
 For J' = J the first is s / ((J s + G)(s + a)), which is Eq. 5.4 with G for G_cv, and the second is
-Eq. 5.5. With D(s), the delay and the current loop between command and torque, C = G + a (J' s + D
-G) / (s + a (1 - D)), and the loop that must be stable is D C / (J s).
+Eq. 5.5. Neither knows a delay, so neither says where the loop becomes unstable; see `stability`.
 """
 
 from __future__ import annotations
@@ -70,61 +69,9 @@ def noise_rate(bench: Bench, corner: float, inertia: float | None) -> float:
     return float(np.sqrt(np.trapezoid(power, frequency)))
 
 
-def stability_limit(bench: Bench, inertia: float | None, highest: float = 1000.0) -> float | None:
-    """The smallest corner frequency (Hz) at which the loop is unstable; None below `highest`.
-
-    From the phase at the last gain crossover, with the delays of gyro and controller, half a sample
-    for the hold, and the current loop. Friction and elastic parts are left out.
-    """
-    if phase_margin(bench, highest, inertia) > 0:
-        return None
-    low, high = 0.0, highest
-    while high - low > 1e-4 * highest:
-        middle = 0.5 * (low + high)
-        if phase_margin(bench, middle, inertia) > 0:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-def phase_margin(bench: Bench, corner: float, inertia: float | None) -> float:
-    """Phase (rad) over -180 deg at the last gain crossover of the rate loop with its observer."""
-    frequency = np.geomspace(1e-2, 1e4, 20_001)
-    s = 2j * np.pi * frequency
-    output, sensor = _delays(bench)
-    drive = np.exp(-s * output) * _current_loop(bench, s)
-    loop = _controller(bench, corner, inertia, s, drive) * drive * np.exp(-s * sensor)
-    loop = loop / (bench.axis.inertia * s)
-    phase = np.unwrap(np.angle(loop))
-    if phase[0] > 0:  # three integrators: -270 deg, not +90 deg
-        phase -= TWO_PI
-    last = int(np.flatnonzero(np.abs(loop) > 1.0)[-1])
-    return float(phase[last] + np.pi)
-
-
-def _controller(
-    bench: Bench, corner: float, inertia: float | None, s: Any, drive: Any = 1.0
-) -> Any:
+def _controller(bench: Bench, corner: float, inertia: float | None, s: Any) -> Any:
     """C(s), N m at the load per rad/s of gyro rate."""
     rate = bench.controller.rate
     g = bench.torque_per_current * (rate.proportional + rate.integral_gain / s)
     a = TWO_PI * corner
-    assumed = inertia or bench.axis.inertia
-    return g + a * (assumed * s + drive * g) / (s + a * (1.0 - drive))
-
-
-def _delays(bench: Bench) -> tuple[float, float]:
-    """Of the output, the hold among it, and of the gyro (s)."""
-    rate = bench.controller.sample_rate
-    if rate is None:
-        return 0.0, 0.0
-    output = np.ceil(bench.controller.delay * rate - 1e-9) + 0.5
-    return float(output / rate), float(round(bench.sensors.gyro.delay * rate) / rate)
-
-
-def _current_loop(bench: Bench, s: Any) -> Any:
-    """Current over commanded current, the motor at rest."""
-    gains, motor = bench.controller.current, bench.motor
-    controller = gains.proportional + gains.integral_gain / s
-    return controller / (controller + motor.resistance + motor.inductance * s)
+    return g + a * (inertia or bench.axis.inertia) + a * g / s
