@@ -49,8 +49,9 @@ COMMANDS = {
 class SimOptions(Options):
     """Options of the simulated bench."""
 
-    longest_step: Time = Field(default=0.25e-3, gt=0, le=0.01)
-    """Longest integration step; shorter ones follow from sample rates and sine frequencies."""
+    longest_step: Time | None = Field(default=None, gt=0, le=0.01)
+    """Longest integration step; absent: 0.25 ms, with a sampled controller 1 ms. Sample rates and
+    the frequencies of sines make it shorter."""
 
 
 class SimBackend:

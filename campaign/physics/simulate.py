@@ -33,6 +33,8 @@ from campaign.trial import Task
 
 LONGEST_STEP = 0.25e-3
 """s; the LuGre-compensated stabilization error, the most sensitive number, is then 0.12 % off."""
+LONGEST_SAMPLED_STEP = 1e-3
+"""s; between the samples of a controller nothing is that sensitive: errors of 1e-4 at most."""
 STEPS_PER_CYCLE = 80
 """of the fastest sine; at 80 a straight-line input loses 5e-4 of its amplitude."""
 BLOCK_STEPS = 20_000
@@ -55,18 +57,24 @@ class Grid:
     samples: int
 
 
-def make_grid(bench: Bench, task: Task, longest_step: float = LONGEST_STEP) -> Grid:
+def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Grid:
     """Steps that divide both the recording's and the controller's sample time.
 
-    Raises ValueError when the recording's rate and the controller's do not divide each other.
+    `longest_step` (s) is LONGEST_STEP, or LONGEST_SAMPLED_STEP with a sampled controller, when
+    None. Raises ValueError when the recording's rate and the controller's do not divide each other.
     """
-    for signal in (task.command, task.base_acceleration, task.disturbance):
+    control_rate = bench.controller.sample_rate
+    continuous = control_rate is None or task.mode in ("prescribed", "spring")
+    if longest_step is None:
+        longest_step = LONGEST_STEP if continuous else LONGEST_SAMPLED_STEP
+    # A sampled controller holds its command between samples: the steps need not resolve it.
+    smooth = (task.base_acceleration, task.disturbance)
+    for signal in (*smooth, task.command) if continuous else smooth:
         if isinstance(signal, Sine | MultiSine):
             fastest = signal.frequency if isinstance(signal, Sine) else max(signal.frequencies)
             longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * fastest))
     samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
-    control_rate = bench.controller.sample_rate
-    if control_rate is None or task.mode in ("prescribed", "spring"):
+    if control_rate is None or continuous:
         every = max(1, math.ceil(1.0 / (task.sample_rate * longest_step) - 1e-9))
         return Grid(1.0 / (task.sample_rate * every), every, 0, samples)
     per_record = control_rate / task.sample_rate
@@ -81,7 +89,7 @@ def make_grid(bench: Bench, task: Task, longest_step: float = LONGEST_STEP) -> G
 
 
 def simulate(
-    bench: Bench, task: Task, seed: int, longest_step: float = LONGEST_STEP
+    bench: Bench, task: Task, seed: int, longest_step: float | None = None
 ) -> Iterator[tuple[Array, Array]]:
     """Blocks of (time (n,), outputs (8, n) with rows as `engine.OUTPUTS`) until the task ends."""
     bench = as_it_is(bench, seed)
