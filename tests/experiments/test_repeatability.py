@@ -1,0 +1,115 @@
+"""Repeatability: which trials make a set, and the statistics of Table 4.4 from its own columns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from campaign.experiments.repeatability import relative_deviation
+from tests.experiments.laboratory import analyse, execute, finding, table, trials
+from tests.physics.benches import bench
+
+FAST = {
+    "speeds": [f"{v} deg/s" for v in (0.5, 1, 1.5, 2, 3, 5, 10, 20, 40)],
+    "warm_up_cycles": 0,
+    "rest": "0.1 s",
+    "max_travel": "40 deg",
+    "window_time": "0.3 s",
+    "window_angle": "1 deg",
+    "max_time": "3 s",
+}
+
+
+@pytest.mark.parametrize(
+    ("columns", "mean", "percent"),
+    [
+        ((27.2, 26.7, 25.8, 26.4, 25.3, 26.7), 26.4, 2.4),  # Tc of Table 4.4, as printed
+        ((0.0281, 0.0299, 0.0275, 0.0288, 0.0271, 0.0291), 0.0284, 3.4),  # vs
+    ],
+)
+def test_the_statistics_of_table_4_4(columns, mean: float, percent: float) -> None:
+    assert np.mean(columns) == pytest.approx(mean, rel=2e-3)
+    assert round(100 * relative_deviation(columns), 1) == percent
+
+
+def coulomb(level: float):
+    def edit(tree):
+        friction = tree["friction"]["load"]
+        friction["coulomb_torque"] = f"{26 * level} N m"
+        friction["static_torque"] = f"{32 * level} N m"
+        del tree["friction"]["motor"]
+
+    return edit
+
+
+@pytest.fixture(scope="module")
+def three_days():
+    """Three days with 1.00, 1.04 and 0.96 of the bench's friction torque."""
+    done = []
+    for day, level in enumerate((1.0, 1.04, 0.96), start=1):
+        for item in execute(trials("repeatability", bench(coulomb(level)), FAST)):
+            point = {**item.trial.point, "bench.variation.day": day}
+            done.append(replace(item, trial=item.trial.model_copy(update={"point": point})))
+    return done
+
+
+def test_three_days_are_six_sets(three_days) -> None:
+    """Mean 26 N m; the deviation of 1, 1.04, 0.96, each twice, is 0.04 sqrt(2/3) = 3.27 %."""
+    result = analyse("repeatability", three_days)
+    for name, level in (("1-2", 1.0), ("3-4", 1.04), ("5-6", 0.96)):
+        for direction in ("positive", "negative"):
+            found = finding(result, "coulomb_torque", set=name, direction=direction)
+            assert found.value == pytest.approx(26.0 * level, rel=0.01)
+    mean = finding(result, "coulomb_torque", statistic="mean")
+    assert mean.value == pytest.approx(26.0, rel=0.01)
+    deviation = finding(result, "coulomb_torque", statistic="relative standard deviation")
+    assert deviation.value == pytest.approx(0.04 * np.sqrt(2 / 3), rel=0.05)
+    assert deviation.unit == ""
+    worst = finding(result, "relative_standard_deviation").value
+    assert worst >= deviation.value
+    columns = [column.name for column in table(result, "repeatability").columns]
+    assert columns[2:8] == [
+        f"{direction}_{name}"
+        for name in ("1-2", "3-4", "5-6")
+        for direction in ("negative", "positive")
+    ]
+    assert [figure.key for figure in result.figures] == ["sets", "scatter"]
+    for figure in result.figures:
+        for panel in figure.panels:
+            for curve in panel.curves:
+                assert curve.x.shape == curve.y.shape
+
+
+def test_repetitions_are_sets_too(three_days) -> None:
+    """Without a sweep, what tells the sets apart is the repetition."""
+    again = []
+    for item in three_days:
+        day = item.trial.point["bench.variation.day"]
+        point = {"speed": item.trial.point["speed"]}
+        trial = item.trial.model_copy(update={"point": point, "repeat": day})
+        again.append(replace(item, trial=trial))
+    result = analyse("repeatability", again)
+    for name in ("1-2", "3-4", "5-6"):
+        assert finding(result, "static_torque", set=name, direction="positive").value > 0
+
+
+def test_one_map_says_nothing_about_repeatability(three_days) -> None:
+    one = [i for i in three_days if i.trial.point["bench.variation.day"] == 1]
+    result = analyse("repeatability", one)
+    assert not [f for f in result.findings if "statistic" in f.conditions]
+    assert any("nothing about repeatability" in note for note in result.notes)
+
+
+def test_a_map_that_cannot_be_fitted_is_left_out_and_said(three_days) -> None:
+    few = [
+        item
+        for item in three_days
+        if item.trial.point["bench.variation.day"] != 2
+        or item.trial.point["speed"] < np.deg2rad(1.2)
+    ]
+    result = analyse("repeatability", few)
+    assert any("Sets 3-4 have no fit" in note for note in result.notes)
+    assert {f.conditions.get("set") for f in result.findings} == {"1-2", "5-6", None}
+    assert analyse("repeatability", []).tables == ()
