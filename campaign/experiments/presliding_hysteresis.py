@@ -30,11 +30,13 @@ from campaign.result import (
     Table,
     Value,
 )
-from campaign.signals import Sine
+from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, Frequency
 
 OWN = ("amplitude",)
+PER_CYCLE = 400
+"""Straight pieces of the prescribed rate in a cycle."""
 SMALL = 1e-4
 """rad; displacements up to here are shown in microradian."""
 
@@ -48,8 +50,8 @@ class PreslidingHysteresisOptions(Options):
     """Amplitudes of the displacement."""
     frequency: Frequency = Field(default=0.1, gt=0)
     """Frequency of the displacement; slow, or bristle damping widens the loops."""
-    cycles: int = Field(default=4, ge=2, le=1000)
-    """Cycles of the displacement; the last one is measured."""
+    cycles: int = Field(default=8, ge=2, le=1000)
+    """Cycles of the displacement; the last one is measured. Small loops need some to close."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording; at least 100 samples per cycle."""
     models: tuple[str, ...] = ()
@@ -59,25 +61,35 @@ class PreslidingHysteresisOptions(Options):
 def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[TrialRequest]:
     if options.sample_rate < 100 * options.frequency:
         raise ValueError("a loop needs at least 100 samples per cycle; raise sample_rate")
-    stop = options.cycles / options.frequency
+    stop = (0.5 + options.cycles) / options.frequency
     for point, tree in in_models(bench, options.models):
         for amplitude in options.amplitudes:
             if amplitude <= 0:
                 raise ValueError("amplitudes are positive")
-            # A rate that starts from zero carries the load from one turning point to the other.
-            rate = 2.0 * np.pi * options.frequency * amplitude
             yield TrialRequest(
                 Task(
                     mode="prescribed",
-                    command=Sine(amplitude=rate, frequency=options.frequency),
+                    command=strokes(options, amplitude),
                     duration=stop,
                     window=(stop - 1.0 / options.frequency, stop),
                     sample_rate=options.sample_rate,
-                    start_angle=-amplitude,
                 ),
                 point={**point, "amplitude": amplitude},
                 bench=tree,
             )
+
+
+def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
+    """Rate from the middle to one turning point in half a period, then the cycles from there.
+
+    Begun in the middle, the loop is nearly the steady one from its first cycle; begun at a turning
+    point with straight bristles, small loops take many cycles to become symmetric.
+    """
+    phase = np.arange((2 * options.cycles + 1) * PER_CYCLE // 2 + 1) / PER_CYCLE
+    rate = 2.0 * np.pi * options.frequency * amplitude * np.sin(2.0 * np.pi * phase)
+    rate[phase < 0.5] *= 0.5
+    times = phase / options.frequency
+    return Polyline(times=tuple(map(float, times)), values=tuple(map(float, rate)))
 
 
 @dataclass(frozen=True)
