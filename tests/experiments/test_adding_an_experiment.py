@@ -1,0 +1,71 @@
+"""What docs/adding-an-experiment.md shows is a whole experiment that works."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment, TestData
+from campaign.options import describe
+from campaign.protocol import check_limits, load_protocol, make_plan
+from tests.experiments.laboratory import execute, failed, table
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "adding-an-experiment.md").read_text(encoding="utf-8")
+
+
+def block(kind: str) -> str:
+    (found,) = re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return str(found)
+
+
+@pytest.fixture(scope="module")
+def experiment(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    path = tmp_path_factory.mktemp("page") / "coast_down.py"
+    path.write_text(block("python"), encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("coast_down", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found = module.EXPERIMENT
+    assert isinstance(found, Experiment)
+    return found
+
+
+def test_the_example_runs_and_finds_the_friction(experiment: Experiment, tmp_path: Path) -> None:
+    protocol = tmp_path / "my.toml"
+    protocol.write_text(block("toml protocol"), encoding="utf-8")
+    registry = {**experiments(), experiment.name: experiment}
+    plan = make_plan(load_protocol(protocol, registry, shipped=ROOT / "protocols"))
+    check_limits(plan)
+    done = execute(plan.trials)
+    result = experiment.analyse(TestData("coast-down", "coast_down", {}, done))
+    rows = table(result, "coast-down").rows
+    coulomb = [f.conditions["bench.friction.load.coulomb_torque"] for f in result.findings]
+    assert coulomb == [20.0, 20.0, 26.0, 26.0]
+    for tc, row in zip(coulomb, rows, strict=True):
+        # Far above the Stribeck velocity: Coulomb and viscous friction of load and motor.
+        rate = float(str(row["rate"]))
+        expected = float(str(tc)) + 141.176 * 0.03 + (4 + 141.176 * 0.001) * rate
+        assert row["friction"] == pytest.approx(expected, rel=0.01)
+    nothing = experiment.analyse(TestData("", "", {}, tuple(map(failed, done))))
+    assert not nothing.figures
+    assert "did not complete" in nothing.notes[0]
+
+
+def test_the_example_documents_its_options(experiment: Experiment) -> None:
+    listed = {info.name: info for info in describe(experiment.options)}
+    assert set(listed) == {"torques", "push", "coast", "sample_rate"}
+    assert listed["torques"].unit == "N m"
+    assert all(info.meaning for info in listed.values())
+
+
+def test_the_page_names_what_exists() -> None:
+    for path in set(re.findall(r"`((?:campaign|tests)/[\w/.]+)`", PAGE)):
+        if path != "campaign/experiments/coast_down.py":
+            assert (ROOT / path).exists(), path
