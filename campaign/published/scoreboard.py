@@ -203,10 +203,17 @@ def _same(found: Value, published: Value) -> bool:
     return str(found) == str(published)
 
 
+def _was_fitted(cell: Cell, fitted: Sequence[str]) -> bool:
+    """Whether the bench was fitted to the cell, or to a table whose condition it repeats."""
+    itself = any(f"{cell.path}/".startswith(f"{name}/") for name in fitted)
+    again = any(f"{name}/".startswith(f"{table}/") for name in fitted for table in cell.repeats)
+    return itself or again
+
+
 def _status(cell: Cell, finding: Finding, test: Evidence) -> Status:
     if cell.status:
         return Status(cell.status)
-    if any(f"{cell.path}/".startswith(f"{fitted}/") for fitted in test.fitted):
+    if _was_fitted(cell, test.fitted):
         return Status.CALIBRATED
     if cell.table in test.given:
         return Status.RECOVERED

@@ -61,6 +61,8 @@ class MarkOptions(Options):
     """`row/column`; `*` stands for all of them."""
     status: Verdict | None = None
     """Whether the document contradicts itself there, or nobody could reproduce it."""
+    repeats: tuple[str, ...] = ()
+    """Tables whose condition they have too, or that they follow from: fitted there, fitted here."""
     reason: str = Field(min_length=1)
     """Why, or what to know about it."""
 
@@ -152,6 +154,7 @@ class Cell:
         decimals: printed digits after the point, None when unknown.
         status: `inconsistent`, `not reproducible` or None; `reason` says why.
         notes: what else to know about it.
+        repeats: tables that were measured at the same condition, or that it follows from.
         symbol: the document's sign for its row, or for its column.
     """
 
@@ -167,6 +170,7 @@ class Cell:
     status: Verdict | None = None
     reason: str = ""
     notes: tuple[str, ...] = ()
+    repeats: tuple[str, ...] = ()
     symbol: str = ""
 
     @property
@@ -278,6 +282,7 @@ def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
         status=verdict.status if verdict else None,
         reason=verdict.reason if verdict else "",
         notes=tuple(mark.reason for mark in marks if mark.status is None),
+        repeats=tuple(name for mark in marks for name in mark.repeats),
         symbol=parts[1].symbol or parts[2].symbol,
     )
 
