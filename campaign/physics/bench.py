@@ -153,7 +153,7 @@ class ControllerOptions(Options):
     sample_rate: Frequency | None = Field(default=None, gt=0, le=1e5)
     """Rate at which the rate loop and the compensation run; absent: they are continuous."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
-    """From a sample to the current command that answers it, rounded up to whole samples."""
+    """From a sample to the current command that answers it."""
     relative_rate_filter: Time = Field(default=0.0, ge=0)
     """Time constant of the first-order low-pass of the relative rate that compensation uses."""
     pointing_high_pass: Frequency = Field(default=0.0, ge=0)

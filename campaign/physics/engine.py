@@ -79,7 +79,8 @@ class Controller(NamedTuple):
     pointing_pole: float  # of the pointing error's high-pass, 1 for none
     resolution: Array  # (4,) of the sensors, 0 for none
     delay: NDArray[np.int64]  # (4,) samples
-    output_delay: int  # samples
+    output_delay: int  # whole samples ...
+    output_offset: int  # ... and steps beyond them
     a: Array  # (m, m) linear compensation, discrete
     b: Array  # (m, 3)
     c: Array  # (m,)
@@ -98,6 +99,7 @@ class Memory(NamedTuple):
     linear: Array  # (m,)
     readings: Array  # (4, longest delay + 1), ring
     outputs: Array  # (output delay + 1,), ring
+    held: Array  # (2,) current command that is next, and that is in force (A)
     counters: NDArray[np.int64]  # 0 steps done, 1 samples done
 
 
@@ -131,9 +133,16 @@ def advance(
         if not sampled:
             u[0] = command[k]
             du[0] = command[k + 1] - command[k]
-        elif memory.counters[0] % controller.every == 0:
-            u[0] = _sample(controller, compensation, memory, command[k], noise[samples], line)
-            samples += 1
+        else:
+            place = memory.counters[0] % controller.every
+            if place == 0:
+                memory.held[0] = _sample(
+                    controller, compensation, memory, command[k], noise[samples], line
+                )
+                samples += 1
+            if place == controller.output_offset:
+                memory.held[1] = memory.held[0]
+            u[0] = memory.held[1]
         memory.counters[0] += 1
         u[1] = base_rate[k]
         du[1] = base_rate[k + 1] - base_rate[k]
@@ -312,7 +321,7 @@ def _sample(
     noise: Array,
     line: Array,
 ) -> float:
-    """One sample of the controller: read the sensors, return the current command now in force."""
+    """One sample of the controller: read the sensors, return the current command that is next."""
     x, own = memory.x, memory.controller
     sample = memory.counters[1]
     memory.counters[1] += 1

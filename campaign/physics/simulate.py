@@ -35,6 +35,8 @@ LONGEST_STEP = 0.25e-3
 """s; the LuGre-compensated stabilization error, the most sensitive number, is then 0.12 % off."""
 LONGEST_SAMPLED_STEP = 1e-3
 """s; between the samples of a controller nothing is that sensitive: errors of 1e-4 at most."""
+FINEST_DELAY = 4
+"""How many times finer the steps may become to meet the controller's delay."""
 STEPS_PER_CYCLE = 80
 """of the fastest sine; at 80 a straight-line input loses 5e-4 of its amplitude."""
 BLOCK_STEPS = 20_000
@@ -84,8 +86,18 @@ def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Gr
             f"recording's ({task.sample_rate:g} Hz)"
         )
     per_control = max(1, math.ceil(1.0 / (control_rate * longest_step) - 1e-9))
+    per_control = _with_delay(per_control, bench.controller.delay * control_rate)
     step = 1.0 / (control_rate * per_control)
     return Grid(step, per_control * round(per_record), per_control, samples)
+
+
+def _with_delay(per_control: int, delay: float) -> int:
+    """More steps per sample, a few times over, if a `delay` (samples) then is whole steps."""
+    for times in range(1, FINEST_DELAY + 1):
+        steps = delay * per_control * times
+        if abs(steps - round(steps)) < 1e-6:
+            return per_control * times
+    return per_control * FINEST_DELAY
 
 
 def simulate(
@@ -203,6 +215,7 @@ def _controller(bench: Bench, task: Task, compensator: Compensator, grid: Grid) 
         # The compensation holds its readings over a sample: the exact discrete equivalent.
         a, b, _ = discretise(compensator.linear.a, compensator.linear.b, period)
         c, d = compensator.linear.c, compensator.linear.d
+    delay_steps = math.ceil(gains.delay / grid.step - 1e-9)
     low_pass = gains.relative_rate_filter
     sensors = _sensors(bench)
     return Controller(
@@ -217,7 +230,8 @@ def _controller(bench: Bench, task: Task, compensator: Compensator, grid: Grid) 
         pointing_pole=math.exp(-2.0 * math.pi * gains.pointing_high_pass * period),
         resolution=np.array([sensor.resolution for sensor in sensors]),
         delay=np.array([round(sensor.delay / period) for sensor in sensors], dtype=np.int64),
-        output_delay=math.ceil(gains.delay / period - 1e-9) if gains.sample_rate else 0,
+        output_delay=delay_steps // grid.per_control if grid.per_control else 0,
+        output_offset=delay_steps % grid.per_control if grid.per_control else 0,
         a=np.ascontiguousarray(a),
         b=np.ascontiguousarray(b),
         c=np.ascontiguousarray(c),
@@ -232,5 +246,6 @@ def _memory(order: int, controller: Controller) -> Memory:
         linear=np.zeros(len(controller.c)),
         readings=np.zeros((4, int(controller.delay.max()) + 1)),
         outputs=np.zeros(controller.output_delay + 1),
+        held=np.zeros(2),
         counters=np.zeros(2, dtype=np.int64),
     )

@@ -74,15 +74,30 @@ def test_a_sensors_delay_shifts_its_own_channel_by_whole_samples(late: str) -> N
             np.testing.assert_array_equal(delayed[channel], prompt[channel])
 
 
-def test_the_output_delay_holds_every_command_back_rounded_up() -> None:
-    """1.5 ms at 1 kHz are two samples; before the first command the current is zero."""
+def test_the_output_delay_holds_every_command_back() -> None:
+    """2 ms at 1 kHz are two samples; before the first command the current is zero."""
     push = task(mode="torque", command=Polyline(times=(0.0,), values=(60.0,)))
     _, prompt = run(sampled(), push)
-    _, late = run(sampled(delay="1.5 ms"), push)
+    _, late = run(sampled(delay="2 ms"), push)
     np.testing.assert_array_equal(late["motor_current"][2:], prompt["motor_current"][:-2])
     np.testing.assert_array_equal(late["load_rate"][2:], prompt["load_rate"][:-2])
     np.testing.assert_array_equal(late["load_rate"][:3], 0.0)
     np.testing.assert_allclose(prompt["motor_current"][-1], 60.0 / (RATIO * KT), rtol=0.02)
+
+
+def test_the_output_delay_need_not_be_whole_samples() -> None:
+    """1.5 ms at 1 kHz: what a recording at 2 kHz of a 2 kHz controller shows three samples late."""
+    push = task(mode="torque", sample_rate=1000.0, command=Polyline(times=(0.0,), values=(60.0,)))
+    one, late = (run(sampled(delay=delay), push)[1] for delay in ("1 ms", "1.5 ms"))
+    fine = task(mode="torque", sample_rate=2000.0, command=Polyline(times=(0.0,), values=(60.0,)))
+    _, half = run(sampled("2 kHz"), fine)
+    # An open loop answers a constant command alike, whenever it comes.
+    np.testing.assert_allclose(
+        late["load_rate"][2:], half["load_rate"][1:-3:2], rtol=1e-6, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        one["load_rate"][1:], half["load_rate"][0:-2:2], rtol=1e-6, atol=1e-12
+    )
 
 
 NOISY = {"gyro": 1e-3, "encoder": 2e-5, "resolver": 1e-3, "current": 0.02}
