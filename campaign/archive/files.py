@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from pathlib import Path
 from typing import BinaryIO
 
@@ -11,13 +12,17 @@ PART = ".part"
 """Ending of a file that is still being written. No reader takes such a file for an archive."""
 
 _BLOCK = 1 << 20
+_REASON = re.compile(r"errno = \d+, error message = '([^']+)'")
 
 
 def why(error: Exception) -> str:
     """What went wrong, in a line: HDF5 tells a page about a full disk."""
     if isinstance(error, OSError) and error.errno:
         return os.strerror(error.errno)
-    return " ".join(str(error).split())[:300] or type(error).__name__
+    told = " ".join(str(error).split())
+    if reason := _REASON.search(told):
+        return reason[1]
+    return told[:300] or type(error).__name__
 
 
 def sync_file(path: Path) -> None:

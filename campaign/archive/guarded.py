@@ -17,6 +17,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5a, h5d, h5g, h5o, h5s
 from numpy.typing import NDArray
 
 from campaign.archive.files import why
@@ -92,7 +93,9 @@ def text_at(parent: h5py.Group, name: str) -> str:
         raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
     if dataset.id.get_storage_size() != kind.itemsize:
         raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
-    raw = bytes(dataset[()])
+    value = np.empty((), dtype=kind)
+    dataset.id.read(h5s.ALL, h5s.ALL, value)
+    raw = bytes(value[()])
     _check(dataset, raw)
     return raw.decode("utf-8")
 
@@ -122,15 +125,17 @@ def integer_at(parent: h5py.Group, name: str) -> int:
 def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
     """A sample dataset whose stated size is backed by what is stored; not read yet."""
     dataset = _dataset_at(parent, name)
-    place = _place(parent, name)
-    if dataset.ndim != 1 or dataset.dtype != SAMPLE or dataset.chunks is None:
-        raise ArchiveError(f"{place}: is not a chunked series of float64")
-    length, chunk = dataset.shape[0], dataset.chunks[0]
+    shape, chunks = dataset.shape, dataset.chunks
+    if len(shape) != 1 or dataset.dtype != SAMPLE or chunks is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
+    length, chunk = shape[0], chunks[0]
     if not 0 < chunk <= _LARGEST_CHUNK:
-        raise ArchiveError(f"{place}: has chunks of {chunk} samples")
+        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
     stored = dataset.id.get_storage_size()
     if length * SAMPLE.itemsize > stored * _MOST_EXPANSION:
-        raise ArchiveError(f"{place}: states {length} samples but stores {stored} bytes")
+        raise ArchiveError(
+            f"{_place(parent, name)}: states {length} samples but stores {stored} bytes"
+        )
     return dataset
 
 
@@ -138,16 +143,20 @@ def read_samples(dataset: h5py.Dataset) -> Array:
     """All samples, checked; shape (n,), float64."""
     values = np.empty(dataset.shape, dtype=SAMPLE)
     if len(values):
-        dataset.read_direct(values)
+        dataset.id.read(h5s.ALL, h5s.ALL, values)
     _check(dataset, values.data)
     return values.astype(np.float64, copy=False)
 
 
 def check_samples(dataset: h5py.Dataset) -> None:
     """Read through a sample dataset in flat memory; ArchiveError when its checksum fails."""
+    length = dataset.shape[0]
+    if length <= _CHECKED_AT_ONCE:
+        read_samples(dataset)
+        return
     digest = hashlib.sha256()
     step = dataset.chunks[0] * max(1, _CHECKED_AT_ONCE // dataset.chunks[0])
-    for start in range(0, dataset.shape[0], step):
+    for start in range(0, length, step):
         digest.update(np.ascontiguousarray(dataset[start : start + step]).data)
     _compare(dataset, digest.hexdigest())
 
@@ -155,9 +164,12 @@ def check_samples(dataset: h5py.Dataset) -> None:
 def attribute(item: h5py.HLObject, name: str) -> str:
     """A text attribute; ArchiveError when there is none."""
     identifier = _attribute(item, name)
-    if identifier.shape != () or h5py.check_string_dtype(identifier.dtype) is None:
+    kind = identifier.dtype
+    if identifier.shape != () or h5py.check_string_dtype(kind) is None:
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a text")
-    return str(item.attrs[name])
+    value = np.empty((), dtype=kind)
+    identifier.read(value)
+    return bytes(value[()]).decode("utf-8")
 
 
 def text_list(item: h5py.HLObject, name: str) -> list[str]:
@@ -170,18 +182,11 @@ def text_list(item: h5py.HLObject, name: str) -> list[str]:
     return [str(text) for text in item.attrs[name]]
 
 
-def flag(item: h5py.HLObject, name: str) -> bool:
-    """An attribute that is 0 or 1."""
-    identifier = _attribute(item, name)
-    if identifier.shape != () or identifier.dtype.kind not in "iu":
-        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not 0 or 1")
-    return bool(item.attrs[name])
-
-
-def _attribute(item: h5py.HLObject, name: str) -> Any:
-    if name not in item.attrs:
+def _attribute(item: h5py.HLObject, name: str) -> h5a.AttrID:
+    raw = name.encode()
+    if not h5a.exists(item.id, raw):
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is missing")
-    identifier = item.attrs.get_id(name)
+    identifier = h5a.open(item.id, raw)
     if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is too large")
     return identifier
@@ -195,22 +200,25 @@ def _own(parent: h5py.Group, name: str) -> Any:
         raise ArchiveError(f"{_place(parent, name)}: is missing")
     if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
         raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
-    return parent[name]
+    found = h5o.open(parent.id, raw)
+    if isinstance(found, h5g.GroupID):
+        return h5py.Group(found)
+    return h5py.Dataset(found) if isinstance(found, h5d.DatasetID) else None
 
 
 def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
     dataset = _own(parent, name)
-    place = _place(parent, name)
     if not isinstance(dataset, h5py.Dataset):
-        raise ArchiveError(f"{place}: is not a dataset")
+        raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
     plan = dataset.id.get_create_plist()
-    if plan.get_layout() == h5py.h5d.VIRTUAL or (
-        plan.get_layout() == h5py.h5d.CONTIGUOUS and plan.get_external_count()
-    ):
-        raise ArchiveError(f"{place}: lies in another file, which is not opened")
+    layout = plan.get_layout()
+    if layout == h5d.VIRTUAL or (layout == h5d.CONTIGUOUS and plan.get_external_count()):
+        raise ArchiveError(f"{_place(parent, name)}: lies in another file, which is not opened")
     filters = {plan.get_filter(number)[0] for number in range(plan.get_nfilters())}
     if not filters <= _ALLOWED_FILTERS:
-        raise ArchiveError(f"{place}: is stored with a filter other than shuffle and deflate")
+        raise ArchiveError(
+            f"{_place(parent, name)}: is stored with a filter other than shuffle and deflate"
+        )
     return dataset
 
 

@@ -53,9 +53,9 @@ class ArchivedTrial:
 
     def problems(self) -> Iterator[str]:
         """Reads every sample in flat memory; what is damaged, by trial and channel."""
-        from campaign.archive.trial_reading import check_recording
+        from campaign.archive.trial_reading import check_recordings
 
-        return check_recording(self.path, self.entry)
+        return check_recordings(self.path, [self.entry])
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,14 @@ class RunReader:
 
     def problems(self) -> list[str]:
         """What in the samples is damaged (reads them all, in flat memory); empty when sound."""
-        return [problem for trial in self.trials for problem in trial.problems()]
+        from campaign.archive.trial_reading import check_recordings
+
+        entries: dict[Path, list[str]] = {}
+        for trial in self.trials:
+            entries.setdefault(trial.path, []).append(trial.entry)
+        return [
+            problem for path, names in entries.items() for problem in check_recordings(path, names)
+        ]
 
 
 def open_run(path: Path) -> RunReader:

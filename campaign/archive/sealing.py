@@ -74,7 +74,7 @@ def _put_hash(part: Path, place: tuple[int, int]) -> None:
 @contextlib.contextmanager
 def _create(part: Path) -> Iterator[h5py.File]:
     """A new file; after an error its handle is let go of without a second error on top."""
-    file = h5py.File(part, "w", locking=False)
+    file = hdf5.create_file(part)
     try:
         yield file
     except BaseException:
@@ -90,7 +90,7 @@ def _copy_trial(folder: Path, finished: TrialFinished, target: h5py.File) -> Non
         raise ArchiveError(f"{path}: is not what the journal says was written")
     name = entry_name(finished.trial)
     with h5py.File(path, "r", locking=False) as source:
-        hdf5.copy_group(source[name], target.create_group(name))
+        hdf5.copy_entry(source, name, target)
 
 
 def _write_run(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import h5py
@@ -64,7 +64,7 @@ class TrialFile:
         self._preview = Preview()
         self._events: list[Event] = []
         try:
-            self._file = h5py.File(self._part, "w", locking=False)
+            self._file = hdf5.create_file(self._part)
         except OSError as error:
             raise ArchiveError(f"{self._part}: cannot be written: {why(error)}") from None
         self._entry = hdf5.make_group(self._file, entry_name(trial.number), "NXentry")
@@ -126,13 +126,12 @@ class TrialFile:
             return
         rest = self._columns.finish()
         self._add_to_preview(rest)
-        hdf5.attach_time(self._entry["data"])
         shown = "data"
         if self._columns.length > PREVIEW_POINTS:
             shown = "preview"
             channel = self._channels[self._shown]
             _write_preview(self._entry, self._trial, channel, self._preview)
-        self._entry.attrs["default"] = shown
+        hdf5.put_attribute(self._entry, "default", shown)
 
     def _add_to_preview(self, rows: Array) -> None:
         self._preview.add(rows[0], rows[1 + self._shown])
@@ -154,12 +153,12 @@ def write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
     """The attributes of a file's root; `shown` is the entry that viewers open first."""
     from campaign import __version__
 
-    file.attrs["NX_class"] = "NXroot"
-    file.attrs["creator"] = "campaign"
-    file.attrs["creator_version"] = __version__
-    file.attrs["file_time"] = created
+    hdf5.put_attribute(file, "NX_class", "NXroot")
+    hdf5.put_attribute(file, "creator", "campaign")
+    hdf5.put_attribute(file, "creator_version", __version__)
+    hdf5.put_attribute(file, "file_time", created)
     if shown is not None:
-        file.attrs["default"] = shown.name.lstrip("/")
+        hdf5.put_attribute(file, "default", shown.name.lstrip("/"))
 
 
 def _write_record(
@@ -171,15 +170,11 @@ def _write_record(
 ) -> None:
     record = hdf5.make_group(entry, "record", "NXcollection")
     hdf5.put_text(record, "trial", canonical_json(trial.model_dump(mode="json")))
-    hdf5.put_text(record, "test", trial.test)
-    hdf5.put_text(record, "kind", trial.kind)
-    hdf5.put_text(record, "role", trial.role)
     hdf5.put_text(record, "fingerprint", trial.fingerprint)
-    hdf5.put_integer(record, "seed", trial.seed)
     hdf5.put_text(record, "outcome", ending.outcome)
     hdf5.put_text(record, "reason", ending.reason)
     hdf5.put_text(record, "safe_state", ending.safe_state)
-    hdf5.put_text(record, "channels", canonical_json([channel.name for channel in channels]))
+    hdf5.put_text(record, "channels", canonical_json([asdict(channel) for channel in channels]))
     told = [{"time": float(event.time), "text": event.text} for event in events]
     hdf5.put_text(record, "events", canonical_json(told))
 
@@ -191,14 +186,13 @@ def _write_preview(entry: h5py.Group, trial: Trial, channel: ChannelInfo, previe
     columns = hdf5.SampleColumns(group, attributes)
     columns.append([times, values])
     columns.finish()
-    hdf5.attach_time(group)
 
 
 def _plot_group(
     entry: h5py.Group, name: str, trial: Trial, signal: str, others: list[str]
 ) -> h5py.Group:
     group = hdf5.make_group(entry, name, "NXdata")
-    group.attrs["signal"] = signal
+    hdf5.put_attribute(group, "signal", signal)
     if others:
         group.attrs["auxiliary_signals"] = others
     group.attrs["axes"] = ["time"]
@@ -207,17 +201,14 @@ def _plot_group(
     return group
 
 
-def _attributes(channel: ChannelInfo) -> dict[str, object]:
+def _attributes(channel: ChannelInfo) -> dict[str, str]:
     return {
         "units": channel.unit,
         "long_name": f"{channel.label} ({channel.unit})" if channel.unit else channel.label,
-        "label": channel.label,
-        "display_units": channel.display_unit,
-        "measured": np.int8(channel.measured),
     }
 
 
-def _time_attributes() -> dict[str, object]:
+def _time_attributes() -> dict[str, str]:
     return {"units": "s", "long_name": "Time (s)"}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import h5py
@@ -19,6 +19,7 @@ from campaign.archive.trial_file import entry_name
 from campaign.errors import ArchiveError
 from campaign.trial import (
     Channel,
+    ChannelInfo,
     Ending,
     Event,
     Outcome,
@@ -35,7 +36,7 @@ class _Event(BaseModel):
 
 
 _EVENTS = TypeAdapter(list[_Event])
-_NAMES = TypeAdapter(list[str])
+_CHANNELS = TypeAdapter(list[ChannelInfo])
 _ENTRY = re.compile(r"trial_([0-9]{5,10})")
 
 
@@ -99,19 +100,27 @@ def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
             return Recording(np.empty(0), {}, events, ending)
         data = guarded.group_at(entry, "data", "NXdata")
         time = guarded.read_samples(guarded.samples_at(data, "time"))
-        names = _NAMES.validate_json(guarded.text_at(record, "channels"))
-        channels = {name: _channel(data, name, len(time)) for name in names}
+        infos = _CHANNELS.validate_json(guarded.text_at(record, "channels"))
+        channels = {info.name: _channel(data, info, len(time)) for info in infos}
         return Recording(time, channels, events, ending)
 
 
-def check_recording(path: Path, entry_name: str) -> Iterator[str]:
-    """What of a trial's samples is damaged, one line each; reads them in flat memory."""
+def check_recordings(path: Path, entries: Iterable[str]) -> Iterator[str]:
+    """What is damaged of the trials in a file, one line each; reads them in flat memory."""
     try:
         with guarded.open_file(path) as file:
-            entry = guarded.group_at(file, entry_name, "NXentry")
-            for group in ("data", "preview"):
-                if group in entry:
-                    yield from _damaged(path, guarded.group_at(entry, group, "NXdata"))
+            for name in entries:
+                yield from _check_entry(path, file, name)
+    except ArchiveError as error:
+        yield str(error)
+
+
+def _check_entry(path: Path, file: h5py.File, name: str) -> Iterator[str]:
+    try:
+        entry = guarded.group_at(file, name, "NXentry")
+        for group in ("data", "preview"):
+            if group in entry:
+                yield from _damaged(path, guarded.group_at(entry, group, "NXdata"))
     except ArchiveError as error:
         yield str(error)
 
@@ -126,18 +135,11 @@ def _damaged(path: Path, data: h5py.Group) -> Iterator[str]:
             yield str(error)
 
 
-def _channel(data: h5py.Group, name: str, length: int) -> Channel:
-    dataset = guarded.samples_at(data, name)
+def _channel(data: h5py.Group, info: ChannelInfo, length: int) -> Channel:
+    dataset = guarded.samples_at(data, info.name)
     if dataset.shape[0] != length:
         raise ArchiveError(
-            f"{data.file.filename}: {data.name}/{name}: has {dataset.shape[0]} samples, "
+            f"{data.file.filename}: {data.name}/{info.name}: has {dataset.shape[0]} samples, "
             f"and time has {length}"
         )
-    return Channel(
-        name=name,
-        unit=guarded.attribute(dataset, "units"),
-        label=guarded.attribute(dataset, "label"),
-        display_unit=guarded.attribute(dataset, "display_units"),
-        samples=guarded.read_samples(dataset),
-        measured=guarded.flag(dataset, "measured"),
-    )
+    return info.with_samples(guarded.read_samples(dataset))

@@ -129,7 +129,8 @@ def test_links_are_not_followed(sealed, tmp_path):
 def test_a_channel_is_not_looked_for_along_a_path(sealed, name):
     with h5py.File(sealed, "r+") as file:
         file["trial_00001/data/aside"] = h5py.SoftLink("/trial_00002/data")
-        put_text(file, "trial_00001/record/channels", json.dumps([name]))
+        channel = {"name": name, "unit": "", "label": "", "display_unit": "", "measured": True}
+        put_text(file, "trial_00001/record/channels", json.dumps([channel]))
     refused(sealed, "is a path, not a name|is missing")
 
 

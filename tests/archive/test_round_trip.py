@@ -99,8 +99,10 @@ def test_the_file_knows_whether_it_was_changed(sealed):
     with h5py.File(sealed, "r+"):
         pass  # a viewer that opens for writing and writes nothing
     assert open_run(sealed).unchanged()
+    with h5py.File(sealed) as file:
+        place = file["trial_00001/data/gyro_rate"].id.get_chunk_info(0).byte_offset
     content = bytearray(sealed.read_bytes())
-    content[-1] ^= 1
+    content[place + 10] ^= 1
     sealed.write_bytes(content)
     assert not open_run(sealed).unchanged()
 
@@ -112,7 +114,7 @@ def test_the_default_plot_is_found_by_following_the_file(sealed):
         signal = data[data.attrs["signal"]]
         axis = data[data.attrs["axes"][0]]
         assert entry.name == "/trial_00001"
-        assert (signal.attrs["units"], signal.attrs["display_units"]) == ("rad/s", "deg/s")
+        assert signal.attrs["units"] == "rad/s"
         assert signal.attrs["long_name"] == "Load rate (rad/s)"
         assert axis.attrs["units"] == "s"
         assert signal.dims[0][0] == axis
@@ -147,6 +149,28 @@ def test_chunks_are_what_zlib_and_a_shuffle_undo(tmp_path, kit):
             parts.append(plain.reshape(8, -1).T.tobytes())
         samples = np.frombuffer(b"".join(parts), "<f8")[: CHUNK + 5]
     assert equal_bits(samples, kit.samples(CHUNK + 5)[1][1])
+
+
+def test_values_of_a_converter_are_stored_whole_and_others_shuffled(tmp_path, kit):
+    """Few values that come again and again are smaller unshuffled; noise and waves are not."""
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    recorder = writer.begin(kit.trial(1))
+    recorder.start(kit.CHANNELS)
+    times = np.arange(6000) / 1000.0
+    noise = np.random.default_rng(3).normal(size=6000)
+    counts = np.round(300 * noise) * (np.pi / 2**23)
+    recorder.append(times, np.stack((np.sin(times), counts, noise)))
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    with h5py.File(path) as file:
+        data = file["trial_00001/data"]
+        assert [data[name].shuffle for name in ("command", "gyro_rate", "friction_torque")] == [
+            True,
+            False,
+            True,
+        ]
+        assert data["gyro_rate"].id.get_storage_size() < 6000 * 4
+        assert equal_bits(data["gyro_rate"][:], counts)
 
 
 def test_a_long_recording_opens_on_a_preview_that_misses_no_peak(tmp_path, kit):
