@@ -188,7 +188,7 @@ def _analyse(data: TestData) -> Result:
             ),
         ),
         rows=tuple(rows),
-        thesis=("5.2", "5.8"),
+        thesis=("5.2", "5.8", "5.4", "5.10", "5.5", "5.11", "5.6", "5.12", "5.7", "5.13"),
         note="The error is the standard deviation of the integrated gyro rate over "
         + ("the measured time." if irregular else "whole cycles."),
     )
@@ -216,13 +216,12 @@ def _figures(
 
 
 def _one_per_method(trials: list[TrialData]) -> dict[str, TrialData]:
-    """The first trial of each compensation, all at the sweep point of the very first trial."""
+    """One trial of each compensation, all at the last point of the rest of the sweep."""
     shown: dict[str, TrialData] = {}
     for item in trials:
-        reference = next(iter(shown.values()), item)
         same = all(
             item.trial.point.get(path) == value
-            for path, value in reference.trial.point.items()
+            for path, value in trials[-1].trial.point.items()
             if path != "compensation"
         )
         if same:
@@ -270,7 +269,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
             Panel(TIME, RELATIVE_RATE, curves, "Base motion"),
             Panel(zoomed_time, zoomed_rate, near, "At a reversal"),
         ),
-        thesis=("5.4", "5.18"),
+        thesis=("5.4", "5.18", "5.8", "5.22"),
         across=2,
     )
 
@@ -302,7 +301,7 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
         alt="Position error over time, one panel per compensation method, each with peaks at the "
         "reversals.",
         panels=tuple(panels),
-        thesis=("5.9", "5.23"),
+        thesis=("5.9", "5.23", "5.10", "5.24"),
         across=2,
     )
 
@@ -327,7 +326,7 @@ def _torque_figure(shown: dict[str, TrialData]) -> Figure:
         alt="Compensation torque over time for each method, square-like with the sign of the "
         "relative rate.",
         panels=(Panel(TIME, torque, curves),),
-        thesis=("5.7",),
+        thesis=("5.7", "5.21"),
     )
 
 

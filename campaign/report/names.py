@@ -26,6 +26,11 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:80] or "unnamed"
 
 
+def stood_for(numbers: Sequence[str], reproduces: Sequence[str], prefix: str) -> tuple[str, ...]:
+    """Which of the numbers that a figure or table can stand for its test says it reproduces."""
+    return tuple(number for number in numbers if f"{prefix}{number}" in reproduces)
+
+
 def figure_name(thesis: Sequence[str], test: str, key: str) -> tuple[str, ...]:
     """Candidates for a figure: the published number it stands for, then its own key."""
     own = f"{test}-{key}"

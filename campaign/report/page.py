@@ -12,7 +12,7 @@ from campaign.published.values import Published, PublishedTable
 from campaign.report import tables
 from campaign.report.analysis import AnalysedTest, one_line
 from campaign.report.figures import draw, inline
-from campaign.report.names import Names, figure_name
+from campaign.report.names import Names, figure_name, stood_for
 from campaign.report.overview import cell_name, draw_overview
 from campaign.report.palette import STATUS
 from campaign.report.text import minus, number, percent, pretty_unit
@@ -254,13 +254,14 @@ def _attempt(problems: list[str], key: str, make: Callable[[], Any]) -> Any:
 
 
 def _figure(test: AnalysedTest, figure: Figure, folder: Folder) -> ShownFigure:
+    numbers = stood_for(figure.thesis, test.reproduces, "figure ")
     return folder.figure(
         draw(figure),
         figure.title,
         figure.caption,
         figure.alt or figure.caption,
-        figure.thesis,
-        *figure_name(figure.thesis, test.name, figure.key),
+        numbers,
+        *figure_name(numbers, test.name, figure.key),
     )
 
 
@@ -269,7 +270,13 @@ def _table(test: AnalysedTest, table: Table, folder: Folder) -> ShownTable:
     download = folder.table(text, f"{test.name}-{table.key}")
     place = folder.next_table()
     return ShownTable(
-        place, f"table-{place}", table.title, table.note, table.thesis, content, download
+        place,
+        f"table-{place}",
+        table.title,
+        table.note,
+        stood_for(table.thesis, test.reproduces, ""),
+        content,
+        download,
     )
 
 
