@@ -125,8 +125,9 @@ def integer_at(parent: h5py.Group, name: str) -> int:
 def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
     """A sample dataset whose stated size is backed by what is stored; not read yet."""
     dataset = _dataset_at(parent, name)
-    shape, chunks = dataset.shape, dataset.chunks
-    if len(shape) != 1 or dataset.dtype != SAMPLE or chunks is None:
+    shape, plan = dataset.id.shape, dataset.id.get_create_plist()
+    chunks = plan.get_chunk() if plan.get_layout() == h5d.CHUNKED else None
+    if len(shape) != 1 or dataset.id.dtype != SAMPLE or chunks is None:
         raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
     length, chunk = shape[0], chunks[0]
     if not 0 < chunk <= _LARGEST_CHUNK:
@@ -141,7 +142,7 @@ def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
 
 def read_samples(dataset: h5py.Dataset) -> Array:
     """All samples, checked; shape (n,), float64."""
-    values = np.empty(dataset.shape, dtype=SAMPLE)
+    values = np.empty(dataset.id.shape, dtype=SAMPLE)
     if len(values):
         dataset.id.read(h5s.ALL, h5s.ALL, values)
     _check(dataset, values.data)
@@ -150,7 +151,7 @@ def read_samples(dataset: h5py.Dataset) -> Array:
 
 def check_samples(dataset: h5py.Dataset) -> None:
     """Read through a sample dataset in flat memory; ArchiveError when its checksum fails."""
-    length = dataset.shape[0]
+    length = dataset.id.shape[0]
     if length <= _CHECKED_AT_ONCE:
         read_samples(dataset)
         return

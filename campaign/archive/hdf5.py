@@ -14,6 +14,7 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -90,15 +91,21 @@ def put_integer(group: h5py.Group, name: str, value: int) -> None:
 def _put_scalar(
     group: h5py.Group, name: str, kind: h5t.TypeID, value: NDArray[Any], raw: bytes
 ) -> h5py.Dataset:
-    plan = h5p.create(h5p.DATASET_CREATE)
-    plan.set_obj_track_times(False)
-    if len(raw) <= _COMPACT:
-        plan.set_layout(h5d.COMPACT)
+    plan = _scalar_plan(compact=len(raw) <= _COMPACT)
     made = h5d.create(group.id, name.encode(), kind, _SCALAR, plan)
     made.write(h5s.ALL, h5s.ALL, value, kind)
     dataset = h5py.Dataset(made)
     put_attribute(dataset, CHECKSUM, hashlib.sha256(raw).hexdigest())
     return dataset
+
+
+@cache
+def _scalar_plan(compact: bool) -> h5p.PropDCID:
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_obj_track_times(False)
+    if compact:
+        plan.set_layout(h5d.COMPACT)
+    return plan
 
 
 def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
@@ -230,17 +237,23 @@ def _create_column(
     """A dataset for the samples of which `first` are the first chunk."""
     chunk = max(1, len(first))
     shuffled = _shuffling_helps(first[:_TRIED])
+    size, limit = ((0,), (h5s.UNLIMITED,)) if grows else (first.shape, first.shape)
+    space, plan = h5s.create_simple(size, limit), _series_plan(chunk, shuffled)
+    dataset = h5py.Dataset(h5d.create(group.id, name.encode(), _SAMPLE, space, plan))
+    for key, value in attributes.items():
+        put_attribute(dataset, key, value)
+    return _Column(dataset, chunk, shuffled, grows)
+
+
+@lru_cache(maxsize=16)
+def _series_plan(chunk: int, shuffled: bool) -> h5p.PropDCID:
     plan = h5p.create(h5p.DATASET_CREATE)
     plan.set_obj_track_times(False)
     plan.set_chunk((chunk,))
     if shuffled:
         plan.set_shuffle()
     plan.set_deflate(_LEVEL)
-    space = h5s.create_simple((0,), (h5s.UNLIMITED,)) if grows else h5s.create_simple((len(first),))
-    dataset = h5py.Dataset(h5d.create(group.id, name.encode(), _SAMPLE, space, plan))
-    for key, value in attributes.items():
-        put_attribute(dataset, key, value)
-    return _Column(dataset, chunk, shuffled, grows)
+    return plan
 
 
 def _shuffling_helps(samples: Array) -> bool:
@@ -248,6 +261,8 @@ def _shuffling_helps(samples: Array) -> bool:
 
     They are, but for those of a converter: few values, each of which comes again and again whole.
     """
+    if len(np.unique(samples)) == len(samples):
+        return True
     return len(pack(samples, shuffled=True)) <= len(pack(samples, shuffled=False))
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -174,7 +174,7 @@ def _write_record(
     hdf5.put_text(record, "outcome", ending.outcome)
     hdf5.put_text(record, "reason", ending.reason)
     hdf5.put_text(record, "safe_state", ending.safe_state)
-    hdf5.put_text(record, "channels", canonical_json([asdict(channel) for channel in channels]))
+    hdf5.put_text(record, "channels", canonical_json([vars(channel) for channel in channels]))
     told = [{"time": float(event.time), "text": event.text} for event in events]
     hdf5.put_text(record, "events", canonical_json(told))
 
