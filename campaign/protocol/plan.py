@@ -18,8 +18,14 @@ from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import Protocol, Test
 from campaign.trial import Task, Tree, Trial, canonical_json
 
-CHANNELS = 8
-"""a backend records, besides the time; for the estimate of what would be written."""
+CHANNELS = 11
+"""A backend records, besides the time; for the estimate of what would be written."""
+
+STRUCTURE = 32_000
+"""Bytes that a trial's archive takes at most besides its samples, preview and description."""
+
+PREVIEW = 20_000
+"""Samples beyond which a recording has a preview, of at most so many points."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +110,7 @@ class Plan:
     @property
     def size(self) -> int:
         """Bytes of all recordings before compression, an upper estimate of what is written."""
-        return self.samples * (CHANNELS + 1) * 8
+        return sum(map(_size, self.trials)) + sum(len(text) for text in self.sources.values())
 
 
 def make_plan(
@@ -164,6 +170,12 @@ def make_plan(
         seed=master,
         breaches=tuple(use for use in uses if use.margin.broken),
     )
+
+
+def _size(trial: Trial) -> int:
+    samples = samples_of(trial.task)
+    preview = 2 * 8 * PREVIEW if samples > PREVIEW else 0
+    return samples * (CHANNELS + 1) * 8 + preview + STRUCTURE + len(trial.model_dump_json())
 
 
 def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:

@@ -223,3 +223,37 @@ def test_a_request_s_own_bench_is_validated(desk) -> None:
     path = desk.write("bad.toml", SWING)
     with pytest.raises(ProtocolError, match=r"swing.*axis.inertia"):
         make_plan(load_protocol(path, {"swing": replace(swing, trials=bad)}, shipped=SHIPPED))
+
+
+def test_the_size_counts_what_the_simulator_records_and_what_comes_with_it(desk) -> None:
+    plan = make_plan(desk.load(SWING + MATRIX), seed=1)
+    from campaign.backends.sim import CHANNELS
+
+    samples = sum(
+        8 * (1 + len(CHANNELS)) * int(t.task.duration * t.task.sample_rate) for t in plan.trials
+    )
+    assert samples < plan.size < samples + 500_000 * len(plan.trials)
+
+
+def test_no_archive_is_larger_than_the_plan_says(desk, tmp_path) -> None:
+    """Noise cannot be compressed: the largest archive that the trials can have."""
+    import numpy as np
+
+    from campaign.archive import RunHeader, RunStatus, RunWriter
+    from campaign.backends.sim import CHANNELS
+    from campaign.trial import Ending, Outcome
+
+    now = "2026-11-21T09:36:58Z"
+    plan = make_plan(desk.load(SWING + MATRIX), seed=1)
+    header = RunHeader(name="noise", created=now, sources=dict(plan.sources))
+    writer = RunWriter.create(tmp_path / "results", header, plan.trials)
+    random = np.random.default_rng(1)
+    for trial in plan.trials:
+        count = int(trial.task.duration * trial.task.sample_rate)
+        recorder = writer.begin(trial)
+        recorder.start(CHANNELS)
+        noise = random.integers(0, 2**62, size=(len(CHANNELS) + 1, count)).view(float)
+        recorder.append(noise[0], noise[1:])
+        recorder.finish(Ending(Outcome.COMPLETED), now, now)
+    written = writer.seal(RunStatus.COMPLETE, ended=now).stat().st_size
+    assert 0.8 * plan.size < written <= plan.size
