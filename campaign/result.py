@@ -28,6 +28,7 @@ class Finding:
         conditions: e.g. {"compensation": "lugre", "frequency": 0.24, "acceleration": 0.314159};
             numbers SI. Every condition a published cell states must be met here.
         recomputed: derived from other published cells rather than from a recording.
+        lower_bound: the true value is at least this; it answers only a claim of "at least".
     """
 
     quantity: str
@@ -35,6 +36,7 @@ class Finding:
     unit: str
     conditions: Mapping[str, Value]
     recomputed: bool = False
+    lower_bound: bool = False
 
 
 @dataclass(frozen=True)

@@ -190,12 +190,16 @@ UNITS = {
 
 def _findings(ramps: list[Ramp]) -> Iterator[Finding]:
     for ramp in ramps:
-        values = _means([ramp])
-        for quantity, value in values.items():
-            yield Finding(quantity, value, UNITS[quantity], ramp.place)
+        yield from _of_means([ramp], ramp.place)
     shared = {k: v for k, v in ramps[0].place.items() if k not in ("measurement", "position")}
+    yield from _of_means(ramps, {**shared, "statistic": "mean"})
+
+
+def _of_means(ramps: list[Ramp], place: dict[str, Value]) -> Iterator[Finding]:
     for quantity, value in _means(ramps).items():
-        yield Finding(quantity, value, UNITS[quantity], {**shared, "statistic": "mean"})
+        # sigma1 is a formula of sigma0 and of assumed numbers: no ramp measures it.
+        computed = quantity == "bristle_damping"
+        yield Finding(quantity, value, UNITS[quantity], place, recomputed=computed)
 
 
 def _table(ramps: list[Ramp], suffix: str) -> Table:

@@ -285,8 +285,8 @@ def _findings(rows: Sequence[Mapping[str, Value]], told: Mapping[str, Value]) ->
         where = {**told, "parameter": row["parameter"]}
         passed, reach = row["threshold"], row["reach"]
         bound = passed if isinstance(passed, float) else reach
-        where_passed = {**where, "passed": passed is not None}
-        yield Finding("sensitivity_threshold", float(str(bound)), "", where_passed)
+        beyond = passed is None
+        yield Finding("sensitivity_threshold", float(str(bound)), "", where, lower_bound=beyond)
         yield Finding("sensitivity_rank", float(str(row["rank"])), "", where)
 
 

@@ -266,7 +266,7 @@ class Bench(Options):
     description: str = ""
     """What it is and where its numbers come from."""
     given: tuple[str, ...] = ()
-    """Published tables whose values this bench was given: finding them again is `recovered`."""
+    """Published cells it was given, `table` or `table/row/column`, * for any: `recovered`."""
     fitted: tuple[str, ...] = ()
     """Published cells it was fitted to, `table/row/column` or `table`: those are `calibrated`."""
     axis: AxisOptions

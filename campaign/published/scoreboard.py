@@ -46,8 +46,9 @@ class Evidence:
 
     Attributes:
         reproduces: the published tables the test stands for, by name.
-        given, fitted: of its bench: tables it was given, cells (or tables) it was fitted to.
+        given, fitted: of its bench: cells (or rows, or tables) it was given, and was fitted to.
         known: conditions that hold for every finding which does not state them itself.
+        failed: whether trials of the test failed, or its analysis found no number somewhere.
     """
 
     test: str
@@ -56,6 +57,7 @@ class Evidence:
     given: Sequence[str] = ()
     fitted: Sequence[str] = ()
     known: Mapping[str, Value] = field(default_factory=dict)
+    failed: bool = False
 
 
 def evidence_of(
@@ -131,9 +133,10 @@ class Scoreboard:
 def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
     """Compare every published cell of the tables that tests stand for with their findings.
 
-    A cell with no finding is a line only when the document itself makes it one (it is marked
-    inconsistent or not reproducible); otherwise it is `missing`. When several tests found a cell,
-    the first one in the order of the protocol counts.
+    A cell with no finding is a line, without a reproduced value, when the document marks it, or
+    when a test tried and failed: a failed trial must not improve the scoreboard. Otherwise this run
+    did not try it, and it is `missing`. When several tests found a cell, the first one in the order
+    of the protocol counts.
     """
     lines, missing, problems = [], [], list(_unknown_tables(published, evidence))
     for table in published.values():
@@ -142,8 +145,8 @@ def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
             found = next(_matches(cell, tests, problems), None)
             if found:
                 lines.append(found)
-            elif cell.status:
-                lines.append(Line(cell, Status(cell.status)))
+            elif cell.status or any(test.failed for test in tests):
+                lines.append(Line(cell, Status(cell.status or Status.NOT_REPRODUCIBLE)))
             else:
                 missing.append(cell)
     return Scoreboard(tuple(lines), tuple(missing), tuple(dict.fromkeys(problems)))
@@ -190,6 +193,8 @@ def _matches(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iter
 def speaks_to(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
     """Whether a finding is of the cell's quantity and states each of the cell's conditions."""
     stated = {**known, **finding.conditions}
+    if finding.lower_bound and cell.relation != "at least":
+        return False
     return finding.quantity == cell.quantity and all(
         name in stated and _same(stated[name], value) for name, value in cell.conditions.items()
     )
@@ -201,6 +206,13 @@ def _same(found: Value, published: Value) -> bool:
     if isinstance(found, int | float) and isinstance(published, int | float):
         return math.isclose(found, published, rel_tol=TOLERANCE)
     return str(found) == str(published)
+
+
+def _covers(name: str, path: str) -> bool:
+    """Whether `table`, `table/row` or `table/row/column` covers a cell; * is any row or column."""
+    return all(
+        want in ("*", part) for want, part in zip(name.split("/"), path.split("/"), strict=False)
+    )
 
 
 def _was_fitted(cell: Cell, fitted: Sequence[str]) -> bool:
@@ -215,7 +227,7 @@ def _status(cell: Cell, finding: Finding, test: Evidence) -> Status:
         return Status(cell.status)
     if _was_fitted(cell, test.fitted):
         return Status.CALIBRATED
-    if cell.table in test.given:
+    if any(_covers(given, cell.path) for given in test.given):
         return Status.RECOVERED
     if finding.recomputed:
         return Status.RECOMPUTED

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.experiments.interface import Experiment, TestData, bench_of
@@ -45,7 +46,9 @@ class AnalysedTest:
 
     def evidence(self) -> Evidence:
         """What it brings to the scoreboard."""
-        return evidence_of(self.name, self.reproduces, self.result.findings, self.bench)
+        found = evidence_of(self.name, self.reproduces, self.result.findings, self.bench)
+        lost = any(not math.isfinite(finding.value) for finding in found.findings)
+        return replace(found, failed=lost or bool(self.failed or self.problem))
 
 
 def analyse_run(run: RunReader, experiments: Mapping[str, Experiment]) -> tuple[AnalysedTest, ...]:

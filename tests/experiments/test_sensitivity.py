@@ -147,7 +147,7 @@ def test_thresholds_and_ranking_of_made_up_errors() -> None:
     ):
         found = finding(result, "sensitivity_threshold", parameter=parameter)
         assert found.value == pytest.approx(threshold, rel=2e-3)
-        assert found.conditions["passed"] is passed
+        assert found.lower_bound is not passed
         assert finding(result, "sensitivity_rank", parameter=parameter).value == rank
     rows = {row["parameter"]: row for row in table(result, "sensitivity").rows}
     assert rows["stribeck_velocity"]["threshold"] is None

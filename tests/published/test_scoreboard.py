@@ -8,7 +8,15 @@ import math
 
 import pytest
 
-from campaign.published.scoreboard import COLUMNS, Evidence, Line, Scoreboard, score, to_csv
+from campaign.published.scoreboard import (
+    COLUMNS,
+    Evidence,
+    Line,
+    Scoreboard,
+    Status,
+    score,
+    to_csv,
+)
 from campaign.published.values import read_published
 from campaign.result import Finding
 
@@ -188,3 +196,17 @@ def test_the_file_has_exactly_these_columns_and_unrounded_values() -> None:
     empty = by_cell["2.0", "none"]
     assert (empty["reproduced"], empty["deviation_percent"]) == ("", "")
     assert empty["status"] == "not reproducible"
+
+
+def test_a_failed_trial_keeps_its_cells_on_the_board() -> None:
+    """Otherwise a method that diverges would make the board look better."""
+    tried = Evidence("shaken", ("1.1",), (), failed=True)
+    found = score(PUBLISHED, [tried])
+    assert not found.missing
+    assert {line.status for line in found.lines} <= {Status.NOT_REPRODUCIBLE, Status.INCONSISTENT}
+    assert all(line.reproduced is None for line in found.lines)
+
+
+def test_a_lower_bound_answers_only_a_claim_of_at_least() -> None:
+    bound = Finding("error", 0.55e-3, "rad", SHAKEN, lower_bound=True)
+    assert "1.1/0.5/none" in [cell.path for cell in board(bound).missing]
