@@ -21,7 +21,7 @@ from campaign.experiments.common import (
 )
 from campaign.experiments.comparisons import compared, preload_of
 from campaign.experiments.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
@@ -161,6 +161,7 @@ def _analyse(data: TestData) -> Result:
         row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
         rows.append(row | {"repeats": len(group), "spread": spread})
     extra = [path for path in paths if path not in columns]
+    firsts = [group[0] for group in groups.values()]
     sines = any("frequency" in row for row in rows)
     irregular = any("motion" in row for row in rows)
     table = Table(
@@ -190,10 +191,17 @@ def _analyse(data: TestData) -> Result:
         rows=tuple(rows),
         thesis=("5.2", "5.8", "5.4", "5.10", "5.5", "5.11", "5.6", "5.12", "5.7", "5.13"),
         note="The error is the standard deviation of the integrated gyro rate over "
-        + ("the measured time." if irregular else "whole cycles."),
+        + ("the measured time." if irregular else "whole cycles.")
+        + _high_pass(firsts),
     )
-    figures = tuple(_figures(data, [group[0] for group in groups.values()], paths, rows))
+    figures = tuple(_figures(data, firsts, paths, rows))
     return Result((table,), figures, (*findings, *compared(findings)), failures_note(data))
+
+
+def _high_pass(trials: list[TrialData]) -> str:
+    """A sentence when the bench sees its position error through a high-pass."""
+    corner = bench_of(trials[0].trial).controller.pointing_high_pass if trials else 0.0
+    return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""
 
 
 def _figures(
