@@ -30,6 +30,12 @@ class AbortedError(CampaignError):
     exit_code = ExitCode.INTERRUPTED
 
 
+class NotSafeError(CampaignError):
+    """The run broke off and nobody saw the bench safe: that comes before why it broke off."""
+
+    exit_code = ExitCode.NOT_SAFE
+
+
 def run_plan(
     trials: Sequence[Trial],
     backend: Backend,
@@ -47,19 +53,21 @@ def run_plan(
         stop: asked before every trial, and by the backend during one.
 
     Raises:
+        NotSafeError: in place of any of the others, when the bench was not seen safe either.
         AbortedError: a second Ctrl-C; nothing is sealed.
         CampaignError: the archive cannot be written any more; nothing is sealed.
         Exception: a bug in a backend, after the archive has been sealed as a fault.
     """
     ledger = Ledger(trials, display)
-    ended = _Ended()
-    with _safe_afterwards(backend, ended, writer.folder):
-        _execute_all(trials, backend, writer, ledger, ended, workers, stop)
-    status, reason = _verdict(ledger, ended, stop)
-    archive = writer.seal(status, reason, ended.safe_state, ended=utc_now())
-    if ended.bug:
-        raise ended.bug
-    return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, archive)
+    ended = _Ended(kept=writer.folder)
+    with _unsafe_first(ended):
+        with _safe_afterwards(backend, ended):
+            _execute_all(trials, backend, writer, ledger, ended, workers, stop)
+        status, reason = _verdict(ledger, ended, stop)
+        ended.kept = writer.seal(status, reason, ended.safe_state, ended=utc_now())
+        if ended.bug:
+            raise ended.bug
+    return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, ended.kept)
 
 
 def _verdict(ledger: Ledger, ended: _Ended, stop: StopSwitch) -> tuple[RunStatus, str]:
@@ -82,11 +90,13 @@ class _Ended:
     """What ended the run early, and how the bench was left.
 
     Attributes:
+        kept: where the finished trials are: the open run, and once it is sealed the archive.
         fault: why the run cannot go on, or empty.
         bug: an exception that no backend should raise.
         unsafe: why the safe state could not be confirmed, or empty.
     """
 
+    kept: Path
     fault: str = ""
     bug: Exception | None = None
     safe_state: SafeState = SafeState.NOT_CONFIRMED
@@ -110,42 +120,52 @@ class _Executed:
 
 
 @contextmanager
-def _safe_afterwards(backend: Backend, ended: _Ended, folder: Path) -> Iterator[None]:
+def _unsafe_first(ended: _Ended) -> Iterator[None]:
+    """Whatever ends the block: a bench not known to be safe is said first, with its own code."""
+    try:
+        yield
+    except BaseException as error:
+        if ended.unsafe:
+            raise NotSafeError(
+                "SAFE STATE NOT CONFIRMED: look at the bench before anything else; "
+                f"{ended.unsafe}; and {_why(error)}; the finished trials are in {ended.kept}"
+            ) from error
+        raise
+
+
+def _why(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "the run was stopped at once"
+    return str(error) if isinstance(error, CampaignError) else f"internal error: {_describe(error)}"
+
+
+@contextmanager
+def _safe_afterwards(backend: Backend, ended: _Ended) -> Iterator[None]:
     """Bring the bench to rest however the block ends, and note whether that was seen."""
     try:
         yield
     except KeyboardInterrupt:
-        _make_safe(backend, ended, folder)
-        raise _aborted(ended, folder) from None
+        _make_safe(backend, ended)
+        raise AbortedError(f"stopped at once; the finished trials are in {ended.kept}") from None
     except BaseException:
-        _make_safe(backend, ended, folder)
+        _make_safe(backend, ended)
         raise
     else:
-        _make_safe(backend, ended, folder)
+        _make_safe(backend, ended)
 
 
-def _make_safe(backend: Backend, ended: _Ended, folder: Path) -> None:
+def _make_safe(backend: Backend, ended: _Ended) -> None:
+    ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off
     try:
         ended.safe_state = backend.make_safe()
     except KeyboardInterrupt:
         ended.unsafe = "making the bench safe was interrupted"
-        raise _aborted(ended, folder) from None
+        raise
     except Exception as error:  # noqa: BLE001 - nothing may hide that the bench is not safe
         ended.unsafe = f"making the bench safe failed: {_describe(error)}"
     else:
-        if ended.safe_state is not SafeState.CONFIRMED:
-            ended.unsafe = "the bench was not seen at rest with its drive off"
-
-
-def _aborted(ended: _Ended, folder: Path) -> AbortedError:
-    safe = ended.safe_state is SafeState.CONFIRMED
-    aborted = AbortedError(
-        f"stopped at once; the finished trials are in {folder}"
-        + ("" if safe else f"; safe state NOT confirmed: {ended.unsafe}")
-    )
-    if not safe:
-        aborted.exit_code = ExitCode.NOT_SAFE
-    return aborted
+        safe = ended.safe_state is SafeState.CONFIRMED
+        ended.unsafe = "" if safe else "the bench was not seen at rest with its drive off"
 
 
 def _execute_all(
@@ -218,5 +238,5 @@ def utc_now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _describe(error: Exception) -> str:
+def _describe(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

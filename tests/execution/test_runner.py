@@ -11,7 +11,7 @@ from campaign.archive.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
-from campaign.execution.runner import AbortedError, run_plan
+from campaign.execution.runner import AbortedError, NotSafeError, run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.trial import Ending, Outcome, SafeState, Trial
 from tests.execution.fakes import COMPLETED, FakeBackend, MemoryArchive, make_trials
@@ -188,9 +188,82 @@ def test_a_stop_while_the_bench_is_made_safe_is_not_taken_for_safe():
         raise KeyboardInterrupt
 
     bench = Bench(1, FakeBackend(rest=interrupted))
-    with pytest.raises(AbortedError, match="safe state NOT confirmed") as aborted:
+    with pytest.raises(NotSafeError, match="SAFE STATE NOT CONFIRMED") as unsafe:
         bench.run()
-    assert aborted.value.exit_code is ExitCode.NOT_SAFE
+    assert unsafe.value.exit_code is ExitCode.NOT_SAFE
+    assert "stopped at once" in str(unsafe.value)
+
+
+def not_confirmed() -> SafeState:
+    return SafeState.NOT_CONFIRMED
+
+
+def drive_is_gone() -> SafeState:
+    raise OSError("port is gone")
+
+
+def assert_unsafe_is_said_first(bench: Bench, *reasons: str) -> None:
+    with pytest.raises(NotSafeError) as unsafe:
+        bench.run()
+    assert unsafe.value.exit_code is ExitCode.NOT_SAFE
+    assert str(unsafe.value).startswith("SAFE STATE NOT CONFIRMED")
+    for reason in reasons:
+        assert reason in str(unsafe.value)
+
+
+@pytest.mark.parametrize(
+    ("rest", "why"), [(not_confirmed, "not seen at rest"), (drive_is_gone, "port is gone")]
+)
+def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_written(
+    rest: Callable[[], SafeState], why: str
+):
+    bench = Bench(3, FakeBackend(rest=rest))
+
+    def full(trial: Trial) -> None:
+        raise ArchiveError("no space left")
+
+    bench.archive.begin = full  # type: ignore[assignment]
+    assert_unsafe_is_said_first(bench, why, "no space left", "run.partial")
+
+
+def test_an_unsafe_bench_comes_before_a_bug_in_the_backend():
+    oops = raises(ZeroDivisionError("oops"))
+    bench = Bench(3, FakeBackend({2: oops}, rest=not_confirmed))
+    assert_unsafe_is_said_first(bench, "not seen at rest", "ZeroDivisionError: oops", "run.nxs")
+    status, reason, safe_state = bench.archive.sealed
+    assert (status, safe_state) == ("fault", SafeState.NOT_CONFIRMED)
+    assert "not seen at rest" in reason
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ArchiveError("no space left"), "no space left"),
+        (RuntimeError("oops"), "RuntimeError: oops"),
+        (KeyboardInterrupt(), "stopped at once"),
+    ],
+)
+def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_sealed(
+    error: BaseException, said: str
+):
+    bench = Bench(1, FakeBackend(rest=not_confirmed))
+
+    def fail(*arguments: object, **more: object) -> None:
+        raise error
+
+    bench.archive.seal = fail  # type: ignore[assignment]
+    assert_unsafe_is_said_first(bench, "not seen at rest", said, "run.partial")
+
+
+def test_an_unsafe_bench_comes_before_a_stop_by_force():
+    bench = Bench(3, FakeBackend(rest=not_confirmed))
+
+    def insist(progress: Progress) -> None:
+        if progress.ended:
+            raise KeyboardInterrupt
+
+    bench.display = insist
+    assert_unsafe_is_said_first(bench, "stopped at once")
 
 
 def test_parallel_trials_run_at_the_same_time_and_all_are_archived():
