@@ -9,7 +9,7 @@ from pathlib import Path
 from campaign.archive import RunHeader, RunWriter, new_run_name
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import Prepared, Request, prepare
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.display import clock, progress_display
 from campaign.execution.outcome import RunOutcome
@@ -25,10 +25,11 @@ def run_protocol(request: Request, results: Path, *, workers: int | None, report
     check_limits(prepared.plan)
     workers = choose_workers(prepared, workers)
     began = datetime.now(UTC)
-    with prepared.open_backend() as backend:
+    # Signals first: from the moment that the bench is connected, a stop has to be an orderly one.
+    with StopSwitch().on_signals() as stop, prepared.open_backend() as backend:
         header = run_header(prepared, request, results, began)
         writer = RunWriter.create(results, header, prepared.plan.trials)
-        with StopSwitch().on_signals() as stop, progress_display(error_console()) as display:
+        with progress_display(error_console()) as display:
             outcome = run_plan(
                 prepared.plan.trials,
                 backend,
@@ -38,12 +39,13 @@ def run_protocol(request: Request, results: Path, *, workers: int | None, report
                 stop=stop,
             )
     _say(outcome, (datetime.now(UTC) - began).total_seconds())
+    code = outcome.exit_code
     try:
         if report:
-            _report(outcome)
+            code = worst_exit_code([code, _report(outcome)])
     finally:
         print_line(str(outcome.archive))
-    return outcome.exit_code
+    return code
 
 
 def choose_workers(prepared: Prepared, wanted: int | None) -> int:
@@ -89,7 +91,32 @@ def _parted(change: str) -> tuple[str, str, str]:
     return change.partition("=")
 
 
-def _report(outcome: RunOutcome) -> None:
+def _report(outcome: RunOutcome) -> ExitCode:
+    """Build the report; what goes wrong with it is said, and must not hide how the run ended.
+
+    Raises:
+        Exception: a bug, after a run that has nothing worse to say.
+    """
+    try:
+        _build_report(outcome)
+    except CampaignError as error:
+        print_note(f"no report: {error}", "yellow")
+        return error.exit_code
+    except KeyboardInterrupt:
+        print_note("no report: interrupted")
+        return ExitCode.INTERRUPTED
+    except Exception as error:
+        if outcome.exit_code is ExitCode.DONE:
+            raise
+        print_note(
+            f"no report: internal error: {type(error).__name__}: {error}\n"
+            f"This is a bug; campaign report {outcome.archive} shows it again.",
+            "yellow",
+        )
+    return ExitCode.DONE
+
+
+def _build_report(outcome: RunOutcome) -> None:
     from campaign.cli.report import report_run
 
     if outcome.exit_code is ExitCode.INTERRUPTED:

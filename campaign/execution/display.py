@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from typing import IO, Any, cast
 
 from rich.console import Console
 from rich.progress import BarColumn, TaskID, TextColumn
@@ -19,12 +20,35 @@ PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
 
 @contextmanager
 def progress_display(console: Console) -> Iterator[Display]:
-    """The display that suits `console`, for as long as the block lasts."""
+    """The display that suits `console`, for as long as the block lasts.
+
+    When the terminal closes, what would have been shown is dropped: the run is not to end by it.
+    """
+    console.file = cast(IO[str], _Droppable(console.file))
     if console.is_terminal and not console.is_dumb_terminal:
         with live_display(console) as display:
             yield display
     else:
         yield PlainDisplay(console)
+
+
+class _Droppable:
+    """A stream whose failed writes are dropped."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            self._stream.flush()
 
 
 @contextmanager

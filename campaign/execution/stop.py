@@ -6,18 +6,20 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 _NOTICE = "\nstopping: the running trial ends first; Ctrl-C again stops now\n"
+_HANG_UP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # Windows has none
 
 
 class StopSwitch:
     """Calling it says whether somebody asked the run to stop.
 
-    The first SIGINT (Ctrl-C) or SIGTERM only sets it: running trials see it and end, the bench is
-    made safe and the archive is closed. A second one raises KeyboardInterrupt where the program
-    stands.
+    The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (the terminal is gone) only sets it: running trials
+    see it and end, the bench is made safe and the archive is closed. A second SIGINT or SIGTERM
+    raises KeyboardInterrupt where the program stands; a second SIGHUP does not, because shell and
+    kernel both send one when a terminal closes, and nobody insists.
     """
 
     def __init__(self) -> None:
@@ -37,11 +39,11 @@ class StopSwitch:
 
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
-        """Listen to SIGINT and SIGTERM inside the block. Main thread only."""
-        before = {
-            number: signal.signal(number, self._handle)
-            for number in (signal.SIGINT, signal.SIGTERM)
-        }
+        """Listen to SIGINT, SIGTERM and SIGHUP inside the block. Main thread only.
+
+        A SIGHUP that was ignored before stays ignored: that is what nohup is for.
+        """
+        before = {number: signal.signal(number, self._handle) for number in _stopping_signals()}
         try:
             yield self
         finally:
@@ -51,7 +53,17 @@ class StopSwitch:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self():
+            if number == _HANG_UP:
+                return
             raise KeyboardInterrupt
         self.request("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
         # Not through sys.stderr: its buffer may be what the signal has interrupted.
-        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _NOTICE.encode())
+        with suppress(OSError):  # nobody may be there to read it
+            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _NOTICE.encode())
+
+
+def _stopping_signals() -> list[signal.Signals]:
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if _HANG_UP is not None and signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
+        numbers.append(_HANG_UP)
+    return numbers

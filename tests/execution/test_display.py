@@ -22,6 +22,20 @@ def test_a_time_reads_like_a_clock(seconds: float, text: str):
     assert clock(seconds) == text
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_that_is_gone_does_not_end_the_run(terminal: bool):
+    class Gone(io.StringIO):
+        def write(self, text: str) -> int:
+            raise OSError(5, "Input/output error")
+
+        def flush(self) -> None:
+            raise OSError(5, "Input/output error")
+
+    console = Console(file=Gone(), force_terminal=terminal, width=80, _environ={"TERM": "xterm"})
+    with progress_display(console) as display:
+        run_three(display)
+
+
 def run_three(display) -> None:
     trials = make_trials(3)
     ledger = Ledger(trials, display)

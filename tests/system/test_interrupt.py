@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,12 @@ from tests.system.user import SEA, campaign, command, environment, write
 LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 3000\n", 1)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+STOPPING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP"}
+
+
+@pytest.mark.parametrize(
+    "number", [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
+)
 def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.Signals):
     write(tmp_path, LONG)
     with subprocess.Popen(
@@ -36,10 +43,31 @@ def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.S
     assert archive.is_file()
     assert {path.name for path in archive.parent.iterdir()} == {archive.name}
     shown = campaign(tmp_path, "show", str(archive)).out
-    who = "Ctrl-C" if number is signal.SIGINT else "SIGTERM"
-    assert f"status:      interrupted: stopped by {who}" in shown
+    assert f"status:      interrupted: stopped by {STOPPING[number.name]}" in shown
     assert "safe state:  confirmed" in shown
     campaign(tmp_path, "report", str(archive))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
+    """The real thing: afterwards every write to the terminal fails, and that ends nothing."""
+    import pty
+
+    write(tmp_path, LONG)
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(tmp_path)
+        os.execve(sys.executable, command("run", "protocol.toml"), environment())
+    shown = b""
+    while b"sea: " not in shown:
+        shown += os.read(terminal, 1024)
+    os.close(terminal)
+    os.waitpid(child, 0)
+    (archive,) = (tmp_path / "results").iterdir()
+    assert archive.suffix == ".nxs"
+    shown = campaign(tmp_path, "show", str(archive)).out
+    assert "status:      interrupted: stopped by SIGHUP" in shown
+    assert "safe state:  confirmed" in shown
 
 
 def test_a_killed_run_is_readable_and_says_that_it_has_no_end(tmp_path: Path):
