@@ -46,12 +46,14 @@ def draw_overview(scoreboard: Scoreboard) -> str | None:
 
 def cell_name(cell: Cell) -> str:
     """A cell within its table in words, as short as it can be said."""
-    parts = (cell.row, cell.column)
-    told = [part for part in parts if part not in (cell.quantity, "value")] or [cell.row]
-    if cell.symbol and cell.quantity in parts:
-        told.insert(parts.index(cell.quantity), cell.symbol)
+    row, column = cell.row, cell.column
+    if cell.symbol and cell.quantity in (row, column):
+        row = cell.symbol if row == cell.quantity else row
+        column = cell.symbol if column == cell.quantity else column
     elif cell.symbol:
-        told[0] = f"{told[0]} {cell.symbol}"
+        row = f"{row} {cell.symbol}"
+    # A column that only repeats what the whole table is about says nothing.
+    told = [row] if column in (cell.quantity, "value") else [row, column]
     return " · ".join(part.replace("_", " ") for part in told)
 
 
