@@ -146,7 +146,11 @@ def _first_beyond(samples: Array, bound: float | None) -> int:
 
 
 def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[int, Ending | None]:
-    """How many samples are good, and why the trial ends there (None: it goes on)."""
+    """How many samples are good, and why the trial ends there (None: it goes on).
+
+    Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
+    Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
+    """
     names = {info.name: row for info, row in zip(CHANNELS, block, strict=True)}
     whole = len(time)
     bad = ~np.isfinite(block).all(axis=0)

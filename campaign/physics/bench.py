@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from campaign.options import Options
 from campaign.physics.compensation import CompensationField
@@ -159,6 +159,14 @@ class ControllerOptions(Options):
     pointing_high_pass: Frequency = Field(default=0.0, ge=0)
     """Corner of the first-order high-pass that the pointing error is seen through; 0 for none."""
 
+    @field_validator("delay")
+    @classmethod
+    def _delay_of_samples(cls, delay: float, info: ValidationInfo) -> float:
+        """A continuous loop has no sample to count from; a delay would silently not be there."""
+        if delay > 0 and info.data.get("sample_rate", delay) is None:
+            raise ValueError("'delay' needs controller.sample_rate: a continuous loop has none")
+        return delay
+
 
 class RateSensor(Options):
     """A sensor of angular rate, read by the sampled controller."""
@@ -238,11 +246,14 @@ class VariationOptions(Options):
     bristle_stiffness: float = Field(default=0.0, ge=0, le=0.3)
     """Of sigma0, from day to day."""
     trial: float = Field(default=0.0, ge=0, le=0.3)
-    """Of all torques, from trial to trial."""
+    """Of Tc and Ts, by one common factor, from trial to trial."""
 
 
 class LimitsOptions(Options):
-    """What must never be exceeded: checked before anything moves, and watched during a trial."""
+    """What must never be exceeded: checked before anything moves.
+
+    All but acceleration and duration are watched during a trial as well.
+    """
 
     angle: Angle = Field(gt=0)
     """Largest angle of the load relative to the hull, either way from zero."""
@@ -301,6 +312,26 @@ class Bench(Options):
             for name, entry in tree["compensation"].items()
         }
         return {**tree, "compensation": named}
+
+    @field_validator("sensors")
+    @classmethod
+    def _sensors_are_sampled(cls, sensors: SensorsOptions, info: ValidationInfo) -> SensorsOptions:
+        """A continuous controller sees everything exactly; no flaw may be lost silently."""
+        controller = info.data.get("controller")
+        if controller is None or controller.sample_rate is not None:
+            return sensors
+        flaws = [
+            f"{sensor}.{name}"
+            for sensor in SensorsOptions.model_fields
+            for name, value in getattr(sensors, sensor)
+            if value > 0
+        ]
+        if flaws:
+            raise ValueError(
+                f"{', '.join(map(repr, flaws))} needs controller.sample_rate: a continuous "
+                "controller sees everything exactly"
+            )
+        return sensors
 
     @model_validator(mode="after")
     def _leave_friction(self) -> Bench:

@@ -80,8 +80,12 @@ BENCH_PATHS = [
         30.0,
     ),
     # Fields that the bench file leaves to their defaults.
-    ('"bench.controller.delay" = ["2 ms"]', ("controller", "delay"), 0.002),
-    ('"bench.sensors.gyro.noise" = ["1 mrad/s"]', ("sensors", "gyro", "noise"), 0.001),
+    (
+        '"bench.controller.relative_rate_filter" = ["2 ms"]',
+        ("controller", "relative_rate_filter"),
+        0.002,
+    ),
+    ('"bench.controller.sample_rate" = ["2 kHz"]', ("controller", "sample_rate"), 2000.0),
     # Through two unions and two tables of free names.
     (
         '"bench.compensation.lugre.friction.load.static_torque" = ["33 N m"]',
@@ -99,6 +103,14 @@ def test_a_bench_can_be_swept(desk, matrix: str, keys: tuple[str, ...], value: f
         found = found[key]
     assert found == value
     assert trial.point == {"bench." + ".".join(keys): value}
+
+
+def test_a_table_that_the_bench_file_leaves_out_can_be_swept(desk) -> None:
+    sampled = '"bench.controller.sample_rate" = ["1 kHz"]\n'
+    noise = '"bench.sensors.gyro.noise" = ["1 mrad/s", "2 mrad/s"]\n'
+    plan = make_plan(desk.load(GOOD + f"[test.matrix]\n{sampled}{noise}"))
+    found = [trial.bench["sensors"]["gyro"]["noise"] for trial in plan.trials]
+    assert sorted(set(found)) == [0.001, 0.002]
 
 
 def test_a_whole_friction_can_be_swept(desk) -> None:
