@@ -54,15 +54,26 @@ def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
     import pty
 
     write(tmp_path, LONG)
-    child, terminal = pty.fork()
-    if child == 0:
-        os.chdir(tmp_path)
-        os.execve(sys.executable, command("run", "protocol.toml"), environment())
-    shown = b""
-    while b"sea: " not in shown:
-        shown += os.read(terminal, 1024)
-    os.close(terminal)
-    os.waitpid(child, 0)
+    terminal, theirs = pty.openpty()
+    own_terminal = (
+        "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", own_terminal, *command("run", "protocol.toml")],
+        cwd=tmp_path,
+        env=environment(),
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        start_new_session=True,
+    ) as process:
+        os.close(theirs)
+        shown = b""
+        while b"sea: " not in shown:
+            shown += os.read(terminal, 1024)
+        os.close(terminal)
+        process.wait(timeout=120)
     (archive,) = (tmp_path / "results").iterdir()
     assert archive.suffix == ".nxs"
     shown = campaign(tmp_path, "show", str(archive)).out
