@@ -12,6 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from campaign.options import Options
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
+from campaign.physics.preload import PreloadOptions, with_preload
 from campaign.units import (
     Angle,
     AngularAcceleration,
@@ -53,19 +54,6 @@ class MotorOptions(Options):
     """R: armature resistance."""
     inductance: Inductance = Field(gt=0)
     """L: armature inductance."""
-
-
-class PreloadOptions(Options):
-    """The preload of the anti-backlash gear, told by the breakaway torque it leads to."""
-
-    torque: Torque = Field(gt=0)
-    """Breakaway torque of the axis as the gear is preloaded now."""
-    nominal: Torque = Field(gt=0)
-    """Breakaway torque that the friction parameters of this bench belong to."""
-    static_share: float = Field(default=1.0, ge=0, le=2)
-    """Share of the difference that static friction gains."""
-    coulomb_share: float = Field(default=0.0, ge=0, le=2)
-    """Share of the difference that Coulomb friction gains."""
 
 
 class GearOptions(Options):
@@ -336,9 +324,7 @@ class Bench(Options):
     @model_validator(mode="after")
     def _leave_friction(self) -> Bench:
         """A preload below its nominal one must not take more friction away than there is."""
-        from campaign.physics.variation import preloaded
-
-        preloaded(self)
+        with_preload(self.friction, self.gear.ratio, self.gear.preload)
         return self
 
     @property
