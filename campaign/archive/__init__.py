@@ -4,9 +4,10 @@
 format is described in `docs/archive-format.md`. Importing this package does not import h5py.
 """
 
+from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
 from campaign.archive.listing import RunSummary, find_run, list_runs
-from campaign.archive.reader import ArchivedTrial, RunReader, open_run
+from campaign.archive.reader import RunReader, open_run
 from campaign.archive.writer import RunWriter, TrialWriter
 
 __all__ = [

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.files import PART, sha256_of
 from campaign.archive.header import PARTIAL, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, read_journal
@@ -20,42 +21,10 @@ from campaign.archive.run_folder import (
     read_plan_text,
 )
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Recording, SafeState, Tree, Trial
+from campaign.trial import SafeState, Tree
 
 if TYPE_CHECKING:
     import h5py
-
-
-@dataclass(frozen=True)
-class ArchivedTrial:
-    """A trial in an archive; what an analysis calls `TrialData`.
-
-    Attributes:
-        trial: as it was executed.
-        ending: how it ended and why.
-        started, ended: ISO 8601.
-        path: the file it lies in: the sealed run, or its own while the run is in progress.
-        entry: its group there.
-    """
-
-    trial: Trial
-    ending: Ending
-    started: str
-    ended: str
-    path: Path
-    entry: str
-
-    def recording(self) -> Recording:
-        """The samples, SI, read now. Raises ArchiveError when one fails its checksum."""
-        from campaign.archive.trial_reading import read_recording
-
-        return read_recording(self.path, self.entry, self.ending)
-
-    def problems(self) -> Iterator[str]:
-        """Reads every sample in flat memory; what is damaged, by trial and channel."""
-        from campaign.archive.trial_reading import check_recordings
-
-        return check_recordings(self.path, [self.entry])
 
 
 @dataclass(frozen=True)
@@ -117,7 +86,7 @@ class RunReader:
 
     def problems(self) -> list[str]:
         """What in the samples is damaged (reads them all, in flat memory); empty when sound."""
-        from campaign.archive.trial_reading import check_recordings
+        from campaign.archive.sample_reading import check_recordings
 
         entries: dict[Path, list[str]] = {}
         for trial in self.trials:
