@@ -93,6 +93,8 @@ def split_quantity(text: str) -> tuple[float, str]:
     match = _NUMBER.match(text)
     if match is None:
         raise ValueError(f"{text!r} does not begin with a number")
+    if match[2].startswith(","):
+        raise ValueError(f"{text!r}: the decimal sign is a point, as in {text.replace(',', '.')!r}")
     return float(match[1]), match[2]
 
 

@@ -9,7 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-_NOTICE = "\nstopping: the running trial ends first; Ctrl-C again stops now\n"
+_NOTICE = (
+    "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
+    "seconds; Ctrl-C again leaves it unclosed\n"
+)
 _HANG_UP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # Windows has none
 
 

@@ -308,7 +308,8 @@ def _figure(ramp: Ramp, suffix: str) -> Figure:
         key=f"ramp{suffix}",
         title="Breakaway: torque ramp, motion, and the presliding curve",
         caption="The torque rises until the load slides. Before that it already gives, "
-        "elastically: the slope at the start of the lower curve is the stiffness of the bristles.",
+        "elastically: the lower curve begins with the stiffness of all interfaces together and "
+        "goes on, once the weaker ones slip, with that of the strongest.",
         alt="Drive torque and rate over time, and drive torque over angle with the fitted "
         "presliding curve and its initial slopes.",
         panels=(

@@ -246,7 +246,11 @@ def _analyse(data: TestData) -> Result:
         "frequency": options.frequency,
         "acceleration": options.acceleration,
     }
-    findings = [*_findings(rows, told)]
+    findings: list[Finding] = []
+    if len(measured) == len(data.trials):
+        findings += _findings(rows, told)
+    else:
+        notes.append("Thresholds and ranks are not compared: they need every trial.")
     findings.append(Finding("stabilization_error", unchanged, "rad", told))
     notes += _skipped_notes(measured, options)
     return Result(

@@ -149,6 +149,9 @@ def test_thresholds_and_ranking_of_made_up_errors() -> None:
         assert found.value == pytest.approx(threshold, rel=2e-3)
         assert found.lower_bound is not passed
         assert finding(result, "sensitivity_rank", parameter=parameter).value == rank
+    cut_off = analyse("sensitivity", [*done[:-1], failed(done[-1])])
+    assert not [f for f in cut_off.findings if f.quantity.startswith("sensitivity_")]
+    assert any("need every trial" in note for note in cut_off.notes)
     rows = {row["parameter"]: row for row in table(result, "sensitivity").rows}
     assert rows["stribeck_velocity"]["threshold"] is None
     assert rows["stribeck_velocity"]["said"] == "none below 75%"

@@ -1,7 +1,7 @@
 """The converged stabilization errors of the thesis' simulation (Tables 5.2 and 5.8).
 
 Expected: 0.488412958 and 0.000594855 mrad by an order-8 Runge-Kutta method with located reversals;
-0.0660 and 0.000813 from an independent fixed-step prototype.
+0.0660 and 0.000813 from an independent fixed-step integration.
 """
 
 from __future__ import annotations

@@ -55,6 +55,7 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         ),
         (GOOD + '§frequenzy = "1 Hz"\n', r"unknown key 'frequenzy'; .*did you mean 'frequency'\?"),
         (GOOD + "§repaet = 3\n", r"did you mean 'repeat'\?"),
+        (HEAD + 'frequency = §"0,24 Hz"\n', r"decimal sign is a point"),
         (HEAD + "frequency = §0.24\n", r"0.24 has no unit; .*\"0.24 Hz\""),
         (HEAD + 'frequency = §"0.24"\n', r"has no unit"),
         (
