@@ -6,11 +6,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PINNED := --quiet --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format clean
+.PHONY: help demo test soak check format clean
 
 help:
 	@echo "make demo    run the quick-start protocol on the simulated bench and report it"
 	@echo "make test    run the whole test suite"
+	@echo "make soak    wear: hundreds of kills, thousands of damaged files, a million frames (long)"
 	@echo "make check   lint, formatting, types, import contracts"
 	@echo "make format  put the code into the project's format"
 	@echo "make clean   remove the environment and everything built (results/ stays)"
@@ -21,6 +22,9 @@ demo: $(VENV)/installed
 
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_OPTIONS)
+
+soak: $(VENV)/installed-test
+	$(BIN)/python -m pytest -m soak -n auto $(PYTEST_OPTIONS)
 
 check: $(VENV)/installed-test
 	$(BIN)/ruff check .

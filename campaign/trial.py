@@ -31,6 +31,8 @@ class Role(StrEnum):
 
     MEASUREMENT = "measurement"
     WARM_UP = "warm-up"
+    HOME = "home"  # brings the axis to where the next trial begins
+    CHECK = "check"  # one trial again and again: is the bench still the same bench?
 
 
 class Task(Options):
@@ -83,6 +85,8 @@ class Trial(Options):
         bench: the normalised bench (SI) with the sweep applied.
         task: what the bench does.
         note: what the plan says about it, e.g. which rule set the measuring window.
+        setup: what a person must have done to the bench for it, in order; shown and confirmed
+            before the first trial for which it differs from what was confirmed last.
     """
 
     number: int = Field(ge=1)
@@ -96,6 +100,7 @@ class Trial(Options):
     bench: Tree
     task: Task
     note: str = ""
+    setup: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -145,6 +150,21 @@ class Outcome(StrEnum):
     INTERRUPTED = "interrupted"  # somebody stopped it
 
 
+class Fault(StrEnum):
+    """What failed, in the words by which a protocol's `[faults]` chooses what to do about it."""
+
+    LOST_CONNECTION = "lost-connection"  # no word from the bench
+    LOST_SAMPLES = "lost-samples"  # some could not be had again; they are marked
+    HEARTBEAT = "heartbeat"  # the bench stopped because it no longer heard the host
+    RESET = "reset"  # the controller started anew in mid-trial
+    OVER_TEMPERATURE = "over-temperature"
+    LIMIT_SWITCH = "limit-switch"
+    SENSOR = "sensor"  # a sensor is stuck or out of its range
+    DRIVE = "drive"  # the drive reports a fault of its own
+    REFUSED = "refused"  # the bench would not arm
+    OTHER = "other"
+
+
 class SafeState(StrEnum):
     """Whether the bench was seen at rest with its drive off after a trial."""
 
@@ -160,11 +180,16 @@ class Ending:
         outcome: see `Outcome`.
         reason: empty when completed; else what happened, with the value and the limit.
         safe_state: whether the bench is known to be safe afterwards.
+        fault: what failed, when the outcome is a fault.
+        telemetry: what the backend measured of its own work (latency, buffer fill, resends ...),
+            JSON-like, units in the names; nothing that an analysis needs.
     """
 
     outcome: Outcome
     reason: str = ""
     safe_state: SafeState = SafeState.CONFIRMED
+    fault: Fault | None = None
+    telemetry: Mapping[str, JsonValue] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -38,13 +38,48 @@ class RunStarted(_Line):
     trials: int
 
 
+class RunResumed(_Line):
+    """Somebody goes on with a run that was interrupted or killed; what follows is theirs.
+
+    `changes` are the differences to what the run began with, as they were shown and accepted.
+    """
+
+    event: Literal["run resumed"] = "run resumed"
+    at: str
+    host: dict[str, str] = {}
+    versions: dict[str, str] = {}
+    command: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
+
+
+class OperatorStep(_Line):
+    """A person was asked to do something to the bench, and what they answered."""
+
+    event: Literal["operator step"] = "operator step"
+    at: str
+    trial: int = Field(ge=1)
+    step: str
+    answer: str
+
+
+class Decision(_Line):
+    """What the run did besides its plan: a retry, a skipped trial, an abort, a rest ..."""
+
+    event: Literal["decision"] = "decision"
+    at: str
+    trial: int | None = None
+    decision: str = Field(pattern=r"^[a-z -]{1,40}$")
+    reason: str
+
+
 class TrialFinished(_Line):
     """A trial ended, however it ended, and its file is on the disk under its real name."""
 
     event: Literal["trial finished"] = "trial finished"
     at: str
     trial: int = Field(ge=1)
-    file: str = Field(pattern=r"^trial-[0-9]{5,10}\.nxs$")
+    attempt: int = Field(default=1, ge=1)
+    file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs$")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     bytes: int = Field(ge=0)
     outcome: Outcome
@@ -72,7 +107,8 @@ class RunEnded(_Line):
 
 
 Entry = Annotated[
-    RunStarted | TrialFinished | TrialAbandoned | RunEnded, Field(discriminator="event")
+    RunStarted | RunResumed | OperatorStep | Decision | TrialFinished | TrialAbandoned | RunEnded,
+    Field(discriminator="event"),
 ]
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 

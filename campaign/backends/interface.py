@@ -18,12 +18,17 @@ class Backend(Protocol):
     def __exit__(self, *exception: object) -> None: ...
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why this backend cannot execute `trial` (naming the field), or None when it can."""
+        """Why this backend cannot execute `trial` (naming the field), or None when it can.
+
+        Asked of every trial of a plan, in order, before anything is connected.
+        """
 
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         """Execute `trial`, appending samples to `recorder`; end early when `stopped()` is true.
 
-        A bench that fails, diverges or meets a limit is an Ending, not an exception.
+        A bench that fails, diverges or meets a limit is an Ending, not an exception; samples that
+        are missing are NaN, each gap is an event, and the trial ends as a fault. A backend that
+        lost its bench may be asked again: it then tries to find it again.
         Raises BackendError when the backend itself cannot go on.
         """
 
@@ -39,6 +44,8 @@ class BackendKind:
         options: what it accepts (`--set backend.NAME=...`).
         open: makes one from its options.
         parallel: whether several trials may be executed at once (`--workers`).
+        attended: whether something real moves: `campaign run` then asks before the first motion,
+            operator steps are confirmed by a person, and pauses are really waited for.
     """
 
     name: str
@@ -46,3 +53,4 @@ class BackendKind:
     options: type[Options]
     open: Callable[[Options], Backend]
     parallel: bool = False
+    attended: bool = False

@@ -1,0 +1,1 @@
+"""Archived runs as files of other programs, one format a file."""
