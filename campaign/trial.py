@@ -87,6 +87,8 @@ class Trial(Options):
         note: what the plan says about it, e.g. which rule set the measuring window.
         setup: what a person must have done to the bench for it, in order; shown and confirmed
             before the first trial for which it differs from what was confirmed last.
+        set_by_operator: the paths of `point` that this sets, e.g. `bench.gear.preload.torque`; all
+            other swept values are the controller's business.
     """
 
     number: int = Field(ge=1)
@@ -101,6 +103,7 @@ class Trial(Options):
     task: Task
     note: str = ""
     setup: tuple[str, ...] = ()
+    set_by_operator: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

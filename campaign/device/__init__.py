@@ -1,1 +1,1 @@
-"""The rehearsal controller: a process that speaks the serial protocol and simulates the bench behind it."""
+"""The rehearsal controller: a process that speaks the serial protocol, with a simulated bench."""
