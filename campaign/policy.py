@@ -6,7 +6,7 @@ decision it led to.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -31,6 +31,12 @@ class Response(Options):
     @classmethod
     def _from_word(cls, value: Any) -> Any:
         return {"do": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.do != "retry" and (self.times, self.pause, self.then) != (1, 0.0, "skip"):
+            raise ValueError("'times', 'pause' and 'then' belong to do = \"retry\"")
+        return self
 
 
 class Rest(Options):

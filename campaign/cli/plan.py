@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from campaign.archive import new_run_name
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
 from campaign.cli.prepare import Prepared, Request, prepare
 from campaign.execution.display import clock
+from campaign.policy import Policy, Response
 from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
 from campaign.protocol.limit_check import in_display_units
 from campaign.trial import Role
@@ -45,9 +47,30 @@ def _print(prepared: Prepared, results: Path) -> None:
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
         f"{prepared.kind.name}; would write {archive}, at most {bytes_text(plan.size)}"
     )
+    for line in policy_lines(plan.policy):
+        print_line(line)
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
         print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+
+
+def policy_lines(policy: Policy) -> Iterator[str]:
+    """What the protocol wants done besides its trials, a line for faults and one for rests."""
+    if policy.faults:
+        responses = (f"{name}: {_response(one)}" for name, one in policy.faults.items())
+        others = () if "default" in policy.faults else ("else: skip",)
+        yield f"faults: {'; '.join((*responses, *others))}"
+    if policy.rest is not None:
+        pause, every = clock(policy.rest.pause), clock(policy.rest.every)
+        yield f"rests: {pause} after each {every} of bench time"
+
+
+def _response(response: Response) -> str:
+    if response.do != "retry":
+        return response.do
+    pause = f" after {clock(response.pause)}" if response.pause else ""
+    times = "once" if response.times == 1 else f"{response.times} times"
+    return f"retry {times}{pause}, then {response.then}"
 
 
 def _row(test: PlannedTest) -> tuple[str, ...]:

@@ -18,6 +18,8 @@ from campaign.protocol.schema import ProtocolFile, replaced
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
 SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration"}
+TABLES = frozenset({"faults", "rest"})
+"""Top-level tables, whose keys can be set one by one."""
 
 
 @dataclass
@@ -90,7 +92,7 @@ def apply_overrides(overrides: list[Override], collected: Collected) -> None:
         if drafts and len(override.keys) > 1:
             for draft in drafts:
                 draft.apply(override)
-        elif first not in SETTABLE or len(override.keys) > 1:
+        elif first not in (SETTABLE if len(override.keys) == 1 else TABLES):
             choices = [f"{name}.…" for name in names] + sorted(SETTABLE)
             slip = nearest(first, [*names, *SETTABLE])
             message = f"no test and no top-level key is called '{first}'; {allowed(choices)}{slip}"
@@ -107,7 +109,8 @@ def top_level(source: Source, overrides: list[Override]) -> tuple[dict[str, Any]
     tree, patches = dict(source.tree), []
     for override in overrides:
         key = override.keys[0]
-        if len(override.keys) == 1 and key in SETTABLE and key not in named:
+        settable = SETTABLE if len(override.keys) == 1 else TABLES
+        if key in settable and key not in named:
             tree = replaced(tree, override.keys, override.value)
             patches.append((override.keys, override.origin))
     return tree, Patched(Within(source), patches)

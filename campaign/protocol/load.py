@@ -10,6 +10,7 @@ from typing import Any
 from campaign.errors import Problem, ProtocolError
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
+from campaign.policy import Policy
 from campaign.protocol.attachments import Read, attach, attach_values
 from campaign.protocol.axes import is_large, make_axis, value_problems
 from campaign.protocol.calibration import Calibration, CalibrationOptions
@@ -93,6 +94,7 @@ def load_protocol(
         sources={name: each.text for name, each in collected.sources.items()},
         overrides=tuple(overrides),
         calibration=calibration,
+        policy=Policy(faults=top.faults, rest=top.rest),
     )
 
 

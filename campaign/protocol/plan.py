@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.limits import Margin, margins
+from campaign.policy import Policy
 from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.expand import Expanded, expand, samples_of, seed_of, size_problem
 from campaign.protocol.matrix import count_points
@@ -78,6 +79,7 @@ class Plan:
         fingerprint: SHA-256 of `normalised`.
         seed: from which tests without a seed of their own got theirs.
         breaches: every limit that a trial would break.
+        policy: what to do about faults, and when to rest; not part of `normalised`.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Plan:
     only: tuple[str, ...]
     seed: int
     breaches: tuple[LimitUse, ...]
+    policy: Policy = field(default_factory=Policy)
 
     @property
     def duration(self) -> float:
@@ -169,6 +172,7 @@ def make_plan(
         only=tuple(only),
         seed=master,
         breaches=tuple(use for use in uses if use.margin.broken),
+        policy=protocol.policy,
     )
 
 

@@ -27,6 +27,7 @@ def as_tree(plan: Plan) -> dict[str, Any]:
         "overrides": list(plan.overrides),
         "only": list(plan.only),
         "sources": sorted(plan.sources),
+        "policy": plan.policy.model_dump(mode="json"),
         "duration_s": plan.duration,
         "samples": plan.samples,
         "bytes": plan.size,

@@ -80,6 +80,10 @@ def _a(noun: str) -> str:
 
 def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collection[str]) -> Fault:
     keys, shape = from_location(model, detail["loc"])
+    if keys[-1:] == ("[key]",):  # pydantic's name for a key that may not stand in a table
+        return keys[:-1], "key", _wrong_value(None, detail)
+    while keys and not isinstance(_value_at(tree, keys[:-1]), Mapping | list):
+        keys = keys[:-1]  # within a value that is short for a table
     match detail["type"]:
         case "extra_forbidden":
             around = shape_at(model, tree, keys[:-1]) if len(keys) > 1 else Shape((model,))

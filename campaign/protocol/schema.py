@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +16,7 @@ from pydantic import ConfigDict, Field
 
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.policy import Occasion, Policy, Response, Rest
 from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
@@ -85,6 +86,10 @@ class ProtocolFile(Options):
     """Published values to compare with: a path relative to this file, "none" or "thesis"."""
     calibration: CalibrationOptions | None = None
     """What `campaign calibrate` fits; `campaign run` does not look at it."""
+    faults: dict[Occasion, Response] = {}
+    """What to do about a trial that did not run to its end: occasion to response."""
+    rest: Rest | None = None
+    """Pauses in which the bench cools down."""
     test: tuple[dict[str, Any], ...] = ()
     """The tests, each under `[[test]]`."""
 
@@ -124,6 +129,7 @@ class Protocol:
         sources: verbatim text of every protocol, bench and published file, by its name as written.
         overrides: what `--set` was given.
         calibration: what may be fitted, None when the protocol does not say.
+        policy: of this file; those of included protocols do not apply.
     """
 
     path: Path
@@ -137,6 +143,7 @@ class Protocol:
     sources: Mapping[str, str]
     overrides: tuple[str, ...] = ()
     calibration: Calibration | None = None
+    policy: Policy = field(default_factory=Policy)
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

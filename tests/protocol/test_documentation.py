@@ -53,11 +53,12 @@ def test_every_key_is_documented() -> None:
         "stabilization.repeat=3",
         "stabilization.bench.axis.inertia=40 kg m^2",
         "stabilization.matrix.cycles=[3, 6]",
+        "rest.pause=5 min",
     ],
 )
 def test_settings_of_the_page(tmp_path: Path, setting: str) -> None:
     key, value = setting.split("=")
     assert f'`--set {key}="{value}"`' in PAGE or f"`--set {setting}`" in PAGE
     path = tmp_path / "my.toml"
-    path.write_text(blocks("toml")[0])
+    path.write_text(blocks("toml")[0] + blocks("toml part")[0])
     load_protocol(path, experiments(), overrides=[setting], shipped=SHIPPED)
