@@ -1,0 +1,43 @@
+"""The bench that a rehearsal controller stands in front of, from its TOML file."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from campaign.errors import ProtocolError, UsageError
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Source, UnreadableError, Within, read_source
+from campaign.protocol.problems import validate
+from campaign.resources import protocols_folder
+
+
+def load_bench(written: str) -> Bench:
+    """The bench in the file `written`, or the shipped one of that name.
+
+    Raises UsageError when there is none, ProtocolError with everything that is wrong with it.
+    """
+    file = _find(written)
+    try:
+        source = read_source(file, written)
+    except UnreadableError as error:
+        raise UsageError(f"--bench {written}: {error}") from None
+    if not isinstance(source, Source):
+        raise ProtocolError(source)
+    bench = validate(Bench, source.tree, Within(source))
+    if not isinstance(bench, Bench):
+        raise ProtocolError(bench)
+    return bench
+
+
+def _find(written: str) -> Path:
+    if "/" in written or "\\" in written or written.endswith(".toml"):
+        return Path(written)
+    shipped = {file.stem: file for file in (protocols_folder() / "benches").glob("*.toml")}
+    if written in shipped:
+        return shipped[written]
+    close = difflib.get_close_matches(written, shipped, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(sorted(shipped))}"
+    raise UsageError(
+        f"--bench {written}: no shipped bench of that name; {hint} (or name a .toml file)"
+    )

@@ -1,0 +1,139 @@
+"""A trial's samples, simulated in a thread ahead of the clock, by the `sim` backend itself."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from campaign.backends.interface import Backend
+from campaign.trial import Array, ChannelInfo, Ending, Event, Fault, Outcome, Trial
+
+AHEAD = 50_000
+"""Samples that are kept ready at most, give or take a block of the simulation."""
+
+
+class CancelledError(Exception):
+    """The trial is over for the controller; the simulation need not go on."""
+
+
+class Producer:
+    """Executes one trial on `backend` in a thread; the controller takes what it has made.
+
+    It is a Recorder for the backend. `wake` is called from the thread whenever there is news.
+    """
+
+    def __init__(
+        self, backend: Backend, trial: Trial, wake: Callable[[], None], ahead: int = AHEAD
+    ) -> None:
+        self._backend = backend
+        self._trial = trial
+        self._wake = wake
+        self._ahead = ahead
+        self._changed = threading.Condition()
+        self._blocks: deque[Array] = deque()
+        self._events: deque[tuple[int, Event]] = deque()
+        self._made = 0  # samples in all
+        self._taken = 0
+        self._cancelled = False
+        self._ending: Ending | None = None
+        self.channels: tuple[ChannelInfo, ...] = ()
+        self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
+
+    def begin(self) -> None:
+        """Begin to simulate."""
+        self._thread.start()
+
+    def cancel(self) -> None:
+        """Forget the trial; the thread ends with its present block."""
+        with self._changed:
+            self._cancelled = True
+            self._changed.notify_all()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the simulation has ended or has made as much as it may; whether it has."""
+        with self._changed:
+            return self._changed.wait_for(self._is_ahead, timeout)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the first samples, or the ending, are there."""
+        with self._changed:
+            return self._made > 0 or self._ending is not None
+
+    @property
+    def available(self) -> int:
+        """Samples that can be taken now."""
+        with self._changed:
+            return self._made - self._taken
+
+    @property
+    def ending(self) -> Ending | None:
+        """How the simulation ended; None until it has and all its samples were taken."""
+        with self._changed:
+            return self._ending if self._made == self._taken else None
+
+    def take(self, most: int) -> Array:
+        """The next samples, at most `most`, shape (channels, n); n is 0 when there are none."""
+        with self._changed:
+            if not self._blocks or most <= 0:
+                return np.empty((len(self.channels), 0))
+            pieces, count = [], 0
+            while self._blocks and count < most:
+                block = self._blocks.popleft()
+                piece, rest = block[:, : most - count], block[:, most - count :]
+                pieces.append(piece)
+                count += piece.shape[1]
+                if rest.shape[1]:
+                    self._blocks.appendleft(rest)
+            self._taken += count
+            self._changed.notify_all()
+        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+
+    def take_events(self) -> list[Event]:
+        """Events that come before the next sample to be taken."""
+        with self._changed:
+            due = []
+            while self._events and self._events[0][0] <= self._taken:
+                due.append(self._events.popleft()[1])
+            return due
+
+    # What the backend calls, from the thread.
+
+    def start(self, channels: tuple[ChannelInfo, ...]) -> None:
+        self.channels = channels
+
+    def append(self, time: Array, block: Array) -> None:
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._cancelled or self._made - self._taken < self._ahead
+            )
+            if self._cancelled:
+                raise CancelledError
+            if block.shape[1]:
+                self._blocks.append(block)
+                self._made += block.shape[1]
+            self._changed.notify_all()
+        self._wake()
+
+    def event(self, event: Event) -> None:
+        with self._changed:
+            self._events.append((self._made, event))
+
+    def _is_ahead(self) -> bool:
+        return self._ending is not None or self._made - self._taken >= self._ahead
+
+    def _run(self) -> None:
+        try:
+            ending = self._backend.execute(self._trial, self, lambda: self._cancelled)
+        except CancelledError:
+            ending = Ending(Outcome.INTERRUPTED, "cancelled")
+        except Exception as error:  # noqa: BLE001 - whatever it was, the controller has to say it
+            reason = f"the simulation failed: {type(error).__name__}: {error}"
+            ending = Ending(Outcome.FAULT, reason, fault=Fault.OTHER)
+        with self._changed:
+            self._ending = ending
+            self._changed.notify_all()
+        self._wake()

@@ -1,0 +1,39 @@
+"""How warm the motor's winding is: one thermal mass, heated by the current, cooled by the room."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from campaign.trial import Array
+
+ROOM = 293.15
+"""K."""
+THERMAL_RESISTANCE = 0.4
+"""K/W, winding to room, of a servo motor of some hundred watts."""
+TIME_CONSTANT = 600.0
+"""s."""
+LIMIT = 393.15
+"""K; a controller switches off above it."""
+
+
+class Winding:
+    """Temperature of the winding, for the status only: the simulated bench does not change with it.
+
+    Attributes:
+        temperature: K.
+    """
+
+    def __init__(self, resistance: float) -> None:
+        self._resistance = resistance
+        self.temperature = ROOM
+
+    def heat(self, current: Array, duration: float) -> None:
+        """`duration` (s) has passed with `current` (A), shape (n,), in the motor."""
+        loss = self._resistance * float(np.mean(np.square(current))) if len(current) else 0.0
+        goal = ROOM + THERMAL_RESISTANCE * loss
+        if math.isfinite(goal):
+            self.temperature = goal + (self.temperature - goal) * math.exp(
+                -duration / TIME_CONSTANT
+            )

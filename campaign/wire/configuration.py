@@ -1,0 +1,82 @@
+"""A trial as the named values that a controller is set to, and how such names make a tree again.
+
+Names are dotted paths; `docs/serial-protocol.md` lists them. All values are SI. `task.`,
+`controller.`, `limits.` and `compensation.` are every controller's business; `rehearsal.` is what
+only a simulated bench can be told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from campaign.trial import Trial
+
+Value = float | int | bool | str | tuple[float, ...]
+"""What one name is set to: f64, i64, bool, text, or an array of f64."""
+
+REHEARSAL = "rehearsal"
+SIMULATED_TASK = ("base_acceleration", "disturbance", "start_angle")
+"""Of the task: what only a simulated bench can be told."""
+
+
+def configuration_of(trial: Trial) -> dict[str, Value]:
+    """Everything that a rehearsal controller is set to for `trial`, by name.
+
+    Of the bench only what is the controller's: its gains, the limits and the chosen compensation;
+    and, under `rehearsal.bench.`, what a person has set.
+    """
+    task = trial.task.model_dump(mode="python", exclude={"window"})
+    simulated = {name: task.pop(name) for name in SIMULATED_TASK}
+    tree: dict[str, Any] = {
+        "task": task,
+        "controller": trial.bench["controller"],
+        "limits": trial.bench["limits"],
+        REHEARSAL: {"seed": trial.seed, **simulated},
+    }
+    method = trial.task.compensation
+    methods = trial.bench.get("compensation")
+    if isinstance(methods, dict) and method in methods:
+        tree["compensation"] = {method: methods[method]}
+    settings = dict(flatten(tree))
+    for path in trial.set_by_operator:
+        value = at_path({"bench": trial.bench}, path)
+        if value is not None:
+            settings |= flatten({f"{REHEARSAL}.{path}": value})
+    return settings
+
+
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Value]]:
+    """Every leaf of `tree` with its dotted name; what is None is left out."""
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from flatten(value, f"{name}.")
+        elif isinstance(value, list | tuple):
+            yield name, tuple(float(each) for each in value)
+        elif value is not None:
+            yield name, value
+
+
+def nest(settings: Mapping[str, Value]) -> dict[str, Any]:
+    """The tree that `flatten` made `settings` of. Raises ValueError when a name is a table too."""
+    tree: dict[str, Any] = {}
+    for name, value in settings.items():
+        *path, last = name.split(".")
+        table = tree
+        for key in path:
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise ValueError(f"{name!r}: {key!r} is set to a value already")
+        if last in table:
+            raise ValueError(f"{name!r} is set twice")
+        table[last] = value
+    return tree
+
+
+def at_path(tree: Mapping[str, Any], path: str) -> Any:
+    """What stands at the dotted `path`; None when nothing does."""
+    found: Any = tree
+    for key in path.split("."):
+        found = found.get(key) if isinstance(found, Mapping) else None
+    return found
