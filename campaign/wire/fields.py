@@ -1,0 +1,137 @@
+"""Bytes of a message body: writing and reading numbers, texts and lists, with every check."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterable
+from typing import TypeVar
+
+from campaign.wire.codes import Code, WireError
+
+SHORT_TEXT = 255
+"""Longest name, unit or label (bytes of UTF-8)."""
+
+C = TypeVar("C", bound=Code)
+
+
+class Writer:
+    """Collects a body."""
+
+    def __init__(self) -> None:
+        self._parts = bytearray()
+
+    def number(self, letter: str, value: float) -> Writer:
+        """Add one number; `letter` as in `struct`."""
+        try:
+            self._parts += struct.pack("<" + letter, value)
+        except (struct.error, OverflowError) as error:
+            raise WireError(f"{value!r} cannot be sent: {error}") from error
+        return self
+
+    def finite(self, value: float) -> Writer:
+        """Add a finite f64."""
+        if not math.isfinite(value):
+            raise WireError(f"{value!r} cannot be sent: not finite")
+        return self.number("d", value)
+
+    def text(self, text: str, length: str = "B") -> Writer:
+        """Add UTF-8 text after its length in bytes, u8 (`B`) or u16 (`H`)."""
+        data = _utf8(text)
+        return self.number(length, len(data)).data(data)
+
+    def texts(self, texts: Iterable[str]) -> Writer:
+        """Add a list of short texts after their number (u8)."""
+        listed = tuple(texts)
+        self.number("B", len(listed))
+        for text in listed:
+            self.text(text)
+        return self
+
+    def data(self, data: bytes) -> Writer:
+        """Add bytes as they are."""
+        self._parts += data
+        return self
+
+    def done(self) -> bytes:
+        """The body."""
+        return bytes(self._parts)
+
+
+class Reader:
+    """Takes a body apart; WireError as soon as it is not what it should be."""
+
+    def __init__(self, body: bytes) -> None:
+        self._body = body
+        self._position = 0
+
+    @property
+    def left(self) -> int:
+        """Bytes not yet read."""
+        return len(self._body) - self._position
+
+    def data(self, count: int) -> bytes:
+        """The next `count` bytes."""
+        if count > self.left:
+            raise WireError(f"{count} bytes expected at {self._position}, {self.left} are left")
+        self._position += count
+        return self._body[self._position - count : self._position]
+
+    def integer(self, letter: str) -> int:
+        """The next integer; `letter` as in `struct`."""
+        return int(struct.unpack("<" + letter, self.data(struct.calcsize("<" + letter)))[0])
+
+    def real(self) -> float:
+        """The next f64, whatever it is."""
+        return float(struct.unpack("<d", self.data(8))[0])
+
+    def finite(self) -> float:
+        """The next f64, which must be finite."""
+        value = self.real()
+        if not math.isfinite(value):
+            raise WireError(f"a number that is not finite at {self._position - 8}")
+        return value
+
+    def flag(self) -> bool:
+        """The next byte, which must be 0 or 1."""
+        value = self.integer("B")
+        if value > 1:
+            raise WireError(f"a flag is 0 or 1, not {value}")
+        return value == 1
+
+    def code(self, kind: type[C]) -> C:
+        """The next byte as a member of `kind`."""
+        value = self.integer("B")
+        try:
+            return kind(value)
+        except ValueError:
+            raise WireError(f"no {kind.__name__} has the number {value}") from None
+
+    def text(self, length: str = "B") -> str:
+        """The next text, after its length u8 (`B`) or u16 (`H`)."""
+        data = self.data(self.integer(length))
+        try:
+            return data.decode()
+        except UnicodeDecodeError as error:
+            raise WireError(f"text that is not UTF-8: {error}") from error
+
+    def texts(self) -> tuple[str, ...]:
+        """The next list of short texts."""
+        return tuple(self.text() for _ in range(self.integer("B")))
+
+    def end(self) -> None:
+        """Nothing may be left."""
+        if self.left:
+            raise WireError(f"{self.left} bytes too many")
+
+
+def clipped(text: str, limit: int = SHORT_TEXT) -> str:
+    """`text`, cut to at most `limit` bytes of UTF-8."""
+    return text.encode("utf-8", "replace")[:limit].decode("utf-8", "ignore")
+
+
+def _utf8(text: str) -> bytes:
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise WireError(f"{text!r} cannot be sent: {error}") from error
