@@ -1,0 +1,111 @@
+"""The NeXus application definition that the trials of an archive follow, `NXfriction_trial`.
+
+It says what every program may rely on: which channels there are at least, that each has a unit,
+what the bench consists of. `nxvalidate` holds a file against it: `docs/reading-archives.md`.
+
+A trial says that it follows the definition when it does. One that recorded nothing, or that comes
+from a bench without one of the required channels, is archived all the same, without saying so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import h5py
+from h5py import h5f, h5o, h5p
+
+from campaign.archive import hdf5
+from campaign.trial import ChannelInfo, Tree
+
+DEFINITION = "NXfriction_trial"
+VERSION = "1.0"
+
+REQUIRED = (
+    "command",
+    "gyro_rate",
+    "relative_rate",
+    "relative_angle",
+    "motor_current",
+    "drive_torque",
+)
+"""The channels without which an entry does not follow the definition."""
+
+_SENSORS = {"gyro": "gyro_rate", "encoder": "relative_angle", "current_sensor": "motor_current"}
+_GAIN_UNITS = {"rate": ("A s/rad", "A/rad"), "current": ("V/A", "V/(A s)")}
+
+
+def definition_path() -> Path:
+    """The definition's own file, for validators: `nxvalidate -a FILE`."""
+    return Path(__file__).with_name(f"{DEFINITION}.nxdl.xml")
+
+
+def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
+    """Whether a recording of these channels is one that the definition describes."""
+    return {channel.name for channel in channels}.issuperset(REQUIRED)
+
+
+def write_definition(entry: h5py.Group, bench: Tree, channels: Iterable[ChannelInfo]) -> None:
+    """Say that `entry` follows the definition, and describe its bench; nothing when it does not."""
+    if not follows_definition(channels):
+        return
+    hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
+    # Copying costs a tenth of making, and the trials of a campaign share a few benches.
+    template = _template(_Described.of(bench))
+    h5o.copy(template.id, b"instrument", entry.id, b"instrument")
+
+
+@dataclass(frozen=True)
+class _Described:
+    """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
+
+    An archive keeps benches of any origin, so nothing of their layout is taken for granted.
+    """
+
+    name: str
+    gains: tuple[tuple[str, float, float], ...]
+
+    @classmethod
+    def of(cls, bench: Tree) -> _Described:
+        loops = bench.get("controller")
+        gains = (
+            (loop, *found)
+            for loop in _GAIN_UNITS
+            if isinstance(loops, Mapping) and (found := _parallel_gains(loops.get(loop)))
+        )
+        return cls(str(bench.get("name", "")), tuple(gains))
+
+
+@lru_cache(maxsize=32)
+def _template(bench: _Described) -> h5py.File:
+    """A file in memory that holds the instrument."""
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(1 << 14, False)
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    file = h5py.File(h5f.create(b"instrument", h5f.ACC_TRUNC, fapl=access))
+    instrument = hdf5.make_group(file, "instrument", "NXinstrument")
+    hdf5.put_text(instrument, "name", bench.name)
+    for name, channel in _SENSORS.items():
+        sensor = hdf5.make_group(instrument, name, "NXsensor")
+        hdf5.put_text(sensor, "short_name", channel)
+    motor = hdf5.make_group(instrument, "motor", "NXactuator")
+    hdf5.put_text(motor, "physical_quantity", "torque")
+    for loop, proportional, integral in bench.gains:
+        controller = hdf5.make_group(motor, f"{loop}_controller", "NXpid_controller")
+        unit, integral_unit = _GAIN_UNITS[loop]
+        hdf5.put_number(controller, "K_p", proportional, units=unit)
+        hdf5.put_number(controller, "K_i", integral, units=integral_unit)
+    return file
+
+
+def _parallel_gains(controller: object) -> tuple[float, float] | None:
+    """Proportional and integral gain (SI) of a controller of a bench; None when it does not say."""
+    if not isinstance(controller, Mapping):
+        return None
+    proportional, integral = controller.get("proportional"), controller.get("integral")
+    if not isinstance(proportional, int | float) or not isinstance(integral, int | float):
+        return None
+    ideal = controller.get("form") == "ideal"  # its integral gain multiplies inside the other
+    return float(proportional), float(proportional * integral if ideal else integral)
