@@ -15,7 +15,7 @@ from campaign.wire.codes import Tag, WireError
 from campaign.wire.fields import Reader, Writer
 from campaign.wire.frames import MAX_BODY
 
-NAME = re.compile(r"[a-z0-9_\-]+(\.[a-z0-9_\-]+)*", re.ASCII)
+NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 LONGEST_NAME = 64
 LONGEST_TEXT = 512
 """Bytes of UTF-8."""
