@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -51,8 +52,14 @@ def publish(part: Path, final: Path) -> None:
 
 def write_atomically(path: Path, content: str) -> None:
     """Write a small text file so that it is there whole or not at all."""
+    write_lines_atomically(path, [content])
+
+
+def write_lines_atomically(path: Path, lines: Iterable[str]) -> None:
+    """Write lines, each with its end, so that all of them are there or no file at all."""
     part = path.with_name(path.name + PART)
-    part.write_text(content, encoding="utf-8", newline="\n")
+    with part.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(lines)
     publish(part, path)
 
 

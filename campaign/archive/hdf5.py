@@ -10,9 +10,10 @@ content makes equal bytes.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -41,6 +42,7 @@ _STRING = h5py.string_dtype()
 _TEXT = h5t.py_create(_STRING, logical=True)
 _SAMPLE = h5t.IEEE_F64LE
 _SCALAR = h5s.create(h5s.SCALAR)
+_SCALES = (b"CLASS", b"NAME", b"REFERENCE_LIST", b"DIMENSION_LIST")  # what dimension scales leave
 
 
 def create_file(path: Path) -> h5py.File:
@@ -53,6 +55,18 @@ def create_file(path: Path) -> h5py.File:
     plan = h5p.create(h5p.FILE_CREATE)
     plan.set_obj_track_times(False)
     return h5py.File(h5f.create(os.fsencode(path), h5f.ACC_TRUNC, plan, access))
+
+
+@contextlib.contextmanager
+def closing(file: h5py.File) -> Iterator[h5py.File]:
+    """Closes `file`; after an error its handle is let go of without a second error on top."""
+    try:
+        yield file
+    except BaseException:
+        with contextlib.suppress(OSError, RuntimeError, ValueError):
+            file.close()
+        raise
+    file.close()
 
 
 def make_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
@@ -86,6 +100,14 @@ def put_integer(group: h5py.Group, name: str, value: int) -> None:
     """A whole number as a 64-bit scalar."""
     number = np.array(value, dtype="<i8")
     _put_scalar(group, name, h5t.STD_I64LE, number, number.tobytes())
+
+
+def put_number(group: h5py.Group, name: str, value: float, **attributes: str) -> None:
+    """A number as a 64-bit float scalar."""
+    number = np.array(value, dtype=SAMPLE)
+    dataset = _put_scalar(group, name, _SAMPLE, number, number.tobytes())
+    for key, text in attributes.items():
+        put_attribute(dataset, key, text)
 
 
 def _put_scalar(
@@ -129,16 +151,28 @@ def attach_time(group: h5py.Group, time: str = "time") -> None:
         h5ds.attach_scale(h5d.open(group.id, name.encode()), scale, 0)
 
 
-def copy_entry(source: h5py.File, name: str, target: h5py.File) -> None:
+def copy_entry(source: h5py.File, name: str, target: h5py.File, new_name: str) -> None:
     """Copy an entry to another file; chunks are not recompressed.
 
     Dimension scales refer to objects by address, which changes, so they are attached here.
     """
-    h5o.copy(source.id, name.encode(), target.id, name.encode())
-    entry = target[name]
-    for group in ("data", "preview"):
-        if group in entry:
-            attach_time(entry[group])
+    h5o.copy(source.id, name.encode(), target.id, new_name.encode())
+    for data in _plotted(target[new_name]):
+        attach_time(data)
+
+
+def copy_entry_back(source: h5py.File, name: str, target: h5py.File, new_name: str) -> None:
+    """Copy an entry out of a sealed file, without its dimension scales: `copy_entry` undone."""
+    h5o.copy(source.id, name.encode(), target.id, new_name.encode())
+    for data in _plotted(target[new_name]):
+        for item in data.values():
+            for attribute in _SCALES:
+                if h5a.exists(item.id, attribute):
+                    h5a.delete(item.id, attribute)
+
+
+def _plotted(entry: h5py.Group) -> list[h5py.Group]:
+    return [entry[name] for name in ("data", "preview") if name in entry]
 
 
 class SampleColumns:

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from campaign.trial import Role, Tree, Trial
 
-FORMAT = 1
+FORMAT = 2
 """Version of the archive format (`docs/archive-format.md`); a reader reads all up to its own."""
 
 SEALED = ".nxs"
@@ -61,6 +61,8 @@ class RunHeader(_Record):
     description: str = ""
     protocol_name: str = ""
     """What people call the protocol, e.g. `quickstart`."""
+    protocol_path: str = ""
+    """The protocol's file, absolute: from there a resume makes the plan again."""
     sources: dict[str, str] = {}
     """Protocol, included protocols and benches, verbatim, by the path the protocol names them."""
     normalised: Tree = {}
@@ -86,6 +88,8 @@ class RunHeader(_Record):
     """The tests that `--only` chose; empty for all."""
     git_revision: str = ""
     """Revision of the working tree the protocol lies in, where there is one."""
+    seed: int | None = None
+    """From which the tests without a seed of their own got theirs."""
     fingerprint: str = ""
     """SHA-256 of the normalised protocol in canonical JSON."""
 

@@ -97,7 +97,7 @@ class TrialAbandoned(_Line):
 
 
 class RunEnded(_Line):
-    """The last line: the run was closed and is being, or has been, sealed."""
+    """The run was closed and is being, or has been, sealed; only a resume may follow."""
 
     event: Literal["run ended"] = "run ended"
     at: str
@@ -116,10 +116,14 @@ _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 class Journal:
     """Appends lines; each is on the disk when `append` returns. Safe to share between threads."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, whole: int | None = None) -> None:
+        """`whole`: bytes of whole lines there are; what follows was torn by a crash, and is cut."""
         self._path = path
         self._lock = threading.Lock()
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        if whole is not None:
+            os.ftruncate(self._descriptor, whole)
+            os.fsync(self._descriptor)
 
     def append(self, entry: Entry) -> None:
         """Add one line. Raises ArchiveError, leaving the journal as it was, when that fails."""
@@ -148,15 +152,25 @@ class Story:
 
     Attributes:
         started: its first line.
-        finished: by trial number, in the order of their numbers; a trial's last line counts.
+        finished: by trial number, in the order of their numbers; a trial's last attempt counts.
+        earlier: by trial number, the attempts before that, in the order they were made.
         ended: None when the run is still in progress or was killed.
+        entries: all of it, in order.
         text: the whole lines, verbatim.
     """
 
     started: RunStarted
     finished: dict[int, TrialFinished]
+    earlier: dict[int, tuple[TrialFinished, ...]]
     ended: RunEnded | None
+    entries: tuple[Entry, ...]
     text: str
+
+    @property
+    def files(self) -> list[TrialFinished]:
+        """Every attempt that is kept, in the order of the trials' numbers."""
+        kept = self.finished.items()
+        return [one for number, last in kept for one in (*self.earlier.get(number, ()), last)]
 
 
 def read_journal(path: Path) -> Story:
@@ -165,6 +179,11 @@ def read_journal(path: Path) -> Story:
         content = path.read_bytes()
     except OSError as error:
         raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+    return parse_journal(path, content)
+
+
+def parse_journal(path: Path, content: bytes) -> Story:
+    """What a journal tells; `path` is for messages."""
     lines = content.split(b"\n")[:-1]  # what follows the last line's end was never reported
     return _tell(path, lines)
 
@@ -173,10 +192,32 @@ def _tell(path: Path, lines: list[bytes]) -> Story:
     entries = list(_parse(path, lines))
     if not entries or not isinstance(entries[0], RunStarted):
         raise ArchiveError(f"{path}: does not begin with the start of a run")
-    finished = {e.trial: e for e in entries if isinstance(e, TrialFinished)}
-    ended = [e for e in entries if isinstance(e, RunEnded)]
+    attempts: dict[int, dict[str, TrialFinished]] = {}
+    for entry in entries:
+        if isinstance(entry, TrialFinished):
+            of_trial = attempts.setdefault(entry.trial, {})
+            of_trial.pop(entry.file, None)
+            of_trial[entry.file] = entry
+    kept = {number: list(attempts[number].values()) for number in sorted(attempts)}
     text = b"".join(line + b"\n" for line in lines[: len(entries)]).decode()
-    return Story(entries[0], dict(sorted(finished.items())), ended[-1] if ended else None, text)
+    return Story(
+        started=entries[0],
+        finished={number: of_trial[-1] for number, of_trial in kept.items()},
+        earlier={n: tuple(of_trial[:-1]) for n, of_trial in kept.items() if len(of_trial) > 1},
+        ended=_end(entries),
+        entries=tuple(entries),
+        text=text,
+    )
+
+
+def _end(entries: list[Entry]) -> RunEnded | None:
+    """How the run ended, unless it was resumed since."""
+    for entry in reversed(entries):
+        if isinstance(entry, RunEnded):
+            return entry
+        if isinstance(entry, RunResumed):
+            return None
+    return None
 
 
 def _parse(path: Path, lines: list[bytes]) -> Iterable[Entry]:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from campaign.archive.files import why
 from campaign.archive.header import FORMAT, PlannedTrial, RunHeader
 from campaign.errors import ArchiveError
+from campaign.trial import canonical_json
 
 HEADER = "run.json"
 PLAN = "plan.jsonl"
@@ -26,9 +27,28 @@ def read_header(folder: Path) -> RunHeader:
         raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
 
 
+def read_format(folder: Path) -> int:
+    """The version of the format in which a run was begun."""
+    path = folder / HEADER
+    try:
+        return int(json.loads(_read(path))["format"])
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
+
+
+def header_document(header: RunHeader) -> str:
+    """The content of `run.json`."""
+    return canonical_json({"format": FORMAT, "header": header.model_dump(mode="json")}) + "\n"
+
+
 def read_plan_text(folder: Path) -> str:
     """The plan as JSON lines."""
     return _read(folder / PLAN)
+
+
+def read_optional(path: Path) -> str:
+    """A text file that earlier formats do not have; then empty."""
+    return _read(path) if path.exists() else ""
 
 
 def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import h5py
 
-from campaign.archive import hdf5
+from campaign.archive import guarded, hdf5
+from campaign.archive.damage import DamageList
 from campaign.archive.files import PART, publish, sha256_of, sync_folder, why
+from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.header import FORMAT, SEALED, RunHeader
 from campaign.archive.journal import JOURNAL, RunEnded, Story, TrialFinished, read_journal
-from campaign.archive.reader import read_sealed
-from campaign.archive.run_folder import PLAN, parse_plan, read_header, read_plan_text
-from campaign.archive.trial_file import entry_name, write_root
+from campaign.archive.provenance import read_provenance
+from campaign.archive.run_folder import (
+    PLAN,
+    parse_plan,
+    read_header,
+    read_optional,
+    read_plan_text,
+)
+from campaign.archive.sample_reading import check_recordings
+from campaign.archive.trial_file import earlier_entry_name, entry_name, write_root
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, canonical_json
 
@@ -51,10 +60,14 @@ def _write(folder: Path, part: Path) -> tuple[int, int]:
     story = read_journal(folder / JOURNAL)
     if story.ended is None:
         raise ArchiveError(f"{folder / JOURNAL}: the run has not ended")
-    with _create(part) as file:
-        _write_run(file, header, story, story.ended, read_plan_text(folder))
-        for finished in story.finished.values():
-            _copy_trial(folder, finished, file)
+    with hdf5.closing(hdf5.create_file(part)) as file:
+        _write_run(file, header, story, story.ended)
+        _write_plan(file["run"], folder)
+        for number, finished in story.finished.items():
+            _copy_trial(folder, finished, file, entry_name(number))
+        for number, attempts in story.earlier.items():
+            for finished in attempts:
+                _copy_trial(folder, finished, file, earlier_entry_name(number, finished.attempt))
         write_root(file, header.created, _shown(file, folder, story))
         return hdf5.blank_digest(file["run/outcome"], "file_sha256")
 
@@ -71,31 +84,15 @@ def _put_hash(part: Path, place: tuple[int, int]) -> None:
         file.write(digest.encode("ascii"))
 
 
-@contextlib.contextmanager
-def _create(part: Path) -> Iterator[h5py.File]:
-    """A new file; after an error its handle is let go of without a second error on top."""
-    file = hdf5.create_file(part)
-    try:
-        yield file
-    except BaseException:
-        with contextlib.suppress(OSError, RuntimeError, ValueError):
-            file.close()
-        raise
-    file.close()
-
-
-def _copy_trial(folder: Path, finished: TrialFinished, target: h5py.File) -> None:
+def _copy_trial(folder: Path, finished: TrialFinished, target: h5py.File, name: str) -> None:
     path = folder / finished.file
     if sha256_of(path) != finished.sha256:
         raise ArchiveError(f"{path}: is not what the journal says was written")
-    name = entry_name(finished.trial)
     with h5py.File(path, "r", locking=False) as source:
-        hdf5.copy_entry(source, name, target)
+        hdf5.copy_entry(source, entry_name(finished.trial), target, name)
 
 
-def _write_run(
-    file: h5py.File, header: RunHeader, story: Story, ended: RunEnded, plan: str
-) -> None:
+def _write_run(file: h5py.File, header: RunHeader, story: Story, ended: RunEnded) -> None:
     run = hdf5.make_group(file, "run", "NXentry")
     hdf5.put_text(run, "title", header.title or header.protocol_name or header.name)
     hdf5.put_text(run, "entry_identifier", header.name)
@@ -106,10 +103,15 @@ def _write_run(
     )
     for number, (name, text) in enumerate(sorted(header.sources.items()), start=1):
         _note(run, f"source_{number:03d}", "application/toml", name, text)
-    _note(run, "plan", "application/jsonl", PLAN, plan)
     _note(run, "journal", "application/jsonl", JOURNAL, story.text)
     _write_provenance(run, header)
     _write_outcome(run, story, ended)
+
+
+def _write_plan(run: h5py.Group, folder: Path) -> None:
+    _note(run, "plan", "application/jsonl", PLAN, read_plan_text(folder))
+    for name, file_name in (("plan_trials", PLAN_TRIALS), ("plan_trees", PLAN_TREES)):
+        _note(run, name, "application/jsonl", file_name, read_optional(folder / file_name))
 
 
 def _write_provenance(run: h5py.Group, header: RunHeader) -> None:
@@ -153,6 +155,20 @@ def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:
 
 def _verify(part: Path) -> None:
     """Read back every dataset of the new file against its checksum."""
-    problems = read_sealed(part).problems()
+    with guarded.open_file(part) as file:
+        damaged = DamageList(part)
+        read_provenance(guarded.group_at(file, "run", "NXentry"), damaged)
+        entries = [name for name in guarded.names(file) if name != "run"]
+        for name in entries:
+            _read_record(part, file, name)
+    problems = [str(damage) for damage in damaged.found]
+    problems += islice(check_recordings(part, entries), 3)
     if problems:
         raise ArchiveError("; ".join(problems[:3]))
+
+
+def _read_record(part: Path, file: h5py.File, name: str) -> None:
+    with guarded.guarded(part, name):
+        record = guarded.group_at(guarded.group_at(file, name, "NXentry"), "record", "NXcollection")
+        for text in guarded.names(record):
+            guarded.text_at(record, text)

@@ -8,16 +8,18 @@ shows what is left of a killed run.
 from __future__ import annotations
 
 import contextlib
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive import hdf5
+from campaign.archive import hdf5, nexus
 from campaign.archive.files import PART, publish, sha256_of, why
 from campaign.archive.header import SEALED
 from campaign.archive.preview import PREVIEW_POINTS, Preview
@@ -42,6 +44,16 @@ def entry_name(trial_number: int) -> str:
     return f"trial_{trial_number:05d}"
 
 
+def earlier_entry_name(trial_number: int, attempt: int) -> str:
+    """Name, in a sealed run, of an attempt that a later one replaced: `trial_00017_attempt_1`."""
+    return f"{entry_name(trial_number)}_attempt_{attempt}"
+
+
+def file_name(trial: Trial, attempt: int) -> str:
+    """Name of a trial's file: `trial-00017.nxs`, and `trial-00017-2.nxs` for a second attempt."""
+    return f"{trial.name}{f'-{attempt}' if attempt > 1 else ''}{SEALED}"
+
+
 @dataclass(frozen=True)
 class FinishedFile:
     """A trial file that is whole and on the disk."""
@@ -54,10 +66,10 @@ class FinishedFile:
 class TrialFile:
     """Takes a trial's samples as they come (a `Recorder`); closed, it is whole and on the disk."""
 
-    def __init__(self, folder: Path, trial: Trial) -> None:
+    def __init__(self, folder: Path, trial: Trial, attempt: int = 1) -> None:
         self._trial = trial
-        self._final = folder / f"{trial.name}{SEALED}"
-        self._part = folder / f"{trial.name}{SEALED}{PART}"
+        self._final = folder / file_name(trial, attempt)
+        self._part = self._final.with_name(self._final.name + PART)
         self._channels: tuple[ChannelInfo, ...] = ()
         self._shown = 0
         self._columns: hdf5.SampleColumns | None = None
@@ -104,6 +116,7 @@ class TrialFile:
         with self._writing():
             self._finish_samples()
             _write_record(self._entry, self._trial, ending, self._channels, self._events)
+            nexus.write_definition(self._entry, self._trial.bench, self._channels)
             hdf5.put_text(self._entry, "title", self._trial.label)
             hdf5.put_text(self._entry, "entry_identifier", self._trial.name)
             hdf5.put_text(self._entry, "start_time", started)
@@ -174,9 +187,26 @@ def _write_record(
     hdf5.put_text(record, "outcome", ending.outcome)
     hdf5.put_text(record, "reason", ending.reason)
     hdf5.put_text(record, "safe_state", ending.safe_state)
+    hdf5.put_text(record, "fault", ending.fault or "")
+    hdf5.put_text(record, "telemetry", canonical_json(_plain(ending.telemetry)))
     hdf5.put_text(record, "channels", canonical_json([vars(channel) for channel in channels]))
     told = [{"time": float(event.time), "text": event.text} for event in events]
     hdf5.put_text(record, "events", canonical_json(told))
+
+
+def _plain(value: Any) -> Any:
+    """`value` as JSON has it: what a backend measured of itself must not cost the trial."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    return str(value)
 
 
 def _write_preview(entry: h5py.Group, trial: Trial, channel: ChannelInfo, preview: Preview) -> None:

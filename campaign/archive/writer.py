@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive.files import sync_folder, write_atomically
+from campaign.archive.files import PART, sync_folder, write_atomically, write_lines_atomically
+from campaign.archive.full_plan import write_full_plan
 from campaign.archive.header import FORMAT, PARTIAL, SEALED, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import (
     JOURNAL,
+    Decision,
+    Entry,
     Journal,
+    OperatorStep,
     RunEnded,
+    RunResumed,
     RunStarted,
     TrialAbandoned,
     TrialFinished,
 )
-from campaign.archive.run_folder import HEADER, PLAN
+from campaign.archive.resuming import reopen
+from campaign.archive.run_folder import HEADER, PLAN, header_document
+from campaign.archive.run_lock import RunLock
 from campaign.errors import UsageError
-from campaign.trial import ChannelInfo, Ending, Event, SafeState, Trial, canonical_json
+from campaign.trial import ChannelInfo, Ending, Event, Outcome, SafeState, Trial, canonical_json
 
 if TYPE_CHECKING:
     from campaign.archive.trial_file import TrialFile
@@ -36,11 +46,20 @@ class TrialWriter:
     Use it from one thread; several may be open at once. End it with `finish` or `abandon`.
     """
 
-    def __init__(self, trial: Trial, file: TrialFile, journal: Journal) -> None:
+    def __init__(
+        self, trial: Trial, attempt: int, file: TrialFile, note: Callable[[Entry], None]
+    ) -> None:
+        """`note` puts a line into the run's journal."""
         self._trial = trial
+        self._attempt = attempt
         self._file = file
-        self._journal = journal
+        self._note = note
         self._open = True
+
+    @property
+    def attempt(self) -> int:
+        """How often the trial is executed with this one, from 1."""
+        return self._attempt
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
         self._file.start(channels)
@@ -68,10 +87,11 @@ class TrialWriter:
         """
         self._open = False
         file = self._file.close(ending, started, ended)
-        self._journal.append(
+        self._note(
             TrialFinished(
                 at=ended,
                 trial=self._trial.number,
+                attempt=self._attempt,
                 file=file.name,
                 sha256=file.sha256,
                 bytes=file.bytes,
@@ -87,17 +107,23 @@ class TrialWriter:
             return
         self._open = False
         self._file.discard()
-        self._journal.append(TrialAbandoned(at=at, trial=self._trial.number, reason=reason))
+        self._note(TrialAbandoned(at=at, trial=self._trial.number, reason=reason))
 
 
 class RunWriter:
-    """Writes one run: `create` it, `begin` each trial, `seal` it. Threads may share it."""
+    """Writes one run: `create` or `resume` it, `begin` each trial, `seal` it.
 
-    def __init__(self, folder: Path, journal: Journal) -> None:
+    Threads may share it. No other process can write the run meanwhile.
+    """
+
+    def __init__(self, folder: Path, journal: Journal, lock: RunLock) -> None:
         self._folder = folder
         self._journal = journal
+        self._run_lock = lock
         self._lock = threading.Lock()
         self._writers: list[TrialWriter] = []
+        self._last: dict[int, TrialFinished] = {}
+        self._told: tuple[Entry, ...] = ()
 
     @classmethod
     def create(cls, results: Path, header: RunHeader, trials: Sequence[Trial]) -> Self:
@@ -107,42 +133,112 @@ class RunWriter:
             UsageError: the folder cannot be made or written, or has a run of that name.
         """
         folder = results / f"{header.name}{PARTIAL}"
-        if (results / f"{header.name}{SEALED}").exists():
-            raise UsageError(f"{results}: there is a run {header.name!r} already")
-        header = header.model_copy(update={"trials": len(trials)})
+        taken = UsageError(f"{results}: there is a run {header.name!r} already")
         try:
             results.mkdir(parents=True, exist_ok=True)
-            folder.mkdir()
-            _write_header(folder, header, trials)
-            journal = Journal(folder / JOURNAL)
-            sync_folder(folder)
-            sync_folder(results)
-        except FileExistsError:
-            if folder.is_dir():
-                raise UsageError(f"{results}: there is a run {header.name!r} already") from None
+            if folder.exists() or folder.with_suffix(SEALED).exists():
+                raise taken
+            lock = RunLock.acquire(results, header.name)
+            try:
+                if folder.exists() or folder.with_suffix(SEALED).exists():
+                    raise taken
+                journal = _make_folder(folder, header, trials)
+            except BaseException:
+                lock.release()
+                raise
+        except (FileExistsError, NotADirectoryError):
             raise UsageError(f"{results}: is not a folder; choose another --results") from None
         except OSError as error:
             raise UsageError(
                 f"{results}: cannot keep results there: {error.strerror}; choose another --results"
             ) from None
-        journal.append(
-            RunStarted(at=header.created, run=header.name, format=FORMAT, trials=len(trials))
-        )
-        return cls(folder, journal)
+        return cls(folder, journal, lock)
+
+    @classmethod
+    def resume(
+        cls,
+        path: Path,
+        *,
+        at: str,
+        host: Mapping[str, str],
+        versions: Mapping[str, str],
+        command: Sequence[str],
+        changes: Sequence[str] = (),
+    ) -> Self:
+        """Go on with a run that was interrupted, killed or ended by a fault.
+
+        A sealed run is opened up again: its folder takes its place. What was finished, `finished`
+        tells; a trial that is begun again gets a further attempt, and the last one counts.
+
+        Args:
+            path: the folder, or the sealed file.
+            at, host, versions, command, changes: for the journal; see `journal.RunResumed`.
+
+        Raises:
+            UsageError: there is nothing to go on with, or another process writes the run.
+            ArchiveError: the run is damaged, named by file, or cannot be written. It is as it was.
+        """
+        folder, story, lock = reopen(path)
+        try:
+            journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
+            writer = cls(folder, journal, lock)
+            writer._last = dict(story.finished)
+            writer._told = story.entries
+            journal.append(
+                RunResumed(
+                    at=at,
+                    host=dict(host),
+                    versions=dict(versions),
+                    command=tuple(command),
+                    changes=tuple(changes),
+                )
+            )
+        except BaseException:
+            lock.release()
+            raise
+        return writer
 
     @property
     def folder(self) -> Path:
         """Where the run lies while it is in progress."""
         return self._folder
 
+    @property
+    def finished(self) -> Mapping[int, Outcome]:
+        """How the last attempt at each trial ended, by number; those of before a resume, too."""
+        with self._lock:
+            return {number: self._last[number].outcome for number in sorted(self._last)}
+
+    @property
+    def told(self) -> tuple[Entry, ...]:
+        """What the journal held when the run was resumed, in order; empty in a new run."""
+        return self._told
+
     def begin(self, trial: Trial) -> TrialWriter:
-        """A writer for `trial`. Raises ArchiveError when its file cannot be written."""
+        """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
+
+        A trial is executed by one thread at a time.
+        """
         from campaign.archive.trial_file import TrialFile
 
-        writer = TrialWriter(trial, TrialFile(self._folder, trial), self._journal)
+        with self._lock:
+            last = self._last.get(trial.number)
+        attempt = last.attempt + 1 if last else 1
+        file = TrialFile(self._folder, trial, attempt)
+        writer = TrialWriter(trial, attempt, file, self._note)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
         return writer
+
+    def decision(
+        self, decision: str, reason: str, trial: int | None = None, *, at: str = ""
+    ) -> None:
+        """Note what the run does besides its plan; `at` is now unless it is given."""
+        self._note(Decision(at=at or _now(), trial=trial, decision=decision, reason=reason))
+
+    def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
+        """Note what a person was asked to do before `trial`, and the answer."""
+        self._note(OperatorStep(at=at or _now(), trial=trial, step=step, answer=answer))
 
     def seal(
         self,
@@ -161,18 +257,57 @@ class RunWriter:
         """
         from campaign.archive.sealing import seal_folder
 
-        with self._lock:
-            for writer in self._writers:
-                writer.abandon(ended, "the run ended")
-        self._journal.append(
-            RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state)
-        )
+        try:
+            self._abandon_open(ended)
+            self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
+            self._journal.close()
+            return seal_folder(self._folder)
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Let go of the run as it is, unsealed: another process may go on with it."""
         self._journal.close()
-        return seal_folder(self._folder)
+        self._run_lock.release()
+
+    def _abandon_open(self, at: str) -> None:
+        with self._lock:
+            writers, self._writers = self._writers, []
+        for writer in writers:
+            writer.abandon(at, "the run ended")
+
+    def _note(self, entry: Entry) -> None:
+        self._journal.append(entry)
+        if isinstance(entry, TrialFinished):
+            with self._lock:
+                self._last[entry.trial] = entry
 
 
-def _write_header(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> None:
-    document = {"format": FORMAT, "header": header.model_dump(mode="json")}
-    lines = (canonical_json(PlannedTrial.of(t).model_dump(mode="json")) + "\n" for t in trials)
-    write_atomically(folder / PLAN, "".join(lines))
-    write_atomically(folder / HEADER, canonical_json(document) + "\n")
+def _make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Journal:
+    """Make a run's folder, under another name until everything is in it."""
+    part = folder.with_name(folder.name + PART)
+    if part.is_dir():
+        shutil.rmtree(part)
+    part.mkdir()
+    try:
+        write_full_plan(part, trials)
+        lines = (canonical_json(PlannedTrial.of(t).model_dump(mode="json")) + "\n" for t in trials)
+        write_lines_atomically(part / PLAN, lines)
+        header = header.model_copy(update={"trials": len(trials)})
+        write_atomically(part / HEADER, header_document(header))
+        journal = Journal(part / JOURNAL)
+        journal.append(
+            RunStarted(at=header.created, run=header.name, format=FORMAT, trials=len(trials))
+        )
+        sync_folder(part)
+        part.rename(folder)
+        sync_folder(folder.parent)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(part)
+        raise
+    return journal
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -87,9 +87,9 @@ def test_a_kill_while_sealing_leaves_the_folder_or_the_file(tmp_path, kit, attem
 
 
 def limit_file_size() -> None:
-    """From now on no file grows beyond 200 kB: writes fail as they do on a full disk."""
+    """From now on no file grows beyond 400 kB: writes fail as they do on a full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
 
 
 def test_a_file_that_cannot_grow_fails_the_seal_and_keeps_the_trials(tmp_path, kit):

@@ -1,0 +1,103 @@
+"""Every planned trial, whole: what a run would have executed can be rebuilt to the last digit.
+
+Benches and options come again and again in a plan, so they are kept once each (`plan-trees.jsonl`),
+under the SHA-256 of their canonical JSON, and the trials (`plan-trials.jsonl`) name them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from campaign.archive.files import write_lines_atomically
+from campaign.archive.run_folder import first_line
+from campaign.errors import ArchiveError
+from campaign.trial import Trial, canonical_json
+
+PLAN_TRIALS = "plan-trials.jsonl"
+PLAN_TREES = "plan-trees.jsonl"
+
+_SHARED = ("bench", "options")
+
+
+def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:
+    """Write both files into a run's folder, line by line."""
+    trees: dict[str, str] = {}
+
+    def lines() -> Iterator[str]:
+        for trial in trials:
+            described = trial.model_dump(mode="json")
+            for name in _SHARED:
+                text = canonical_json(described[name])
+                digest = hashlib.sha256(text.encode()).hexdigest()
+                trees[digest] = text
+                described[name] = digest
+            yield canonical_json(described) + "\n"
+
+    write_lines_atomically(folder / PLAN_TRIALS, lines())
+    write_lines_atomically(
+        folder / PLAN_TREES,
+        (f'{{"sha256":"{digest}","tree":{text}}}\n' for digest, text in trees.items()),
+    )
+
+
+@dataclass(frozen=True)
+class FullPlan:
+    """The planned trials of a run.
+
+    Attributes:
+        path: of the run, for messages.
+        trials_text, trees_text: the two files.
+    """
+
+    path: Path
+    trials_text: str = field(repr=False)
+    trees_text: str = field(repr=False)
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self.trials_text.splitlines()
+
+    @cached_property
+    def _trees(self) -> dict[str, Any]:
+        trees = {}
+        for number, line in enumerate(self.trees_text.splitlines(), start=1):
+            try:
+                entry = json.loads(line)
+                digest, tree = entry["sha256"], entry["tree"]
+                found = hashlib.sha256(canonical_json(tree).encode()).hexdigest()
+            except (ValueError, LookupError, TypeError, RecursionError) as error:
+                raise self._damaged(PLAN_TREES, number, first_line(error)) from None
+            if found != digest:
+                raise self._damaged(PLAN_TREES, number, "does not match its hash")
+            trees[digest] = tree
+        return trees
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def trial(self, number: int) -> Trial:
+        """The planned trial `number`, from 1. Raises ArchiveError when it cannot be rebuilt."""
+        if not 1 <= number <= len(self._lines):
+            raise ArchiveError(f"{self.path}: the plan has no trial {number}")
+        try:
+            described = json.loads(self._lines[number - 1])
+            described |= {name: self._trees[described[name]] for name in _SHARED}
+            trial = Trial.model_validate_json(canonical_json(described))
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
+            raise self._damaged(PLAN_TRIALS, number, first_line(error)) from None
+        if trial.number != number:
+            raise self._damaged(PLAN_TRIALS, number, f"holds trial number {trial.number}")
+        return trial
+
+    def trials(self) -> Iterable[Trial]:
+        """All of them, in order, one at a time."""
+        return (self.trial(number) for number in range(1, len(self) + 1))
+
+    def _damaged(self, name: str, line: int, what: str) -> ArchiveError:
+        return ArchiveError(f"{self.path}: {name}, line {line}: {what}")

@@ -1,0 +1,90 @@
+"""Opening a run that was interrupted, killed or ended by a fault, to go on with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from campaign.archive.files import PART, sha256_of, why
+from campaign.archive.header import PARTIAL, SEALED, RunStatus
+from campaign.archive.journal import JOURNAL, Story, read_journal
+from campaign.archive.run_folder import read_format
+from campaign.archive.run_lock import RunLock
+from campaign.errors import ArchiveError, UsageError
+
+RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
+"""How a run has to stand for somebody to go on with it."""
+
+_FIRST_FORMAT = 2  # before, an archive did not hold the trials that had not been executed
+
+
+def reopen(path: Path) -> tuple[Path, Story, RunLock]:
+    """The folder of the run at `path`, what its journal tells, and the right to write it.
+
+    Raises:
+        UsageError: there is nothing to go on with, or another process writes the run.
+        ArchiveError: the run is damaged, or its folder cannot be written; nothing was changed.
+    """
+    folder, sealed = path.with_suffix(PARTIAL), path.with_suffix(SEALED)
+    if path.suffix not in (PARTIAL, SEALED) or not path.exists():
+        raise UsageError(f"{path}: is no run")
+    with _locked(folder) as lock:
+        if sealed.is_file():
+            _check_sealed(sealed)
+            from campaign.archive.unsealing import unseal
+
+            unseal(sealed)
+        return folder, _read_folder(folder), lock
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[RunLock]:
+    """The run's lock; given up again when the block fails."""
+    try:
+        lock = RunLock.acquire(folder.parent, folder.stem)
+    except OSError as error:
+        raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
+    try:
+        yield lock
+    except BaseException:
+        lock.release()
+        raise
+
+
+def _check_sealed(sealed: Path) -> None:
+    from campaign.archive import guarded
+
+    with guarded.open_file(sealed) as file, guarded.guarded(sealed, "/run"):
+        run = guarded.group_at(file, "run", "NXentry")
+        provenance = guarded.group_at(run, "provenance", "NXcollection")
+        _check_format(sealed, guarded.integer_at(provenance, "format"))
+        outcome = guarded.group_at(run, "outcome", "NXcollection")
+        status = RunStatus(guarded.text_at(outcome, "status"))
+    if status not in RESUMABLE:
+        raise UsageError(f"{sealed}: the run has ended ({status}); there is nothing to go on with")
+
+
+def _check_format(path: Path, version: int) -> None:
+    if version < _FIRST_FORMAT:
+        raise UsageError(
+            f"{path}: was begun by an earlier program, which did not keep the whole plan "
+            f"(format {version}); start a new run"
+        )
+
+
+def _read_folder(folder: Path) -> Story:
+    """What is in the folder, checked. Raises ArchiveError naming the trial file that is wrong."""
+    _check_format(folder, read_format(folder))
+    story = read_journal(folder / JOURNAL)
+    try:
+        for finished in story.files:
+            if sha256_of(folder / finished.file) != finished.sha256:
+                raise ArchiveError(
+                    f"{folder / finished.file}: is not what the journal says was written"
+                )
+        for part in folder.glob(f"*{PART}"):
+            part.unlink()
+    except OSError as error:
+        raise ArchiveError(f"{error.filename or folder}: cannot be used: {why(error)}") from None
+    return story
