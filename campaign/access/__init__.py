@@ -1,0 +1,32 @@
+"""Archives in Python: `campaign.open(...)` gives a run, its tests and its trials, lazily.
+
+What is asked for comes as pandas and xarray objects; samples are read when they are asked for, and
+not before. `docs/reading-archives.md` shows it.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from campaign.access.run import RunView
+from campaign.access.test import TestView
+from campaign.access.trial import TrialView
+from campaign.archive import find_run, open_run
+
+__all__ = ["RunView", "TestView", "TrialView", "open_view"]
+
+
+def open_view(
+    run: str | PathLike[str] | None = None, results: str | PathLike[str] = "results"
+) -> RunView:
+    """Open an archived run.
+
+    Args:
+        run: a path, a run's name, or a unique beginning of it; absent: the newest.
+        results: the folder in which names are looked up.
+
+    Raises UsageError when there is no such run, ArchiveError when it cannot be read.
+    """
+    name = None if run is None else str(run)
+    return RunView(open_run(find_run(Path(results), name)))

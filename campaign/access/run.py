@@ -1,0 +1,122 @@
+"""An archived run: its tests and trials as tables, and each of them by name or number."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from campaign.access.tables import trials_table
+from campaign.access.test import TestView
+from campaign.access.trial import TrialView
+from campaign.archive import RunHeader, RunReader, RunStatus
+from campaign.errors import UsageError
+from campaign.trial import Outcome
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, repr=False)
+class RunView:
+    """A run; iterating over it gives its executed trials, failed ones included, in plan order."""
+
+    archive: RunReader
+
+    @property
+    def name(self) -> str:
+        return self.archive.name
+
+    @property
+    def path(self) -> Path:
+        """The sealed file, or the folder of a run in progress."""
+        return self.archive.path
+
+    @property
+    def status(self) -> RunStatus:
+        """How the run stands."""
+        return self.archive.status
+
+    @property
+    def header(self) -> RunHeader:
+        """What was known before the first trial: protocol, versions, host, operator, tags ..."""
+        return self.archive.header
+
+    @property
+    def tests(self) -> pd.DataFrame:
+        """One row per test of the protocol, its name as index."""
+        import pandas as pd
+
+        views = self._tests()
+        planned = Counter(trial.test for trial in self.archive.plan)
+        done = Counter(
+            t.trial.test for t in self.archive.trials if t.ending.outcome is Outcome.COMPLETED
+        )
+        rows = [
+            (view.kind, view.title, planned[view.name], len(view), done[view.name])
+            for view in views
+        ]
+        return pd.DataFrame(
+            rows,
+            columns=["kind", "title", "planned", "executed", "completed"],
+            index=pd.Index([view.name for view in views], name="test", dtype="object"),
+        )
+
+    @property
+    def trials(self) -> pd.DataFrame:
+        """One row per executed trial, its number as index."""
+        return trials_table(self.archive.trials)
+
+    def test(self, name: str) -> TestView:
+        """The test of that name. Raises UsageError naming those there are."""
+        views = {view.name: view for view in self._tests()}
+        if name in views:
+            return views[name]
+        close = difflib.get_close_matches(name, views, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(views) or 'none'}"
+        raise UsageError(f"{self.name}: there is no test {name!r}; {hint}")
+
+    def trial(self, number: int) -> TrialView:
+        """The trial of that number. Raises UsageError when it was not executed."""
+        for archived in self.archive.trials:
+            if archived.trial.number == number:
+                return TrialView(archived)
+        planned = any(trial.number == number for trial in self.archive.plan)
+        why = (
+            "was not executed" if planned else f"is not among the {len(self.archive.plan)} planned"
+        )
+        raise UsageError(f"{self.name}: trial {number} {why}")
+
+    def __iter__(self) -> Iterator[TrialView]:
+        return (TrialView(archived) for archived in self.archive.trials)
+
+    def __len__(self) -> int:
+        return len(self.archive.trials)
+
+    def __repr__(self) -> str:
+        tests = self._tests()
+        count = f"{len(self)} of {len(self.archive.plan)} trials"
+        lines = [f"<run {self.name}: {self.status.value}, {count}, {len(tests)} tests>"]
+        return "\n".join([*lines, *(f"  {view.name} ({view.kind}): {len(view)}" for view in tests)])
+
+    def _tests(self) -> list[TestView]:
+        """The protocol's tests, and any other that a trial belongs to."""
+        told = {str(test.get("name", "")): test for test in self.archive.tests}
+        kinds = {t.trial.test: t.trial.kind for t in self.archive.trials}
+        views = []
+        for name in dict.fromkeys((*told, *kinds)):
+            test = told.get(name, {})
+            options = test.get("options")
+            views.append(
+                TestView(
+                    name=name,
+                    kind=str(test.get("kind") or kinds.get(name, "")),
+                    title=str(test.get("title") or name),
+                    options=options if isinstance(options, dict) else {},
+                    archived=self.archive.trials_of(name),
+                )
+            )
+        return views

@@ -1,0 +1,80 @@
+"""Many trials as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from campaign.archive import ArchivedTrial
+from campaign.result import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = (
+    "test",
+    "kind",
+    "role",
+    "repeat",
+    "outcome",
+    "reason",
+    "started",
+    "ended",
+    "duration",
+    "seed",
+)
+"""What the table of trials says of every trial, before the swept values."""
+
+
+def trials_table(trials: Iterable[ArchivedTrial]) -> pd.DataFrame:
+    """One row per executed trial, its number as index; swept values (SI) by their dotted path.
+
+    `duration` is the planned one (s). A swept value that would take the place of another column is
+    called `point.` and its path.
+    """
+    import pandas as pd
+
+    rows = [(archived.trial.number, _row(archived)) for archived in trials]
+    paths = dict.fromkeys(path for _, row in rows for path in row if path not in COLUMNS)
+    table = pd.DataFrame(
+        [row for _, row in rows],
+        index=pd.Index([number for number, _ in rows], name="number", dtype="int64"),
+        columns=[*COLUMNS, *paths],
+    )
+    for column in ("started", "ended"):
+        table[column] = pd.to_datetime(table[column], utc=True, format="ISO8601", errors="coerce")
+    return table
+
+
+def _row(archived: ArchivedTrial) -> dict[str, object]:
+    trial, ending = archived.trial, archived.ending
+    said = (
+        trial.test,
+        trial.kind,
+        trial.role.value,
+        trial.repeat,
+        ending.outcome.value,
+        ending.reason,
+        archived.started,
+        archived.ended,
+        trial.task.duration,
+        trial.seed,
+    )
+    row: dict[str, object] = dict(zip(COLUMNS, said, strict=True))
+    for path, value in trial.point.items():
+        row[f"point.{path}" if path in COLUMNS else path] = value
+    return row
+
+
+def result_table(table: Table) -> pd.DataFrame:
+    """A table of an analysis, unrounded, SI; `attrs` has its title, units and labels."""
+    import pandas as pd
+
+    names = [column.name for column in table.columns]
+    frame = pd.DataFrame([dict(row) for row in table.rows], columns=names)
+    frame.attrs = {
+        "title": table.title,
+        "units": {column.name: column.unit for column in table.columns},
+        "labels": {column.name: column.label for column in table.columns},
+    }
+    return frame
