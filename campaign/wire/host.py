@@ -43,7 +43,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Start:
-    """Set the axis in motion. `trial` is chosen by the host and marks every record."""
+    """Set the axis in motion. `trial` (from 1) is chosen by the host and marks every record."""
 
     trial: int
 

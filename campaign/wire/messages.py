@@ -287,6 +287,8 @@ def _check(message: Message) -> None:
         beyond = message.first + len(message.channels) > message.total
         if beyond or not message.channels or message.sample_rate <= 0:
             raise WireError("channels beyond their total, none at all, or no sample rate")
+    elif isinstance(message, Start) and not message.trial:
+        raise WireError("trials are counted from 1: 0 means none")
     elif isinstance(message, Resend | Lost) and not 1 <= message.count <= 2**32 - message.first:
         raise WireError(f"{message.count} records from {message.first}")
 

@@ -84,22 +84,34 @@ class Turn(Enum):
 class Numbering:
     """Sequence numbers of commands: each is the last one plus 1, modulo 65536.
 
-    HELLO begins anew with its own number. SAFE is outside: always new, and remembered by nobody.
-    A command that is refused has used its number; one out of order has not.
+    An accepted HELLO begins anew with its own number; SAFE is outside: always new, and remembered
+    by nobody. A command that is refused has used its number; one out of order has not.
     """
 
     def __init__(self) -> None:
-        self._last: tuple[int, int] | None = None
+        self._hello: tuple[int, int] | None = None
+        self._last = (0, 0)
+
+    def same_session(self, session: int) -> bool:
+        """Whether HELLO renews the session there is."""
+        return self._hello is not None and self._hello[0] == session
+
+    def begin(self, session: int, sequence: int) -> None:
+        """An accepted HELLO; one that was heard before (late or twice) changes nothing."""
+        if self._hello != (session, sequence):
+            self._hello = (session, sequence)
+            self._last = (sequence, 0)
 
     def turn(self, kind: int, sequence: int, body: bytes) -> Turn:
-        """Judge a command, and remember it when it is new."""
-        if kind == Kind.SAFE:
+        """Judge a command, and remember it when it is new and neither HELLO nor SAFE."""
+        if kind in (Kind.HELLO, Kind.SAFE):
             return Turn.NEW
-        this = (sequence, zlib.crc32(bytes((kind,)) + body))
+        if self._hello is None:
+            return Turn.OUT_OF_ORDER
+        this = (sequence, zlib.crc32(body, kind))
         if this == self._last:
             return Turn.REPEATED
-        due = None if self._last is None else (self._last[0] + 1) % 2**16
-        if kind != Kind.HELLO and sequence != due:
+        if sequence != (self._last[0] + 1) % 2**16:
             return Turn.OUT_OF_ORDER
         self._last = this
         return Turn.NEW
