@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from campaign.archive.damage import DamageList
 from campaign.archive.header import PARTIAL, SEALED, RunStatus
 from campaign.archive.journal import JOURNAL, read_journal
 from campaign.archive.run_folder import read_header
@@ -123,11 +124,11 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
 
 def _summarise_file(path: Path, size: int) -> RunSummary:
     from campaign.archive import guarded
-    from campaign.archive.reader import read_provenance
+    from campaign.archive.provenance import read_provenance
 
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         run = guarded.group_at(file, "run", "NXentry")
-        header = read_provenance(path, run)
+        header = read_provenance(run, DamageList(path))
         outcome = guarded.group_at(run, "outcome", "NXcollection")
         return RunSummary(
             name=path.stem,

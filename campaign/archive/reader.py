@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.files import PART, sha256_of
+from campaign.archive.damage import Damage, DamageList
+from campaign.archive.files import PART, sha256_of, why
 from campaign.archive.header import PARTIAL, PlannedTrial, RunHeader, RunStatus
-from campaign.archive.journal import JOURNAL, read_journal
-from campaign.archive.run_folder import (
-    check_format,
-    first_line,
-    parse_plan,
-    read_header,
-    read_plan_text,
-)
+from campaign.archive.journal import JOURNAL, RunStarted
+from campaign.archive.run_folder import PLAN, parse_plan, read_header, read_plan_text
+from campaign.archive.story import Lines, read_lines
 from campaign.errors import ArchiveError
 from campaign.trial import SafeState, Tree
 
@@ -40,6 +34,9 @@ class RunReader:
         plan: every planned trial, executed or not.
         trials: the executed ones, in plan order, failed ones included.
         journal: verbatim.
+        damaged: what cannot be read. It is missing from the rest: a trial from `trials`, a line
+            from `plan`, a field of the header is as if it had not been given. Samples are looked
+            at only by `problems`.
     """
 
     path: Path
@@ -51,6 +48,7 @@ class RunReader:
     plan: tuple[PlannedTrial, ...]
     trials: tuple[ArchivedTrial, ...]
     journal: str = field(repr=False)
+    damaged: tuple[Damage, ...] = ()
 
     @property
     def name(self) -> str:
@@ -85,13 +83,14 @@ class RunReader:
         return digest == sha256_of(self.path, place)
 
     def problems(self) -> list[str]:
-        """What in the samples is damaged (reads them all, in flat memory); empty when sound."""
+        """What is damaged, samples included (reads them all, in flat memory)."""
         from campaign.archive.sample_reading import check_recordings
 
+        known = [f"{self.path}: {damage}" for damage in self.damaged]
         entries: dict[Path, list[str]] = {}
         for trial in self.trials:
             entries.setdefault(trial.path, []).append(trial.entry)
-        return [
+        return known + [
             problem for path, names in entries.items() for problem in check_recordings(path, names)
         ]
 
@@ -99,7 +98,8 @@ class RunReader:
 def open_run(path: Path) -> RunReader:
     """Open a sealed run, or the folder of a run in progress.
 
-    Raises ArchiveError, naming file and place, when it is none or is damaged.
+    What is damaged is left out and listed in `damaged`. Raises ArchiveError, naming file and place,
+    when it is no run, or when what it was or how it ended cannot be read.
     """
     if path.is_dir():
         return _open_folder(path)
@@ -111,63 +111,60 @@ def open_run(path: Path) -> RunReader:
 def read_sealed(path: Path) -> RunReader:
     """Read a sealed file, whatever its name; its hash is not looked at (`RunReader.unchanged`)."""
     from campaign.archive import guarded
+    from campaign.archive.provenance import read_provenance
     from campaign.archive.trial_reading import read_trials
 
+    damaged = DamageList(path)
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         run = guarded.group_at(file, "run", "NXentry")
-        header = read_provenance(path, run)
+        header = read_provenance(run, damaged)
         outcome = guarded.group_at(run, "outcome", "NXcollection")
+        story = read_lines(damaged.read(lambda: _note(path, run, "journal"), "").encode())
+        trials = tuple(read_trials(path, file, damaged))
+        _note_lines(story, "/run/journal", damaged)
+        if story.torn or not story.all(RunStarted):
+            damaged.add("/run/journal", "is not a whole journal")
+        _note_missing(story, trials, damaged)
         return RunReader(
             path=path,
             header=header,
             status=RunStatus(guarded.text_at(outcome, "status")),
             reason=guarded.text_at(outcome, "reason"),
             safe_state=SafeState(guarded.text_at(outcome, "safe_state")),
-            ended=guarded.text_at(run, "end_time"),
-            plan=parse_plan(path, _note(run, "plan")),
-            trials=tuple(read_trials(path, file)),
-            journal=_note(run, "journal"),
+            ended=damaged.read(lambda: _end(path, run), ""),
+            plan=damaged.read(lambda: parse_plan(path, _note(path, run, "plan")), ()),
+            trials=trials,
+            journal=story.text,
+            damaged=tuple(damaged.found),
         )
 
 
-def read_provenance(path: Path, run: h5py.Group) -> RunHeader:
-    """The header of a sealed run."""
+def _end(path: Path, run: h5py.Group) -> str:
     from campaign.archive import guarded
 
-    provenance = guarded.group_at(run, "provenance", "NXcollection")
-    check_format(path, guarded.integer_at(provenance, "format"))
-    tree: dict[str, object] = {"sources": dict(_sources(run))}
-    for name, info in RunHeader.model_fields.items():
-        if name == "sources" or (name not in provenance and not info.is_required()):
-            continue
-        text = guarded.text_at(provenance, name)
-        tree[name] = text if info.annotation is str else _json(path, name, text)
-    try:
-        return RunHeader.model_validate(tree)
-    except ValueError as error:
-        raise ArchiveError(f"{path}: /run/provenance: {first_line(error)}") from None
+    with guarded.guarded(path, "/run/end_time"):
+        return guarded.text_at(run, "end_time")
 
 
-def _sources(run: h5py.Group) -> Iterator[tuple[str, str]]:
+def _note(path: Path, run: h5py.Group, name: str) -> str:
+    """What a note says."""
     from campaign.archive import guarded
 
-    for name in guarded.names(run):
-        if name.startswith("source_"):
-            note = guarded.group_at(run, name, "NXnote")
-            yield guarded.text_at(note, "file_name"), guarded.text_at(note, "data")
+    with guarded.guarded(path, f"/run/{name}"):
+        return guarded.text_at(guarded.group_at(run, name, "NXnote"), "data")
 
 
-def _note(run: h5py.Group, name: str) -> str:
-    from campaign.archive import guarded
+def _note_lines(story: Lines, place: str, damaged: DamageList) -> None:
+    for number in story.damaged:
+        damaged.add(f"{place}:{number}", "is not a line of a journal")
 
-    return guarded.text_at(guarded.group_at(run, name, "NXnote"), "data")
 
-
-def _json(path: Path, name: str, text: str) -> object:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ArchiveError(f"{path}: /run/provenance/{name}: {first_line(error)}") from None
+def _note_missing(story: Lines, trials: tuple[ArchivedTrial, ...], damaged: DamageList) -> None:
+    """A trial that finished has a group; one that was found damaged is not told of twice."""
+    there = {trial.trial.name for trial in trials} | {d.trial for d in damaged.found}
+    for number in story.finished:
+        if f"trial-{number:05d}" not in there:
+            damaged.add(f"/trial_{number:05d}", "is missing, and the journal says that it finished")
 
 
 def _open_folder(folder: Path) -> RunReader:
@@ -176,7 +173,12 @@ def _open_folder(folder: Path) -> RunReader:
     if folder.suffix != PARTIAL:
         raise ArchiveError(f"{folder}: is a folder, but not that of a run in progress")
     header = read_header(folder)
-    story = read_journal(folder / JOURNAL)
+    damaged = DamageList(folder)
+    story = _folder_story(folder, damaged)
+    trials = []
+    for number, finished in story.finished.items():
+        with damaged.noting():
+            trials.append(read_trial_file(folder / finished.file, number))
     ended = story.ended
     return RunReader(
         path=folder,
@@ -185,7 +187,23 @@ def _open_folder(folder: Path) -> RunReader:
         reason=ended.reason if ended else "the run is in progress or was killed",
         safe_state=ended.safe_state if ended else SafeState.NOT_CONFIRMED,
         ended=ended.at if ended else "",
-        plan=parse_plan(folder, read_plan_text(folder)),
-        trials=tuple(read_trial_file(folder / f.file, n) for n, f in story.finished.items()),
+        plan=damaged.read(lambda: parse_plan(folder / PLAN, read_plan_text(folder)), ()),
+        trials=tuple(trials),
         journal=story.text,
+        damaged=tuple(damaged.found),
     )
+
+
+def _folder_story(folder: Path, damaged: DamageList) -> Lines:
+    story = read_lines(damaged.read(lambda: _bytes(folder / JOURNAL), b""))
+    _note_lines(story, JOURNAL, damaged)
+    if not story.all(RunStarted) and not damaged.found:
+        damaged.add(JOURNAL, "does not tell of the start of the run")
+    return story
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None

@@ -25,7 +25,7 @@ _CHANNELS = TypeAdapter(list[ChannelInfo])
 
 def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
     """A trial's samples and events, checked; a trial that recorded nothing has no channels."""
-    with guarded.open_file(path) as file, guarded.guarded(path, entry_name):
+    with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry_name}"):
         entry = guarded.group_at(file, entry_name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
         told = _EVENTS.validate_json(guarded.text_at(record, "events"))

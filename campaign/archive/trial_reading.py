@@ -12,6 +12,7 @@ import h5py
 
 from campaign.archive import guarded
 from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.damage import DamageList
 from campaign.archive.run_folder import first_line
 from campaign.archive.trial_file import entry_name
 from campaign.errors import ArchiveError
@@ -20,11 +21,12 @@ from campaign.trial import Ending, Outcome, SafeState, Trial, canonical_json
 _ENTRY = re.compile(r"trial_([0-9]{5,10})")
 
 
-def read_trials(path: Path, file: h5py.File) -> Iterator[ArchivedTrial]:
-    """The trials of a sealed run, in plan order."""
-    numbers = [int(m[1]) for name in guarded.names(file) if (m := _ENTRY.fullmatch(name))]
+def read_trials(path: Path, file: h5py.File, damaged: DamageList) -> Iterator[ArchivedTrial]:
+    """The trials of a sealed run that can be read, in plan order; the others are noted."""
+    numbers = {int(m[1]) for name in guarded.names(file) if (m := _ENTRY.fullmatch(name))}
     for number in sorted(numbers):
-        yield read_trial(path, file, number)
+        with damaged.noting():
+            yield read_trial(path, file, number)
 
 
 def read_trial_file(path: Path, number: int) -> ArchivedTrial:
@@ -36,7 +38,7 @@ def read_trial_file(path: Path, number: int) -> ArchivedTrial:
 def read_trial(path: Path, file: h5py.File, number: int) -> ArchivedTrial:
     """One trial without its samples. Raises ArchiveError naming what is wrong with it."""
     name = entry_name(number)
-    with guarded.guarded(path, name):
+    with guarded.guarded(path, f"/{name}"):
         entry = guarded.group_at(file, name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
         text = guarded.text_at(record, "trial")

@@ -3,18 +3,19 @@
 import hashlib
 import json
 import random
+import re
 
 import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import list_runs, open_run
+from campaign.archive import RunWriter, list_runs, open_run
 from campaign.errors import ArchiveError, ExitCode
 
 
 def read_all(path):
-    """Everything a report would read."""
-    return [archived.recording() for archived in open_run(path).trials]
+    """Everything a report would read, by trial."""
+    return {archived.trial.number: archived.recording() for archived in open_run(path).trials}
 
 
 def refused(path, match):
@@ -23,6 +24,17 @@ def refused(path, match):
     assert str(path) in str(caught.value)
     assert caught.value.exit_code is ExitCode.ARCHIVE
     assert "\n" not in str(caught.value)
+
+
+def listed(path, match):
+    """What is damaged is told of in a line, and everything else can be read; returns the run."""
+    run = open_run(path)
+    told = [str(damage) for damage in run.damaged]
+    assert any(re.search(match, line) for line in told), told
+    assert all("\n" not in line and str(path) not in line for line in told)
+    for archived in run.trials:
+        archived.recording()
+    return run
 
 
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"\x89HDF\r\n\x1a\n" + b"\xff" * 500])
@@ -108,7 +120,8 @@ def test_no_object_is_ever_read(sealed):
         file["trial_00001/record"].create_dataset(
             "reason", data=b"cos\nsystem\n", dtype=h5py.string_dtype()
         )
-    refused(sealed, "/trial_00001/record/reason: is not a text of fixed length")
+    run = listed(sealed, "^/trial_00001/record/reason: is not a text of fixed length")
+    assert [trial.trial.number for trial in run.trials] == [2]
 
 
 def test_links_are_not_followed(sealed, tmp_path):
@@ -118,11 +131,11 @@ def test_links_are_not_followed(sealed, tmp_path):
     with h5py.File(sealed, "r+") as file:
         del file["trial_00001"]
         file["trial_00001"] = h5py.ExternalLink(str(other), "/trial_00001")
-    refused(sealed, "/trial_00001: is a link")
+    assert len(listed(sealed, "^/trial_00001: is a link").trials) == 1
     with h5py.File(sealed, "r+") as file:
         del file["trial_00001"]
         file["trial_00001"] = h5py.SoftLink("/trial_00002")
-    refused(sealed, "/trial_00001: is a link")
+    assert len(listed(sealed, "^/trial_00001: is a link").trials) == 1
 
 
 @pytest.mark.parametrize("name", ["/trial_00001/data/command", "aside/command", ".", "", "x"])
@@ -148,34 +161,73 @@ def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
     refused(sealed, "lies in another file")
 
 
+NONSENSE = ["", "nonsense", "[" * 20_000, '{"a":1}', "NaN"]
+
+
 @pytest.mark.parametrize(
     "place",
     [
         "run/provenance/created",
-        "run/provenance/tests",
         "run/outcome/status",
-        "run/plan/data",
-        "trial_00001/record/trial",
-        "trial_00001/record/outcome",
         "trial_00001/record/events",
         "trial_00001/record/channels",
     ],
 )
-@pytest.mark.parametrize("text", ["", "nonsense", "[" * 20_000, '{"a":1}', "NaN"])
+@pytest.mark.parametrize("text", NONSENSE)
 def test_text_that_is_not_what_belongs_there_is_refused(sealed, place, text):
     with h5py.File(sealed, "r+") as file:
         put_text(file, place, text)
-    if (place, text) == ("run/plan/data", ""):
-        assert open_run(sealed).plan == ()
-    else:
-        refused(sealed, "record|provenance|plan|/run|trial_00001")
+    refused(sealed, "record|provenance|/run|trial_00001")
 
 
-@pytest.mark.parametrize("name", ["run", "run/provenance", "run/outcome", "trial_00001/record"])
+@pytest.mark.parametrize("place", ["provenance/tests", "plan/data", "journal/data"])
+@pytest.mark.parametrize("text", NONSENSE)
+def test_a_text_of_the_run_that_is_damaged_costs_only_itself(sealed, place, text):
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, f"run/{place}", text)
+    run = open_run(sealed)
+    if text or place != "plan/data":
+        run = listed(sealed, f"^/run/{place.removesuffix('/data')}|plan, line 1")
+    assert (run.tests == ()) is (place == "provenance/tests")
+    assert (run.plan == ()) is (place == "plan/data")
+    assert len(run.trials) == 2
+
+
+@pytest.mark.parametrize("place", ["trial", "outcome", "safe_state"])
+@pytest.mark.parametrize("text", NONSENSE)
+def test_a_trial_whose_record_is_damaged_costs_only_itself(sealed, place, text):
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, f"trial_00001/record/{place}", text)
+    run = listed(sealed, "^/trial_00001")
+    assert [trial.trial.number for trial in run.trials] == [2]
+    assert {damage.trial for damage in run.damaged} == {"trial-00001"}
+
+
+def test_a_text_without_its_checksum_is_not_believed(sealed):
+    with h5py.File(sealed, "r+") as file:
+        for place in ("run/provenance/notes", "run/source_001/data"):
+            del file[place].attrs["sha256"]
+        put_text(file, "run/provenance/operator", "Eve")
+        file["run/provenance/operator"].attrs["sha256"] = "0" * 64
+    run = listed(sealed, "^/run/provenance/operator: does not match its checksum")
+    assert len(run.damaged) == 3
+    assert run.header.operator == ""
+    assert len(run.header.sources) == 1
+
+
+@pytest.mark.parametrize("name", ["run", "run/provenance", "run/outcome"])
 def test_a_missing_group_is_named(sealed, name):
     with h5py.File(sealed, "r+") as file:
         del file[name]
     refused(sealed, f"/{name}: is missing")
+
+
+@pytest.mark.parametrize("name", ["trial_00001", "trial_00001/record", "run/journal", "run/plan"])
+def test_a_missing_group_that_the_rest_can_do_without_is_listed(sealed, name):
+    with h5py.File(sealed, "r+") as file:
+        del file[name]
+    run = listed(sealed, f"^/{name}: is missing")
+    assert len(run.trials) == (1 if name.startswith("trial") else 2)
 
 
 def test_an_archive_from_before_a_trial_had_a_field_still_opens(sealed):
@@ -189,12 +241,12 @@ def test_an_archive_from_before_a_trial_had_a_field_still_opens(sealed):
     assert open_run(sealed).trials[0].trial.task.start_angle == 0.0
 
 
-def test_a_trial_that_is_not_what_ran_is_refused(sealed):
+def test_a_trial_that_is_not_what_ran_is_left_out(sealed):
     with h5py.File(sealed, "r+") as file:
         tree = json.loads(file["trial_00001/record/trial"][()])
         tree["bench"]["axis"]["inertia"] = 36.0
         put_text(file, "trial_00001/record/trial", json.dumps(tree))
-    refused(sealed, "/trial_00001/record: does not match its fingerprint")
+    listed(sealed, "^/trial_00001/record: does not match its fingerprint")
 
 
 def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
@@ -226,8 +278,8 @@ def test_mutated_files_are_read_right_or_refused(sealed):
         except ArchiveError:
             refusals += 1
             continue
-        for mine, theirs in zip(found, original, strict=False):
-            assert mine["gyro_rate"].tobytes() == theirs["gyro_rate"].tobytes()
+        for number, recording in found.items():
+            assert recording["gyro_rate"].tobytes() == original[number]["gyro_rate"].tobytes()
     assert refusals > 10
 
 
@@ -240,12 +292,23 @@ def test_a_bad_file_is_listed_and_stalls_nothing(sealed):
 
 
 def test_a_journal_cannot_name_a_file_outside_its_folder(tmp_path, kit):
-    from campaign.archive import RunWriter
-
     writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
     kit.record(writer, kit.trial(1), 5)
     journal = writer.folder / "journal.jsonl"
     lines = journal.read_text().splitlines()
     entry = json.loads(lines[1]) | {"file": "../../trial-00001.nxs"}
     journal.write_text("\n".join([lines[0], json.dumps(entry), lines[1]]) + "\n")
-    refused(writer.folder, "journal.jsonl:2: is not a line of a journal")
+    run = listed(writer.folder, "^journal.jsonl:2: is not a line of a journal")
+    assert [trial.path.parent for trial in run.trials] == [writer.folder]
+
+
+def test_a_trial_file_that_is_gone_or_damaged_costs_only_itself(tmp_path, kit):
+    trials = [kit.trial(number) for number in (1, 2, 3)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        kit.record(writer, trial, 5)
+    (writer.folder / "trial-00001.nxs").unlink()
+    (writer.folder / "trial-00002.nxs").write_bytes(b"\x89HDF\r\n\x1a\n" * 9)
+    run = listed(writer.folder, "^trial-00001.nxs: there is no such file")
+    assert [damage.trial for damage in run.damaged] == ["trial-00001", "trial-00002"]
+    assert [trial.trial.number for trial in run.trials] == [3]

@@ -1,0 +1,93 @@
+"""What of a run cannot be read: noted one by one, so that the rest of it still can be."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self, TypeVar
+
+from campaign.errors import ArchiveError
+
+_Read = TypeVar("_Read")
+
+_ENTRY = re.compile(r"trial_(\d{5,10})(?:_attempt_(\d{1,6}))?(?:/(?:data|preview)/(\w+))?")
+_FILE = re.compile(r"trial-(\d{5,10})(?:-(\d{1,6}))?\.nxs")
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Something of a run that cannot be read, or is not what it ought to be.
+
+    Attributes:
+        place: in the archive, e.g. `/trial_00002/data/gyro_rate`, `journal.jsonl:3` or
+            `trial-00002.nxs`; empty for the file as a whole.
+        reason: what is wrong there, in a line.
+        trial: the trial's name, e.g. `trial-00002`; an earlier attempt at it is
+            `trial-00002 (attempt 1)`. Empty when it is not one trial's.
+        channel: the channel's name, when it is its samples.
+    """
+
+    place: str
+    reason: str
+    trial: str = ""
+    channel: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.reason}" if self.place else self.reason
+
+    @classmethod
+    def at(cls, place: str, reason: str) -> Self:
+        """Damage at a place in the archive, which says what trial and channel it belongs to."""
+        match = _ENTRY.search(place) or _FILE.search(place)
+        if match is None:
+            return cls(place, reason)
+        number, attempt, *channel = match.groups(default="")
+        trial = f"trial-{number}" + (f" (attempt {attempt})" if attempt else "")
+        return cls(place, reason, trial, channel[0] if channel else "")
+
+    @classmethod
+    def of(cls, path: Path, error: ArchiveError) -> Self:
+        """Damage as an error tells of it: `file: /place/in/it: what is wrong`.
+
+        Args:
+            path: the sealed file, or the folder of a run in progress.
+            error: met while reading there.
+        """
+        told = str(error)
+        if not told.startswith(str(path)):
+            return cls("", told)
+        file, _, what = told.removeprefix(str(path)).lstrip("/").partition(": ")
+        inner = ""
+        if what.startswith("/") and ": " in what:
+            inner, _, what = what.partition(": ")
+        return cls.at(file + inner, what)
+
+
+class DamageList:
+    """Collects damage while a run at `path` is read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.found: list[Damage] = []
+
+    def add(self, place: str, reason: str) -> None:
+        self.found.append(Damage.at(place, reason))
+
+    def read(self, what: Callable[[], _Read], instead: _Read) -> _Read:
+        """What `what` reads, or `instead` when that is damaged, which is noted."""
+        try:
+            return what()
+        except ArchiveError as error:
+            self.found.append(Damage.of(self.path, error))
+            return instead
+
+    @contextlib.contextmanager
+    def noting(self) -> Iterator[None]:
+        """What cannot be read inside is noted, and reading goes on behind the block."""
+        try:
+            yield
+        except ArchiveError as error:
+            self.found.append(Damage.of(self.path, error))
