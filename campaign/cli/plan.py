@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from campaign.execution.display import clock
 from campaign.policy import Policy, Response
 from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
 from campaign.protocol.limit_check import in_display_units
-from campaign.trial import Role
+from campaign.trial import Role, Trial
 
 NOTES = 5
 """of a test that are shown; the others are in the JSON."""
@@ -54,6 +54,19 @@ def _print(prepared: Prepared, results: Path) -> None:
         print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
 
 
+def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
+    """What a person does before which trial, as often as it changes within the test."""
+    done: tuple[str, ...] = ()
+    steps = []
+    for trial in trials:
+        if trial.setup != done:
+            steps += [f"by hand before {trial.name}: {step}" for step in trial.setup]
+        done = trial.setup
+    yield from steps[:NOTES]
+    if len(steps) > NOTES:
+        yield f"and {len(steps) - NOTES} more steps by hand; --json has them all"
+
+
 def policy_lines(policy: Policy) -> Iterator[str]:
     """What the protocol wants done besides its trials, a line for faults and one for rests."""
     if policy.faults:
@@ -87,6 +100,11 @@ def _print_details(plan: Plan, test: PlannedTest) -> None:
     warm_ups = sum(trial.role is Role.WARM_UP for trial in trials)
     if warm_ups:
         print_line(f"  {warm_ups} of the trials warm up and are not analysed")
+    checks = sum(trial.role is Role.CHECK for trial in trials)
+    if checks:
+        print_line(f"  {checks} of the trials check that the bench is still the same")
+    for line in _by_hand(trials):
+        print_line(f"  {line}")
     for use in sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True):
         value, bound = in_display_units(use.margin)
         broken = "  BROKEN" if use.margin.broken else ""

@@ -18,7 +18,7 @@ from campaign.protocol.schema import ProtocolFile, replaced
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
 SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration"}
-TABLES = frozenset({"faults", "rest"})
+TABLES = frozenset({"faults", "rest", "check"})
 """Top-level tables, whose keys can be set one by one."""
 
 

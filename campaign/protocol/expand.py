@@ -12,6 +12,7 @@ from campaign.errors import Problem
 from campaign.physics.bench import Bench
 from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
+from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
 from campaign.protocol.points import Point, PointError, points_of
 from campaign.protocol.schema import Test
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
@@ -22,10 +23,14 @@ LARGEST_RECORDING = 200_000_000
 
 @dataclass(frozen=True)
 class Expanded:
-    """The trials of one test in order of execution, each with its bench as an object."""
+    """The trials of one test in order of execution, each with its bench as an object.
+
+    `first_measurement` is the index of the first as written, whatever the order; None without one.
+    """
 
     trials: tuple[Trial, ...]
     benches: tuple[Bench, ...]
+    first_measurement: int | None
 
 
 @dataclass(frozen=True)
@@ -52,8 +57,25 @@ def expand(test: Test, seed: int, before: int, allow_large: bool) -> Expanded:
                 raise PointError([size_problem(test, "the plan has")])
     ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
     numbers = itertools.count(before + 1)
-    trials = tuple(_trial(test, place, next(numbers), seed) for place in ordered)
-    return Expanded(trials, tuple(place.bench for place in ordered))
+    set_by_hand = set_by_operator(test)
+    setups = {id(point): _setup(test, point) for point in points}
+    trials = tuple(
+        _trial(test, place, next(numbers), seed, setups[id(place.point)], set_by_hand)
+        for place in ordered
+    )
+    measured = (place for place in places if place.request.role is Role.MEASUREMENT)
+    first = next(measured, None)
+    at = next((i for i, place in enumerate(ordered) if place is first), None)
+    return Expanded(trials, tuple(place.bench for place in ordered), at)
+
+
+def _setup(test: Test, point: Point) -> tuple[str, ...]:
+    """What a person does for a point, which may lack what a placeholder of the first one names."""
+    try:
+        return setup_at(test, point)
+    except PlaceholderError as error:
+        message = f"test '{test.entry.name}' at {point.label}: {error}"
+        raise PointError([test.origin.problem(("operator",), "key", message)]) from None
 
 
 def _requests(
@@ -98,7 +120,7 @@ def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
     """
 
     def hashed(place: _Place) -> int:
-        return _hash("order", seed, place.point.values, place.index, place.repeat)
+        return place_hash("order", seed, place.point.values, place.index, place.repeat)
 
     ordered: list[_Place] = []
     for _, group in itertools.groupby(places, key=lambda place: place.repeat):
@@ -109,7 +131,14 @@ def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
     return ordered
 
 
-def _trial(test: Test, place: _Place, number: int, seed: int) -> Trial:
+def _trial(
+    test: Test,
+    place: _Place,
+    number: int,
+    seed: int,
+    setup: tuple[str, ...],
+    set_by_hand: tuple[str, ...],
+) -> Trial:
     # All parts are validated; constructing without validation shares one bench tree among the
     # trials of a point, where validation would copy it for each of up to 100 000.
     request = place.request
@@ -122,10 +151,12 @@ def _trial(test: Test, place: _Place, number: int, seed: int) -> Trial:
         point=swept,
         options=place.point.options_tree,
         repeat=place.repeat,
-        seed=_hash(seed, place.point.values, place.index, place.repeat),
+        seed=place_hash(seed, place.point.values, place.index, place.repeat),
         bench=place.bench_tree,
         task=request.task,
         note=request.note,
+        setup=setup,
+        set_by_operator=set_by_hand,
     )
 
 
@@ -139,11 +170,11 @@ def size_problem(test: Test, what: str) -> Problem:
 def seed_of(test: Test, master: int) -> int:
     """The test's own seed, or one drawn from the plan's that no other test changes."""
     given = test.entry.seed
-    return given if given is not None else _hash(master, test.entry.name)
+    return given if given is not None else place_hash(master, test.entry.name)
 
 
-def _hash(*place: Any) -> int:
-    """63 bits that depend on nothing but a trial's place in its test."""
+def place_hash(*place: Any) -> int:
+    """63 bits that depend on nothing but `place`, e.g. a trial's place in its test."""
     digest = hashlib.sha256(canonical_json(place).encode()).digest()
     return int.from_bytes(digest[:8], "big") >> 1
 

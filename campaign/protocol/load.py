@@ -32,10 +32,14 @@ from campaign.protocol.files import (
     read_text,
 )
 from campaign.protocol.matrix import Axis
+from campaign.protocol.operator import operator_problems
 from campaign.protocol.overrides import Override, parse_overrides
+from campaign.protocol.points import PointError, points_of
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.protocol.schema import (
+    Check,
+    CheckEntry,
     ExperimentKind,
     Protocol,
     ProtocolFile,
@@ -77,6 +81,7 @@ def load_protocol(
         raise _failed(collected)
     published = loader.published(source, top.published, origin)
     calibration = loader.calibration(source, top.calibration, origin)
+    check = loader.check(top.check, origin)
     if not collected.drafts and not collected.problems:
         message = "no tests; add a [[test]], or include a protocol that has some"
         collected.problems.append(Problem(path, 1, 1, message))
@@ -95,6 +100,7 @@ def load_protocol(
         overrides=tuple(overrides),
         calibration=calibration,
         policy=Policy(faults=top.faults, rest=top.rest),
+        check=check,
     )
 
 
@@ -151,6 +157,17 @@ class _Loader:
                 self._report(draft.origin.problem(("bench",), "value", message))
         return Calibration(options, bench, origin)
 
+    def check(self, entry: CheckEntry | None, origin: Origin) -> Check | None:
+        """The repeated trial; its test may stand in an included protocol."""
+        if entry is None:
+            return None
+        names = [draft.name for draft in self.collected.drafts]
+        if entry.test not in names:
+            message = f"no test is called {shown(entry.test)}; {allowed(names)}"
+            message += nearest(entry.test, names)
+            self._report(origin.problem(("check", "test"), "value", message))
+        return Check(entry.test, entry.every, origin)
+
     def _report(self, *problems: Problem) -> None:
         self.collected.problems += problems
 
@@ -179,6 +196,7 @@ class _Loader:
         self._compensation(test, known)
         if not is_large(axes, entry.repeat):
             self._report(*value_problems(test))
+        self._operator(test)
         return test
 
     def _experiment(self, draft: Draft, kind: Any) -> ExperimentKind | None:
@@ -287,6 +305,16 @@ class _Loader:
         valid = validate(experiment.options, tree, origin, also=TestEntry.model_fields)
         if isinstance(valid, list):
             self._report(*valid)
+
+    def _operator(self, test: Test) -> None:
+        """What a person is asked to do, tried at the first point of the matrix."""
+        if not test.entry.operator or any(len(axis) == 0 for axis in test.axes):
+            return
+        try:
+            point = next(points_of(test))
+        except PointError:
+            return  # reported where the value stands
+        self._report(*operator_problems(test, point))
 
     def _compensation(self, test: Test, bench: Mapping[str, Any]) -> None:
         """An option called `compensation` names a method that the bench has parameters for."""

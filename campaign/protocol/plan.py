@@ -12,6 +12,7 @@ from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.limits import Margin, margins
 from campaign.policy import Policy
 from campaign.protocol.axes import is_large, value_problems
+from campaign.protocol.check_trials import nothing_to_check, with_checks
 from campaign.protocol.expand import Expanded, expand, samples_of, seed_of, size_problem
 from campaign.protocol.matrix import count_points
 from campaign.protocol.points import PointError, points_of
@@ -139,22 +140,18 @@ def make_plan(
     if problems:
         raise ProtocolError(problems)
     master = secrets.randbits(63) if seed is None else seed
-    trials: list[Trial] = []
     planned: list[PlannedTest] = []
     uses: list[LimitUse] = []
-    for test in chosen:
-        try:
-            expanded = expand(test, seed_of(test, master), len(trials), allow_large)
-        except PointError as error:
-            problems += error.problems
-            continue
+    expansions = _expanded(protocol, chosen, master, allow_large)
+    for test, expanded in zip(chosen, expansions, strict=True):
         own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
         planned.append(_planned(test, expanded, own, master))
         uses += own
-        trials += expanded.trials
-    if problems:
-        raise ProtocolError(list(dict.fromkeys(problems)))
+    trials = [trial for expanded in expansions for trial in expanded.trials]
+    trials.sort(key=lambda trial: trial.number)  # checks stand among the trials of other tests
     normalised: Tree = {"tests": [_normalised(t, master) for t in protocol.tests]}
+    if protocol.check is not None:
+        normalised["check"] = {"test": protocol.check.test, "every": protocol.check.every}
     return Plan(
         name=protocol.path.name,
         title=protocol.title,
@@ -174,6 +171,31 @@ def make_plan(
         breaches=tuple(use for use in uses if use.margin.broken),
         policy=protocol.policy,
     )
+
+
+def _expanded(
+    protocol: Protocol, chosen: Sequence[Test], master: int, allow_large: bool
+) -> list[Expanded]:
+    """Every chosen test's trials, the checks among them. Raises ProtocolError."""
+    expansions: list[Expanded] = []
+    problems: list[Problem] = []
+    before = 0
+    for test in chosen:
+        try:
+            expansions.append(expand(test, seed_of(test, master), before, allow_large))
+        except PointError as error:
+            problems += error.problems
+            continue
+        before += len(expansions[-1].trials)
+    if problems:
+        raise ProtocolError(list(dict.fromkeys(problems)))
+    check, names = protocol.check, [test.entry.name for test in chosen]
+    if check is None or check.test not in names:
+        return expansions  # --only left out the test that would be repeated
+    named = names.index(check.test)
+    if expansions[named].first_measurement is None:
+        raise ProtocolError([nothing_to_check(check)])
+    return with_checks(expansions, named, check, seed_of(chosen[named], master))
 
 
 def _size(trial: Trial) -> int:
@@ -225,7 +247,10 @@ def _normalised(test: Test, master: int) -> Tree:
     """What determines the trials of a test; prose is left out, so that it may be corrected."""
     first = next(iter(points_of(test)))
     swept: dict[str, Any] = {axis.path: axis.describe() for axis in test.axes}
+    by_hand: list[Any] = [entry.model_dump(mode="json") for entry in test.entry.operator]
+    more: Tree = {"operator": by_hand} if by_hand else {}
     return {
+        **more,
         "name": test.entry.name,
         "kind": test.entry.kind,
         "options": first.options_tree,

@@ -68,6 +68,8 @@ def _trial(trial: Trial) -> dict[str, Any]:
         "duration_s": trial.task.duration,
         "compensation": trial.task.compensation,
         "note": trial.note,
+        "setup": list(trial.setup),
+        "set_by_operator": list(trial.set_by_operator),
         "fingerprint": trial.fingerprint,
     }
 

@@ -39,6 +39,24 @@ class ExperimentKind(typing.Protocol):
     def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
 
 
+class OperatorEntry(Options):
+    """One `[[test.operator]]`: what a person must do to the bench."""
+
+    text: str = Field(min_length=1, max_length=500)
+    """What to do; {a.dotted.path} stands for the value there."""
+    sets: tuple[str, ...] = ()
+    """The swept paths that this sets, instead of the controller."""
+
+
+class CheckEntry(Options):
+    """`[check]`: one trial again and again."""
+
+    test: str
+    """The test whose first measurement is repeated."""
+    every: int = Field(ge=1)
+    """After how many measurements of the whole plan."""
+
+
 class TestEntry(Options):
     """One `[[test]]`, without the options of its kind."""
 
@@ -65,6 +83,8 @@ class TestEntry(Options):
     """Order of the measurements within each repetition."""
     seed: int | None = Field(default=None, ge=0, lt=2**63)
     """Of everything random in the test; drawn and recorded when absent."""
+    operator: tuple[OperatorEntry, ...] = ()
+    """What a person must have done to the bench, each under `[[test.operator]]`."""
 
 
 class ProtocolFile(Options):
@@ -90,6 +110,8 @@ class ProtocolFile(Options):
     """What to do about a trial that did not run to its end: occasion to response."""
     rest: Rest | None = None
     """Pauses in which the bench cools down."""
+    check: CheckEntry | None = None
+    """A trial that is repeated to see that the bench is still the same."""
     test: tuple[dict[str, Any], ...] = ()
     """The tests, each under `[[test]]`."""
 
@@ -120,6 +142,21 @@ class Test:
 
 
 @dataclass(frozen=True)
+class Check:
+    """The `[check]` of a loaded protocol.
+
+    Attributes:
+        test: whose first measurement is repeated.
+        every: after how many measurements.
+        origin: of the protocol's top level, for problems found later.
+    """
+
+    test: str
+    every: int
+    origin: Origin
+
+
+@dataclass(frozen=True)
 class Protocol:
     """A validated protocol with all it includes.
 
@@ -129,7 +166,7 @@ class Protocol:
         sources: verbatim text of every protocol, bench and published file, by its name as written.
         overrides: what `--set` was given.
         calibration: what may be fitted, None when the protocol does not say.
-        policy: of this file; those of included protocols do not apply.
+        policy, check: of this file; those of included protocols do not apply.
     """
 
     path: Path
@@ -144,6 +181,7 @@ class Protocol:
     overrides: tuple[str, ...] = ()
     calibration: Calibration | None = None
     policy: Policy = field(default_factory=Policy)
+    check: Check | None = None
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

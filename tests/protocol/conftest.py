@@ -74,6 +74,15 @@ def _speeds(options: SpeedsOptions, bench: Bench) -> Iterator[TrialRequest]:
             yield TrialRequest(task, role=role, point={"speed": speed})
 
 
+class StillOptions(Options):
+    """Nothing can be chosen."""
+
+
+def _still(options: StillOptions, bench: Bench) -> Iterator[TrialRequest]:
+    task = Task(mode="rate", duration=1.0, window=(0.0, 1.0), sample_rate=10.0)
+    yield TrialRequest(task, role=Role.WARM_UP)
+
+
 @dataclass(frozen=True)
 class Kind:
     name: str
@@ -84,6 +93,7 @@ class Kind:
 KINDS = {
     "swing": Kind("swing", SwingOptions, _swing),
     "speeds": Kind("speeds", SpeedsOptions, _speeds),
+    "still": Kind("still", StillOptions, _still),
 }
 
 

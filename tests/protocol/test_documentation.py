@@ -40,6 +40,19 @@ def test_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert listed.sub(r"\1…", str(caught.value)) == listed.sub(r"\1…", shown.strip())
 
 
+def test_parts_of_the_page(tmp_path: Path) -> None:
+    operator, check, faults = blocks("toml part")
+    head = "[[test]]\nname = 'reference'\nkind = 'step_response'\nbench = 'platform'\n"
+    sweep = "[test.matrix]\n'bench.gear.preload.torque' = ['33 N m', '50 N m']\n"
+    path = tmp_path / "my.toml"
+    path.write_text(head + operator + sweep + check + faults)
+    protocol = load_protocol(path, experiments(), shipped=SHIPPED)
+    assert protocol.check is not None
+    assert protocol.policy.rest is not None
+    trial = make_plan(protocol).trials[-1]
+    assert trial.setup == ("Preload the spring to 50 N m", "Remove the transport lock")
+
+
 def test_every_key_is_documented() -> None:
     for key in [*ProtocolFile.model_fields, *TestEntry.model_fields]:
         assert f"`{key}`" in PAGE or f"`[{key}]`" in PAGE or f"`[[{key}]]`" in PAGE
@@ -60,5 +73,6 @@ def test_settings_of_the_page(tmp_path: Path, setting: str) -> None:
     key, value = setting.split("=")
     assert f'`--set {key}="{value}"`' in PAGE or f"`--set {setting}`" in PAGE
     path = tmp_path / "my.toml"
-    path.write_text(blocks("toml")[0] + blocks("toml part")[0])
+    faults = next(block for block in blocks("toml part") if "[faults]" in block)
+    path.write_text(blocks("toml")[0] + faults)
     load_protocol(path, experiments(), overrides=[setting], shipped=SHIPPED)

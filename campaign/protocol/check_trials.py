@@ -1,0 +1,65 @@
+"""One trial again and again, to see that the bench is still the same bench: `[check]`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from campaign.errors import Problem
+from campaign.physics.bench import Bench
+from campaign.protocol.expand import Expanded, place_hash
+from campaign.protocol.schema import Check
+from campaign.trial import Role, Trial
+
+
+def with_checks(tests: Sequence[Expanded], named: int, check: Check, seed: int) -> list[Expanded]:
+    """The same tests with the checks among them, all numbered in the order of execution.
+
+    After every `check.every` measurements of the whole plan comes the first measurement of the test
+    at the index `named` again, with role `check`, counted by `repeat`, and with a seed that follows
+    from that test's `seed`. Checks are trials of that test; no other trial changes but in number.
+    """
+    original, bench = _first(tests[named])
+    pairs: list[list[tuple[Trial, Bench]]] = [[] for _ in tests]
+    number = measured = 0
+    for owner, test in enumerate(tests):
+        for trial, own in zip(test.trials, test.benches, strict=True):
+            number += 1
+            pairs[owner].append((_changed(trial, number=number), own))
+            if trial.role is not Role.MEASUREMENT:
+                continue
+            measured += 1
+            if measured % check.every == 0:
+                number, count = number + 1, measured // check.every
+                again = _changed(
+                    original,
+                    number=number,
+                    role=Role.CHECK,
+                    repeat=count,
+                    seed=place_hash("check", seed, count),
+                    note="again, to see that the bench is still the same",
+                )
+                pairs[named].append((again, bench))
+    return [
+        Expanded(tuple(t for t, _ in own), tuple(b for _, b in own), test.first_measurement)
+        for test, own in zip(tests, pairs, strict=True)
+    ]
+
+
+def nothing_to_check(check: Check) -> Problem:
+    """The problem of a `[check]` whose test only warms up or moves."""
+    message = f"the test '{check.test}' has no measurement that could be repeated"
+    return check.origin.problem(("check", "test"), "value", message)
+
+
+def _first(test: Expanded) -> tuple[Trial, Bench]:
+    index = test.first_measurement
+    if index is None:
+        raise ValueError("no measurement to repeat")  # the plan has looked before
+    return test.trials[index], test.benches[index]
+
+
+def _changed(trial: Trial, **changes: Any) -> Trial:
+    """A copy without what the trial has worked out of itself, such as its fingerprint."""
+    fields = {name: getattr(trial, name) for name in Trial.model_fields}
+    return Trial.model_construct(**{**fields, **changes})
