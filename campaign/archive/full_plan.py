@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from campaign.archive.files import write_lines_atomically
-from campaign.archive.run_folder import first_line
+from campaign.archive.run_folder import first_line, read_optional
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
 
@@ -101,3 +101,22 @@ class FullPlan:
 
     def _damaged(self, name: str, line: int, what: str) -> ArchiveError:
         return ArchiveError(f"{self.path}: {name}, line {line}: {what}")
+
+
+def read_full_plan(path: Path) -> FullPlan:
+    """The planned trials of a run; none in an archive of format 1. Raises ArchiveError."""
+    if path.is_dir():
+        texts = [read_optional(path / name) for name in (PLAN_TRIALS, PLAN_TREES)]
+    else:
+        texts = list(_sealed_texts(path))
+    return FullPlan(path, *texts)
+
+
+def _sealed_texts(path: Path) -> Iterator[str]:
+    from campaign.archive import guarded
+
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        run = guarded.group_at(file, "run", "NXentry")
+        for name in ("plan_trials", "plan_trees"):
+            there = name in run
+            yield guarded.text_at(guarded.group_at(run, name, "NXnote"), "data") if there else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,12 +11,13 @@ from typing import TYPE_CHECKING
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import Damage, DamageList
 from campaign.archive.files import PART, sha256_of, why
+from campaign.archive.full_plan import FullPlan, read_full_plan
 from campaign.archive.header import PARTIAL, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted
 from campaign.archive.run_folder import PLAN, parse_plan, read_header, read_plan_text
 from campaign.archive.story import Lines, read_lines
 from campaign.errors import ArchiveError
-from campaign.trial import SafeState, Tree
+from campaign.trial import SafeState, Tree, Trial
 
 if TYPE_CHECKING:
     import h5py
@@ -71,6 +73,31 @@ class RunReader:
     def sha256(self) -> str:
         """Hash of the sealed file as `sha256sum` prints it; of the journal while in progress."""
         return sha256_of(self.path if self.sealed else self.path / JOURNAL)
+
+    @cached_property
+    def earlier_attempts(self) -> Mapping[int, tuple[ArchivedTrial, ...]]:
+        """By trial number, the attempts that a later one replaced; no analysis sees them."""
+        from campaign.archive.attempts import read_earlier
+
+        return read_earlier(self.path, DamageList(self.path))
+
+    @cached_property
+    def full_plan(self) -> FullPlan:
+        """Every planned trial, whole; empty in an archive of format 1."""
+        return read_full_plan(self.path)
+
+    def planned(self, number: int) -> Trial:
+        """The trial `number` of the plan, executed or not, ready to be executed.
+
+        Raises ArchiveError when there is none, or when the archive is of format 1, which kept the
+        executed ones only.
+        """
+        if len(self.full_plan):
+            return self.full_plan.trial(number)
+        executed = {archived.trial.number: archived.trial for archived in self.trials}
+        if number not in executed:
+            raise ArchiveError(f"{self.path}: has no trial {number}, or not all that was planned")
+        return executed[number]
 
     def unchanged(self) -> bool:
         """Whether every byte of the sealed file is as it was written (reads it all)."""

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
+from pydantic import TypeAdapter
 
 from campaign.archive import guarded
 from campaign.archive.archived_trial import ArchivedTrial
@@ -16,9 +17,10 @@ from campaign.archive.damage import DamageList
 from campaign.archive.run_folder import first_line
 from campaign.archive.trial_file import entry_name
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Outcome, SafeState, Trial, canonical_json
+from campaign.trial import Ending, Fault, Outcome, SafeState, Tree, Trial, canonical_json
 
 _ENTRY = re.compile(r"trial_([0-9]{5,10})")
+_TREE: TypeAdapter[Tree] = TypeAdapter(Tree)
 
 
 def read_trials(path: Path, file: h5py.File, damaged: DamageList) -> Iterator[ArchivedTrial]:
@@ -35,9 +37,12 @@ def read_trial_file(path: Path, number: int) -> ArchivedTrial:
         return read_trial(path, file, number)
 
 
-def read_trial(path: Path, file: h5py.File, number: int) -> ArchivedTrial:
-    """One trial without its samples. Raises ArchiveError naming what is wrong with it."""
-    name = entry_name(number)
+def read_trial(path: Path, file: h5py.File, number: int, place: str = "") -> ArchivedTrial:
+    """One trial without its samples. Raises ArchiveError naming what is wrong with it.
+
+    `place` is where it lies, when that is not its own group: an earlier attempt.
+    """
+    name = place or entry_name(number)
     with guarded.guarded(path, f"/{name}"):
         entry = guarded.group_at(file, name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
@@ -54,10 +59,24 @@ def read_trial(path: Path, file: h5py.File, number: int) -> ArchivedTrial:
             Outcome(guarded.text_at(record, "outcome")),
             guarded.text_at(record, "reason"),
             SafeState(guarded.text_at(record, "safe_state")),
+            _fault(record),
+            _telemetry(record),
         )
         started = guarded.text_at(entry, "start_time")
         ended = guarded.text_at(entry, "end_time")
         return ArchivedTrial(trial, ending, started, ended, path, name)
+
+
+def _fault(record: h5py.Group) -> Fault | None:
+    """What failed; format 1 did not keep it."""
+    text = guarded.text_at(record, "fault") if "fault" in record else ""
+    return Fault(text) if text else None
+
+
+def _telemetry(record: h5py.Group) -> Tree:
+    if "telemetry" not in record:
+        return {}
+    return _TREE.validate_json(guarded.text_at(record, "telemetry"))
 
 
 def _fingerprint(trial_text: str) -> str:
