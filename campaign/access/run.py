@@ -98,8 +98,8 @@ class RunView:
 
     def __repr__(self) -> str:
         tests = self._tests()
-        count = f"{len(self)} of {len(self.archive.plan)} trials"
-        lines = [f"<run {self.name}: {self.status.value}, {count}, {len(tests)} tests>"]
+        count = f"{len(self)} of {len(self.archive.plan)} trials executed"
+        lines = [f"<run {self.name}: {self.status.value}, {count}>"]
         return "\n".join([*lines, *(f"  {view.name} ({view.kind}): {len(view)}" for view in tests)])
 
     def _tests(self) -> list[TestView]:

@@ -198,6 +198,39 @@ def report(
     typer.echo(report_run(run, results, output, templates, open_it=open_it))
 
 
+@app.command()
+def export(
+    run: RunArgument,
+    to: Annotated[
+        str, typer.Option("--to", metavar="FORMAT", help="csv, parquet, mat, or a plug-in's.")
+    ],
+    results: ResultsOption = RESULTS,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="DIR",
+            help="A new folder; RUN-FORMAT beside the archive when absent.",
+            show_default=False,
+        ),
+    ] = None,
+    tests: Annotated[
+        list[str] | None,
+        typer.Option("--test", metavar="TEST", help="Only this test; may be given again."),
+    ] = None,
+    trials: Annotated[
+        list[int] | None,
+        typer.Option("--trial", metavar="N", help="Only this trial; may be given again."),
+    ] = None,
+) -> None:
+    """Write recordings as files of other programs, with a table of the trials beside them."""
+    from campaign.cli.export import export_archive
+
+    folder, code = export_archive(run, results, to, output, tests or (), trials or ())
+    typer.echo(folder)
+    raise typer.Exit(code)
+
+
 @app.command("list")
 def list_command(results: ResultsOption = RESULTS) -> None:
     """List the archived runs, the newest first."""

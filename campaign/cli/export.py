@@ -1,0 +1,33 @@
+"""`campaign export`: recordings in the formats of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from campaign.access import open_view
+from campaign.cli.output import print_note
+from campaign.errors import ExitCode, UsageError
+from campaign.export import exports
+from campaign.export.run_export import export_run
+
+
+def export_archive(
+    name: str | None,
+    results: Path,
+    to: str,
+    output: Path | None,
+    tests: Sequence[str],
+    trials: Sequence[int],
+) -> tuple[Path, ExitCode]:
+    """Export the run that `name` means; the folder, and whether all of it could be read."""
+    kinds = exports()
+    if to not in kinds:
+        raise UsageError(f"there is no format {to!r}; there are {', '.join(kinds)}")
+    run = open_view(name, results)
+    folder = output or run.path.with_name(f"{run.path.stem}-{to}")
+    exported = export_run(run, kinds[to], folder, tests, trials)
+    for problem in exported.problems:
+        print_note(f"not exported: {problem}", style="yellow")
+    print_note(f"{exported.files} recordings written")
+    return exported.folder, ExitCode.ARCHIVE if exported.problems else ExitCode.DONE

@@ -1,0 +1,122 @@
+"""MAT version 5, which MATLAB, Octave and SciPy read.
+
+Each channel is a variable, a column; beside them stand the structs `units` and `labels` with a
+field per variable, and `trial` with what was executed and how it ended.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.access import TrialView
+from campaign.errors import UsageError
+from campaign.export.interface import ExportKind
+from campaign.trial import Recording, canonical_json
+
+LARGEST = 2**31 - 1
+"""Bytes of a variable in version 5; version 7.3 would be HDF5, as the archive is."""
+
+_LONGEST = 63  # characters of a name
+_STRUCTS = ("units", "labels", "trial")
+_KEYWORDS = frozenset(
+    [
+        "break",
+        "case",
+        "catch",
+        "classdef",
+        "continue",
+        "else",
+        "elseif",
+        "end",
+        "for",
+        "function",
+        "global",
+        "if",
+        "otherwise",
+        "parfor",
+        "persistent",
+        "return",
+        "spmd",
+        "switch",
+        "try",
+        "while",
+    ]
+)
+
+
+def _write(trial: TrialView, recording: Recording, path: Path) -> None:
+    from scipy.io import savemat
+
+    check_size(trial.name, len(recording.time))
+    channels = list(recording.channels.values())
+    names = matlab_names(["time", *(channel.name for channel in channels)], taken=_STRUCTS)
+    series = [recording.time, *(channel.samples for channel in channels)]
+    units = ["s", *(channel.unit for channel in channels)]
+    labels = ["Time", *(channel.label for channel in channels)]
+    variables: dict[str, Any] = dict(zip(names, series, strict=True))
+    variables["units"] = dict(zip(names, units, strict=True))
+    variables["labels"] = dict(zip(names, labels, strict=True))
+    variables["trial"] = _about(trial)
+    savemat(path, variables, long_field_names=True, do_compression=True, oned_as="column")
+
+
+def check_size(name: str, samples: int) -> None:
+    """Raises UsageError when a series of so many samples does not fit."""
+    if samples * 8 > LARGEST:
+        raise UsageError(
+            f"{name}: {samples} samples are more than a variable of a MAT file of version 5 holds "
+            "(2 GB); export to parquet, or read the archive itself: it is HDF5"
+        )
+
+
+def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """Each name as MATLAB accepts it: at most 63 letters, digits and `_`, and each once."""
+    used = set(taken) | _KEYWORDS
+    valid = []
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        plain = plain if plain[:1].isalpha() else f"x{plain}"
+        choice, number = plain[:_LONGEST], 1
+        while choice in used:
+            number += 1
+            choice = f"{plain[: _LONGEST - len(str(number)) - 1]}_{number}"
+        used.add(choice)
+        valid.append(choice)
+    return valid
+
+
+def _about(trial: TrialView) -> dict[str, Any]:
+    executed, ending = trial.trial, trial.ending
+    return {
+        "number": float(executed.number),
+        "test": executed.test,
+        "kind": executed.kind,
+        "role": executed.role.value,
+        "repeat": float(executed.repeat),
+        "point": _struct(executed.point),
+        "seed": np.uint64(executed.seed),  # a double has no room for its 63 bits
+        "outcome": ending.outcome.value,
+        "reason": ending.reason,
+        "json": canonical_json(executed.model_dump(mode="json")),
+    }
+
+
+def _struct(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Swept values: numbers and text as they are, anything else as JSON."""
+    plain = [
+        float(value)
+        if isinstance(value, int | float) and not isinstance(value, bool)
+        else value
+        if isinstance(value, bool | str)
+        else canonical_json(value)
+        for value in tree.values()
+    ]
+    return dict(zip(matlab_names(tree), plain, strict=True))
+
+
+EXPORT = ExportKind("mat", "version 5, for MATLAB and Octave", ".mat", _write)
