@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from typing import IO, Any, cast
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from typing import IO, Any, Protocol, cast
 
 from rich.console import Console
 from rich.progress import BarColumn, TaskID, TextColumn
 from rich.progress import Progress as Live
 from rich.text import Text
 
-from campaign.execution.progress import Display, Progress
+from campaign.execution.progress import Progress
 from campaign.trial import Ending, Outcome, Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
+PATIENCE = 2.0  # s that the archive may take to close before somebody is told
+CLOSING = "closing the archive"
+
+
+class Shown(Protocol):
+    """A display that can get out of the way when a person is asked something."""
+
+    def __call__(self, progress: Progress) -> None: ...
+
+    def hidden(self) -> AbstractContextManager[None]:
+        """The terminal belongs to somebody else inside the block."""
 
 
 @contextmanager
-def progress_display(console: Console) -> Iterator[Display]:
+def progress_display(console: Console) -> Iterator[Shown]:
     """The display that suits `console`, for as long as the block lasts.
 
     When the terminal closes, what would have been shown is dropped: the run is not to end by it.
@@ -29,7 +41,11 @@ def progress_display(console: Console) -> Iterator[Display]:
         with live_display(console) as display:
             yield display
     else:
-        yield PlainDisplay(console)
+        plain = PlainDisplay(console)
+        try:
+            yield plain
+        finally:
+            plain.end()
 
 
 class _Droppable:
@@ -52,8 +68,8 @@ class _Droppable:
 
 
 @contextmanager
-def live_display(console: Console) -> Iterator[Display]:
-    """One line that is redrawn in place; trials that fail are kept above it."""
+def live_display(console: Console) -> Iterator[LiveDisplay]:
+    """One line that is redrawn in place, for as long as the block lasts."""
     live = Live(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=None),
@@ -63,24 +79,39 @@ def live_display(console: Console) -> Iterator[Display]:
         transient=True,
         expand=True,
     )
-    task: TaskID | None = None
+    with live:
+        yield LiveDisplay(live)
 
-    def display(progress: Progress) -> None:
-        nonlocal task
-        if task is None:
-            task = live.add_task("", total=progress.total, counts="", time_left="")
-        if (failure := _failure(progress.ended)) is not None:
-            live.console.print(failure)
-        live.update(
-            task,
-            description=current_test(progress),
+
+class LiveDisplay:
+    """Redraws one line; trials that fail and what the run decides are kept above it."""
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+        self._task: TaskID | None = None
+
+    def __call__(self, progress: Progress) -> None:
+        """Show the state of the run."""
+        if self._task is None:
+            self._task = self._live.add_task("", total=progress.total, counts="", time_left="")
+        for line in _news(progress):
+            self._live.console.print(line)
+        self._live.update(
+            self._task,
+            description=CLOSING if progress.closing else current_test(progress),
             completed=progress.total - progress.left,
             counts=counts(progress),
             time_left=time_left(progress),
         )
 
-    with live:
-        yield display
+    @contextmanager
+    def hidden(self) -> Iterator[None]:
+        """No line, and nothing redrawn, inside the block."""
+        self._live.stop()
+        try:
+            yield
+        finally:
+            self._live.start()
 
 
 class PlainDisplay:
@@ -90,21 +121,44 @@ class PlainDisplay:
         self._console = console
         self._test = ""
         self._printed = time.monotonic()
+        self._patience: threading.Timer | None = None
 
     def __call__(self, progress: Progress) -> None:
         """Print what there is to say, if anything."""
-        if (failure := _failure(progress.ended)) is not None:
-            self._print(failure)
+        for line in _news(progress):
+            self._print(line)
+        if progress.closing:
+            self._patience = threading.Timer(PATIENCE, self._print, [Text(f"{CLOSING} ...")])
+            self._patience.daemon = True
+            self._patience.start()
+            return
         test = current_test(progress)
         due = time.monotonic() - self._printed >= PLAIN_INTERVAL
         if test and (test != self._test or due or not progress.left):
             self._test = test
-            line = ", ".join(filter(None, (counts(progress), time_left(progress))))
-            self._print(Text(f"{test}: {line}"))
+            parts = ", ".join(filter(None, (counts(progress), time_left(progress))))
+            self._print(Text(f"{test}: {parts}"))
+
+    def hidden(self) -> AbstractContextManager[None]:
+        """Lines are in nobody's way."""
+        return nullcontext()
+
+    def end(self) -> None:
+        """Say nothing any more."""
+        if self._patience is not None:
+            self._patience.cancel()
+            self._patience.join()
 
     def _print(self, text: Text) -> None:
         self._console.print(text, soft_wrap=True)
         self._printed = time.monotonic()
+
+
+def _news(progress: Progress) -> Iterator[Text]:
+    if (failure := _failure(progress.ended)) is not None:
+        yield failure
+    if progress.remark:
+        yield Text(progress.remark, style="yellow")
 
 
 def current_test(progress: Progress) -> str:

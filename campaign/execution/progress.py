@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.trial import Ending, Outcome, Trial
@@ -22,6 +23,8 @@ class Progress:
         bench_time: of the trials that have ended (s).
         bench_time_left: of all the others (s).
         ended: the trial that has just ended, and how.
+        remark: what the run has just decided, for people.
+        closing: whether all trials have ended and the archive is being closed.
     """
 
     total: int
@@ -33,6 +36,8 @@ class Progress:
     bench_time: float
     bench_time_left: float
     ended: tuple[Trial, Ending] | None = None
+    remark: str = ""
+    closing: bool = False
 
     @property
     def left(self) -> int:
@@ -51,15 +56,21 @@ Display = Callable[[Progress], None]
 
 
 class Ledger:
-    """Counts what a run has done and tells its display. Used from one thread only."""
+    """Counts what a run has done and tells its display. Used from one thread only.
 
-    def __init__(self, trials: Sequence[Trial], display: Display) -> None:
+    A trial counts once, by how its last attempt ended. `finished` are trials of an earlier session:
+    they count as done, and say nothing about today's pace.
+    """
+
+    def __init__(
+        self, trials: Sequence[Trial], display: Display, finished: Mapping[int, Outcome]
+    ) -> None:
         self._total = len(trials)
-        self._bench_time_total = sum(trial.task.duration for trial in trials)
+        self._bench_time_left = sum(t.task.duration for t in trials if t.number not in finished)
         self._bench_time = 0.0
         self._display = display
         self._running: dict[int, Trial] = {}
-        self._outcomes: dict[Outcome, int] = {}
+        self._outcomes: dict[Outcome, int] = dict(Counter(finished.values()))
         self._started = time.monotonic()
 
     @property
@@ -82,9 +93,25 @@ class Ledger:
         self._running.pop(trial.number, None)
         self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
         self._bench_time += trial.task.duration
+        self._bench_time_left -= trial.task.duration
         self._tell((trial, ending))
 
-    def _tell(self, ended: tuple[Trial, Ending] | None) -> None:
+    def repeat(self, trial: Trial, ending: Ending) -> None:
+        """An attempt has ended, and the trial will be executed again."""
+        self._running.pop(trial.number, None)
+        self._tell((trial, ending))
+
+    def remark(self, text: str) -> None:
+        """The run has decided something."""
+        self._tell(None, remark=text)
+
+    def close(self) -> None:
+        """All trials have ended; the archive is being closed."""
+        self._tell(None, closing=True)
+
+    def _tell(
+        self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
+    ) -> None:
         done = self._outcomes.get(Outcome.COMPLETED, 0)
         self._display(
             Progress(
@@ -95,7 +122,9 @@ class Ledger:
                 started=self._started,
                 elapsed=time.monotonic() - self._started,
                 bench_time=self._bench_time,
-                bench_time_left=max(0.0, self._bench_time_total - self._bench_time),
+                bench_time_left=max(0.0, self._bench_time_left),
                 ended=ended,
+                remark=remark,
+                closing=closing,
             )
         )

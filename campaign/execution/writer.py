@@ -24,7 +24,13 @@ class PlanWriter(Protocol):
         """Where the run lies until it is sealed."""
 
     def begin(self, trial: Trial) -> TrialWriter:
-        """Open a trial for its samples."""
+        """Open the next attempt at a trial for its samples."""
+
+    def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
+        """Note what the run did besides its plan. Raises ArchiveError."""
+
+    def operator_step(self, trial: int, step: str, answer: str) -> None:
+        """Note what a person was asked to do, and the answer. Raises ArchiveError."""
 
     def seal(self, status: RunStatus, reason: str, safe_state: SafeState, *, ended: str) -> Path:
         """Close the run for good and say where it is."""

@@ -71,6 +71,7 @@ class MemoryTrial(MemoryRecorder):
         assert datetime.fromisoformat(started) <= datetime.fromisoformat(ended)
         with self.archive.lock:
             self.archive.endings[self.trial.number] = ending
+            self.archive.attempts.append((self.trial.number, ending.outcome))
             self.archive.samples[self.trial.number] = len(self.recording(ending).time)
 
 
@@ -78,6 +79,10 @@ class MemoryTrial(MemoryRecorder):
 class MemoryArchive:
     endings: dict[int, Ending] = field(default_factory=dict)
     samples: dict[int, int] = field(default_factory=dict)
+    decisions: list[tuple[str, int | None]] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    steps: list[tuple[int, str, str]] = field(default_factory=list)
+    attempts: list[tuple[int, Outcome]] = field(default_factory=list)
     sealed: tuple[str, str, SafeState] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -87,6 +92,14 @@ class MemoryArchive:
 
     def begin(self, trial: Trial) -> MemoryTrial:
         return MemoryTrial(self, trial)
+
+    def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
+        assert self.sealed is None
+        self.decisions.append((decision, trial))
+        self.reasons.append(reason)
+
+    def operator_step(self, trial: int, step: str, answer: str) -> None:
+        self.steps.append((trial, step, answer))
 
     def seal(self, status: str, reason: str, safe_state: SafeState, *, ended: str) -> Path:
         assert self.sealed is None, "sealed twice"

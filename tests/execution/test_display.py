@@ -38,7 +38,7 @@ def test_a_terminal_that_is_gone_does_not_end_the_run(terminal: bool):
 
 def run_three(display) -> None:
     trials = make_trials(3)
-    ledger = Ledger(trials, display)
+    ledger = Ledger(trials, display, {})
     for trial, ending in zip(trials, (COMPLETED, DIVERGED, COMPLETED), strict=True):
         ledger.begin(trial)
         ledger.end(trial, ending)

@@ -11,7 +11,8 @@ from campaign.archive.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
-from campaign.execution.runner import AbortedError, NotSafeError, run_plan
+from campaign.execution.runner import run_plan
+from campaign.execution.safety import AbortedError, NotSafeError
 from campaign.execution.stop import StopSwitch
 from campaign.trial import Ending, Outcome, SafeState, Trial
 from tests.execution.fakes import COMPLETED, FakeBackend, MemoryArchive, make_trials
@@ -76,13 +77,28 @@ def test_a_failed_trial_is_recorded_and_the_campaign_goes_on(outcome: Outcome, c
     assert run.exit_code is code
 
 
-def test_a_fault_that_leaves_the_bench_unsafe_ends_the_run():
-    unsafe = ends(Outcome.FAULT, "no answer from the drive", SafeState.NOT_CONFIRMED)
-    bench = Bench(3, FakeBackend({2: unsafe}))
+UNSAFE = ends(Outcome.FAULT, "no answer from the drive", SafeState.NOT_CONFIRMED)
+
+
+def test_nothing_moves_after_an_unsafe_trial_until_the_bench_was_seen_at_rest():
+    bench = Bench(3, FakeBackend({2: UNSAFE}))
+    run = bench.run()
+    assert bench.backend.log == [
+        *("trial-00001", "trial-00002", "made safe", "trial-00003", "made safe")
+    ]
+    assert bench.archive.decisions == [("make safe", 2), ("skip", 2)]
+    assert run.status is RunStatus.FAILED_TRIALS
+
+
+def test_a_bench_that_is_not_seen_at_rest_after_a_trial_ends_the_run():
+    bench = Bench(3, FakeBackend({2: UNSAFE}, rest=lambda: SafeState.NOT_CONFIRMED))
     run = bench.run()
     assert set(bench.archive.endings) == {1, 2}
-    assert bench.archive.sealed == ("fault", "no answer from the drive", SafeState.CONFIRMED)
-    assert run.exit_code is ExitCode.LIMIT_OR_FAULT
+    assert bench.archive.decisions == [("make safe", 2)]
+    status, reason, safe_state = bench.archive.sealed
+    assert (status, safe_state) == ("fault", SafeState.NOT_CONFIRMED)
+    assert "not seen at rest with its drive off after trial-00002" in reason
+    assert run.exit_code is ExitCode.NOT_SAFE
 
 
 def test_a_safe_state_that_nobody_saw_comes_before_every_other_exit_code():

@@ -1,0 +1,128 @@
+"""Asking a person: before the first motion of a real bench, and for every operator step."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+
+from campaign.backends.interface import BackendKind
+from campaign.cli.output import print_note
+from campaign.errors import CampaignError, ExitCode, UsageError
+from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
+from campaign.execution.display import Shown, clock
+from campaign.execution.stop import StopSwitch
+from campaign.protocol import PlannedTest
+from campaign.trial import Trial
+
+GLANCE = 0.2
+"""s between two looks at the stop switch while nobody types."""
+
+ASSUMED = "assumed done (--yes)"
+
+
+class NotStartedError(CampaignError):
+    """Somebody was asked and said no: nothing has moved."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
+def allow_motion(
+    kind: BackendKind, trials: Sequence[Trial], tests: Sequence[PlannedTest], *, yes: bool
+) -> None:
+    """Show in short what `trials` will do to an attended bench, and ask whether they may.
+
+    Args:
+        tests: with the limits they come close to; may be empty.
+
+    Raises UsageError when there is nobody to ask, and NotStartedError when they may not.
+    """
+    if not kind.attended or not trials:
+        return
+    if not yes and not _somebody_is_there():
+        raise UsageError(
+            f"the backend {kind.name!r} moves a real bench, and there is no terminal to ask "
+            "whether it may; --yes says so"
+        )
+    for line in motion_summary(kind.name, trials, tests):
+        print_note(line)
+    if yes:
+        return
+    print_note("Is the bench clear, and may it move? Type yes to begin: ")
+    if sys.stdin.readline().strip().lower() not in ("yes", "y"):
+        raise NotStartedError("not started: nothing has moved and nothing was written")
+
+
+def motion_summary(
+    backend: str, trials: Sequence[Trial], tests: Sequence[PlannedTest]
+) -> list[str]:
+    """What is about to move, how long, how close to which limits, and what people have to do."""
+    duration = clock(sum(trial.task.duration for trial in trials))
+    lines = [f"{backend}: {len(trials)} trials, {duration} of bench time"]
+    limits = {test.name: test.closest for test in tests}
+    for name, count in Counter(trial.test for trial in trials).items():
+        worst = max(limits.get(name, ()), key=lambda use: use.margin.fraction, default=None)
+        share = f", {worst.margin.fraction:.0%} of the {worst.margin.limit} limit" if worst else ""
+        lines.append(f"  {name}: {count} trials{share}")
+    steps = dict.fromkeys(step for trial in trials for step in trial.setup)
+    return [*lines, *(f"  you will be asked to: {step}" for step in steps)]
+
+
+def attendance_of(kind: BackendKind, stop: StopSwitch, display: Shown, *, yes: bool) -> Attendance:
+    """Who is asked during a run on this backend, and whether its pauses are waited for."""
+    if not kind.attended:
+        return UNATTENDED
+    return Attendance(
+        AssumingOperator() if yes else ConsoleOperator(stop, display.hidden), wait_unless(stop)
+    )
+
+
+class AssumingOperator:
+    """Stands in for a person where a script said `--yes`; the record says so."""
+
+    def confirm(self, trial: Trial, step: str) -> str | None:
+        """Shows the step, and takes it for done."""
+        print_note(f"before {trial.name}: {step}: {ASSUMED}")
+        return ASSUMED
+
+
+class ConsoleOperator:
+    """A person at the terminal."""
+
+    def __init__(
+        self, stop: StopSwitch, hidden: Callable[[], AbstractContextManager[None]]
+    ) -> None:
+        self._stop = stop
+        self._hidden = hidden
+
+    def confirm(self, trial: Trial, step: str) -> str | None:
+        """Ask until there is an answer, the run is stopped, or nobody is there any more."""
+        with self._hidden():
+            print_note(f"before {trial.name} ({trial.label}):\n  {step}", "bold")
+            while True:
+                print_note("Enter when it is done, or stop to end the run: ")
+                line = read_line(self._stop)
+                if line is None or line.strip().lower() == "stop":
+                    return None
+                answer = line.strip() or "done"
+                if answer.lower() not in ("no", "n"):
+                    return answer
+
+
+def read_line(stop: Callable[[], bool]) -> str | None:
+    """A line from standard input; None when `stop()` or when there will be none."""
+    if os.name != "posix":  # where a terminal cannot be waited for with a time limit
+        line = sys.stdin.readline()
+        return None if stop() or not line else line
+    while not stop():
+        ready, _, _ = select.select([sys.stdin], [], [], GLANCE)
+        if ready:
+            return sys.stdin.readline() or None
+    return None
+
+
+def _somebody_is_there() -> bool:
+    return sys.stdin is not None and sys.stdin.isatty()

@@ -1,0 +1,158 @@
+"""What `run` and `resume` have in common: execute, seal, say how it ended, report if asked."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from campaign.archive import RunStatus, RunWriter
+from campaign.backends.interface import Backend, BackendKind
+from campaign.cli.ask import attendance_of
+from campaign.cli.output import error_console, print_line, print_note
+from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
+from campaign.execution.display import clock, progress_display
+from campaign.execution.naming import reference
+from campaign.execution.outcome import RunOutcome
+from campaign.execution.runner import run_plan
+from campaign.execution.safety import NOT_SAFE, connected, safe_when_broken_off
+from campaign.execution.stop import StopSwitch
+from campaign.policy import Policy
+from campaign.trial import Outcome, Trial
+
+
+@dataclass(frozen=True)
+class Session:
+    """Trials, and the backend that accepts them, not yet connected.
+
+    Attributes:
+        trials: the whole plan.
+        finished: those that are not executed (again), by number.
+        yes: whether nobody is asked anything.
+    """
+
+    kind: BackendKind
+    backend: Backend
+    trials: Sequence[Trial]
+    policy: Policy
+    workers: int
+    yes: bool = False
+    finished: Mapping[int, Outcome] = field(default_factory=dict)
+
+
+def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: bool) -> ExitCode:
+    """Execute a session; the archive's path is the last line of standard output.
+
+    `open_archive` is called once the bench is connected: a bench that is not there leaves no run.
+    """
+    began = time.monotonic()
+    outcome: RunOutcome | None = None
+    codes: list[ExitCode] = []
+    try:
+        # Signals first: from the moment that the bench is connected, a stop has to be orderly.
+        with (
+            StopSwitch().on_signals() as stop,
+            connected(session.backend, print_warning) as backend,
+        ):
+            with safe_when_broken_off(backend):
+                writer = open_archive()
+            with closing(writer):
+                outcome = _execute(session, backend, writer, stop)
+    except BackendError as error:
+        if outcome is None:
+            raise
+        print_warning(str(error))
+        codes.append(error.exit_code)
+    say_outcome(outcome, time.monotonic() - began)
+    codes.append(outcome.exit_code)
+    try:
+        if report:
+            codes.append(_report(outcome))
+    finally:
+        print_line(str(outcome.archive))
+    return worst_exit_code(codes)
+
+
+def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
+    with progress_display(error_console()) as display:
+        return run_plan(
+            session.trials,
+            backend,
+            writer,
+            workers=session.workers,
+            display=display,
+            stop=stop,
+            policy=session.policy,
+            attendance=attendance_of(session.kind, stop, display, yes=session.yes),
+            finished=session.finished,
+        )
+
+
+def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
+    """How many trials at once: what was asked for, else what backend and machine allow."""
+    if not kind.parallel:
+        if wanted is not None and wanted > 1:
+            raise UsageError(
+                f"the backend {kind.name!r} executes one trial at a time; "
+                f"leave --workers {wanted} out"
+            )
+        return 1
+    return min(wanted or os.cpu_count() or 1, max(1, trials))
+
+
+def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
+    """How the run ended, and what can be done about it."""
+    done = outcome.outcomes.get(Outcome.COMPLETED, 0)
+    failed = {o.value: n for o, n in outcome.outcomes.items() if o is not Outcome.COMPLETED}
+    counts = ", ".join([f"{done} trials done", *(f"{n} {word}" for word, n in failed.items())])
+    reason = f" ({outcome.reason})" if outcome.reason else ""
+    go_on = ""
+    if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):
+        go_on = f"; `campaign resume {reference(outcome.archive)}` goes on from there"
+    print_note(f"{outcome.status.value}{reason}: {counts}, in {clock(elapsed)}{go_on}")
+    if outcome.exit_code is ExitCode.NOT_SAFE:
+        print_note(NOT_SAFE, "bold red")
+
+
+def print_warning(text: str) -> None:
+    """Something went wrong that does not end the command."""
+    print_note(text, "yellow")
+
+
+def _report(outcome: RunOutcome) -> ExitCode:
+    """Build the report; what goes wrong with it is said, and must not hide how the run ended.
+
+    Raises:
+        Exception: a bug, after a run that has nothing worse to say.
+    """
+    try:
+        _build_report(outcome)
+    except CampaignError as error:
+        print_warning(f"no report: {error}")
+        return error.exit_code
+    except KeyboardInterrupt:
+        print_note("no report: interrupted")
+        return ExitCode.INTERRUPTED
+    except Exception as error:
+        if outcome.exit_code is ExitCode.DONE:
+            raise
+        print_warning(
+            f"no report: internal error: {type(error).__name__}: {error}\n"
+            f"This is a bug; campaign report {reference(outcome.archive)} shows it again."
+        )
+    return ExitCode.DONE
+
+
+def _build_report(outcome: RunOutcome) -> None:
+    from campaign.cli.report import report_run
+
+    archive: Path = outcome.archive
+    if outcome.exit_code is ExitCode.INTERRUPTED:
+        name = reference(archive)
+        print_note(f"no report of an interrupted run; `campaign report {name}` makes one")
+        return
+    page = report_run(str(archive), archive.parent, None, None, open_it=False)
+    print_note(f"report: {page}")

@@ -1,0 +1,69 @@
+"""What the protocol's policy makes of a trial that failed, and when the bench has to rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from campaign.policy import Policy, Rest
+from campaign.trial import Ending, Trial
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is done about a failed trial.
+
+    Attributes:
+        pause: what is waited before a retry (s).
+        reason: why the trial failed, and which retry this is or that it was the last.
+    """
+
+    do: Literal["retry", "skip", "abort"]
+    reason: str
+    pause: float = 0.0
+
+
+class Responses:
+    """Applies a policy; remembers how often each trial was executed again in this session."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self._retries: dict[int, int] = {}
+
+    def choose(self, trial: Trial, ending: Ending) -> Choice:
+        """What to do about a trial that ended in any way but completed or interrupted."""
+        response = self._policy.response(ending)
+        what = str(ending.fault or ending.outcome)
+        reason = f"{what}: {ending.reason}" if ending.reason else what
+        if response.do != "retry":
+            return Choice(response.do, reason)
+        retries = self._retries.get(trial.number, 0)
+        if retries >= response.times:
+            return Choice(response.then, f"{reason}; after {_times(retries, 'retry', 'retries')}")
+        self._retries[trial.number] = retries + 1
+        return Choice("retry", f"{reason}; retry {retries + 1} of {response.times}", response.pause)
+
+
+class Rests:
+    """Counts bench time (s) until the bench has to rest."""
+
+    def __init__(self, rest: Rest | None) -> None:
+        self._rest = rest
+        self._since = 0.0
+
+    def worked(self, seconds: float) -> None:
+        """The bench was in use for so long."""
+        self._since += seconds
+
+    @property
+    def due(self) -> Rest | None:
+        """The rest that has to be taken before the next trial, or None."""
+        return self._rest if self._rest is not None and self._since >= self._rest.every else None
+
+    def taken(self) -> None:
+        """The bench has rested."""
+        self._since = 0.0
+
+
+def _times(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"

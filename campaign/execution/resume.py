@@ -1,0 +1,182 @@
+"""Going on with a run: whether it can be, what of it is done, and what has changed since."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from campaign.archive import PlannedTrial, RunReader, RunStatus
+from campaign.errors import UsageError
+from campaign.trial import Outcome, Tree, Trial, canonical_json
+
+SHOWN = 20
+"""Differences that are shown one by one."""
+
+RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
+
+_SETTLED = (Outcome.COMPLETED, Outcome.LIMIT, Outcome.DIVERGED)
+_WIDTH = 60
+_ABSENT = object()
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a run's samples depend on, as trees that can be compared.
+
+    Attributes:
+        normalised: the protocol's, as `Plan.normalised`; what else is in it is not compared.
+        versions: of the program and the libraries that make samples.
+    """
+
+    normalised: Tree
+    backend: str
+    backend_options: Tree
+    versions: Mapping[str, str]
+
+
+def check_resumable(run: RunReader) -> None:
+    """UsageError when there is nothing to go on with.
+
+    A folder whose end was written but which was killed while it was sealed can always go on.
+    """
+    if run.sealed and run.status not in RESUMABLE:
+        raise UsageError(
+            f"{run.name}: is {run.status.value}: every planned trial was executed, and there is "
+            "nothing to go on with; `campaign run` makes a new run"
+        )
+
+
+def not_repeated(run: RunReader) -> dict[int, Outcome]:
+    """The trials that are done, by number, and how they ended.
+
+    A fault is done when the policy skipped it; one without such a decision ended the run, or its
+    retry never came.
+    """
+    skipped = set(_skipped(run.journal))
+    return {
+        each.trial.number: each.ending.outcome
+        for each in run.trials
+        if each.ending.outcome in _SETTLED
+        or (each.ending.outcome is Outcome.FAULT and each.trial.number in skipped)
+    }
+
+
+def _skipped(journal: str) -> Iterator[int]:
+    """Numbers of the trials whose last attempt was followed by the decision to skip them."""
+    last: dict[int, str] = {}
+    for line in journal.splitlines():
+        entry = json.loads(line)
+        trial = entry.get("trial")
+        if entry["event"] == "trial finished":
+            last[trial] = "finished"
+        elif entry["event"] == "decision" and trial is not None:
+            last[trial] = entry["decision"]
+    return (trial for trial, what in last.items() if what == "skip")
+
+
+def archived_conditions(run: RunReader) -> Conditions:
+    """What the run began with."""
+    header = run.header
+    return Conditions(
+        header.normalised, header.backend, header.backend_options, dict(header.versions)
+    )
+
+
+def differences(was: Conditions, now: Conditions) -> list[str]:
+    """Every field that differs, as `dotted.path: was → is`, in the paths that `--set` takes.
+
+    What several tests share, such as a bench, is named once.
+    """
+    found = [_line("backend", was.backend, now.backend)] if was.backend != now.backend else []
+    found += [
+        _line(f"backend.{path}", *values)
+        for path, *values in _compare(was.backend_options, now.backend_options)
+    ]
+    found += _of_tests(_by_name(was.normalised), _by_name(now.normalised))
+    found += [
+        _line(f"versions.{path}", *values)
+        for path, *values in _compare(dict(was.versions), dict(now.versions))
+    ]
+    return found
+
+
+def trial_differences(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> list[str]:
+    """Trials that are not what they were although no field says why: the program has changed."""
+    return [
+        f"{trial.name}.fingerprint: {was.fingerprint[:12]} → {trial.fingerprint[:12]}"
+        for was, trial in zip(planned, trials, strict=True)
+        if was.fingerprint != trial.fingerprint
+    ]
+
+
+def same_list(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> bool:
+    """Whether both plans have the same trials in the same order, whatever is in them."""
+
+    def key(trial: PlannedTrial | Trial) -> tuple[object, ...]:
+        return (trial.number, trial.test, trial.kind, trial.role, trial.label)
+
+    return list(map(key, planned)) == list(map(key, trials))
+
+
+def listed(lines: Sequence[str]) -> str:
+    """The first of them, one a line, and how many more there are."""
+    more = len(lines) - SHOWN
+    shown = [f"  {line}" for line in lines[:SHOWN]]
+    return "\n".join([*shown, *([f"  and {more} more"] if more > 0 else [])])
+
+
+def _by_name(normalised: Tree) -> dict[str, Any]:
+    """The tests by name, their options where `--set` has them, axes by path."""
+    tests: Any = json.loads(canonical_json(normalised.get("tests", [])))
+    trees = {}
+    for test in tests:
+        rest = {key: value for key, value in test.items() if key not in ("name", "options")}
+        rest["matrix"] = dict(test.get("matrix", []))
+        trees[test["name"]] = {**test.get("options", {}), **rest}
+    return trees
+
+
+def _of_tests(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for name in dict.fromkeys((*was, *now)):
+        for path, before, after in _compare(was.get(name, _ABSENT), now.get(name, _ABSENT)):
+            found.setdefault((path, _short(before), _short(after)), []).append(name)
+    lines = []
+    for (path, before, after), names in found.items():
+        place = ".".join(filter(None, (names[0], path)))
+        others = f" (and in {len(names) - 1} other tests)" if len(names) > 1 else ""
+        lines.append(f"{place}{others}: {before} → {after}")
+    return lines
+
+
+def _compare(was: Any, now: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in dict.fromkeys((*was, *now)):
+            below = f"{path}.{key}" if path else str(key)
+            yield from _compare(was.get(key, _ABSENT), now.get(key, _ABSENT), below)
+    elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        for index, (one, other) in enumerate(zip(was, now, strict=True)):
+            yield from _compare(one, other, f"{path}[{index}]")
+    elif _differ(was, now):
+        yield path, was, now
+
+
+def _differ(was: Any, now: Any) -> bool:
+    if was is _ABSENT or now is _ABSENT:
+        return was is not now
+    return canonical_json(was) != canonical_json(now)
+
+
+def _line(path: str, was: Any, now: Any) -> str:
+    return f"{path}: {_short(was)} → {_short(now)}"
+
+
+def _short(value: Any) -> str:
+    if value is _ABSENT:
+        return "absent"
+    if isinstance(value, dict):
+        return "present"
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _WIDTH else text[: _WIDTH - 3] + "..."

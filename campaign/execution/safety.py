@@ -1,0 +1,142 @@
+"""Bringing the bench to rest however a run ends, and saying first when nobody saw that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.backends.interface import Backend
+from campaign.errors import BackendError, CampaignError, ExitCode
+from campaign.execution.naming import how_to_go_on
+from campaign.trial import SafeState
+
+NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
+
+
+class AbortedError(CampaignError):
+    """The run was stopped at once, by force: what it had finished is kept, unsealed."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
+class NotSafeError(CampaignError):
+    """The run broke off and nobody saw the bench safe: that comes before why it broke off."""
+
+    exit_code = ExitCode.NOT_SAFE
+
+
+@dataclass
+class Ended:
+    """What ended the run early, and how the bench was left.
+
+    Attributes:
+        kept: where the finished trials are: the open run, and once it is sealed the archive; None
+            when nothing was begun.
+        fault: why the run cannot go on, or empty.
+        bug: an exception that no backend should raise.
+        safe_state: what the backend said last.
+        unsafe: why the safe state could not be confirmed, or empty.
+    """
+
+    kept: Path | None = None
+    fault: str = ""
+    bug: Exception | None = None
+    safe_state: SafeState = SafeState.NOT_CONFIRMED
+    unsafe: str = ""
+
+
+@contextmanager
+def unsafe_first(ended: Ended) -> Iterator[None]:
+    """Whatever ends the block: a bench not known to be safe is said first, with its own code."""
+    try:
+        yield
+    except BaseException as error:
+        if ended.unsafe:
+            kept = f"; the finished trials are in {ended.kept}" if ended.kept else ""
+            raise NotSafeError(f"{NOT_SAFE}; {ended.unsafe}; and {_why(error)}{kept}") from error
+        raise
+
+
+@contextmanager
+def safe_afterwards(backend: Backend, ended: Ended) -> Iterator[None]:
+    """Bring the bench to rest however the block ends, and note whether that was seen."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        make_safe(backend, ended)
+        go_on = f"; {how_to_go_on(ended.kept)}" if ended.kept else ""
+        kept = f"; the finished trials are in {ended.kept}" if ended.kept else ""
+        raise AbortedError(f"stopped at once{kept}{go_on}") from None
+    except BaseException:
+        make_safe(backend, ended)
+        raise
+    else:
+        make_safe(backend, ended)
+
+
+@contextmanager
+def safe_when_broken_off(backend: Backend) -> Iterator[None]:
+    """Bring a connected bench to rest when the block raises, before any trial was begun."""
+    ended = Ended()
+    with unsafe_first(ended):
+        try:
+            yield
+        except BaseException:
+            make_safe(backend, ended)
+            raise
+
+
+@contextmanager
+def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend]:
+    """A connected backend. Letting go of it cannot hide what happened in the block.
+
+    Raises BackendError when letting go fails after a block that did not raise; after one that did,
+    its error goes on and `tell` is told of the other.
+    """
+    entered = backend.__enter__()
+    try:
+        yield entered
+    except BaseException as error:
+        try:
+            backend.__exit__(type(error), error, error.__traceback__)
+        except Exception as second:  # noqa: BLE001 - the first one says more
+            tell(f"and {_let_go(second)}")
+        raise
+    try:
+        backend.__exit__(None, None, None)
+    except Exception as error:
+        raise BackendError(_let_go(error)) from error
+
+
+def make_safe(backend: Backend, ended: Ended) -> None:
+    """Tell the bench to come to rest; afterwards `ended` says whether it was seen to."""
+    ended.safe_state = SafeState.NOT_CONFIRMED
+    ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off
+    try:
+        ended.safe_state = backend.make_safe()
+    except KeyboardInterrupt:
+        ended.unsafe = "making the bench safe was interrupted"
+        raise
+    except Exception as error:  # noqa: BLE001 - nothing may hide that the bench is not safe
+        ended.unsafe = f"making the bench safe failed: {describe(error)}"
+    else:
+        safe = ended.safe_state is SafeState.CONFIRMED
+        ended.unsafe = "" if safe else "the bench was not seen at rest with its drive off"
+
+
+def describe(error: BaseException) -> str:
+    """An exception nobody expected, by its type and what it says."""
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+def _let_go(error: Exception) -> str:
+    what = str(error) if isinstance(error, CampaignError) else describe(error)
+    return f"the backend could not let go of the bench: {what}"
+
+
+def _why(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "the run was stopped at once"
+    return str(error) if isinstance(error, CampaignError) else f"internal error: {describe(error)}"
