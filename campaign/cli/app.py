@@ -70,6 +70,39 @@ TemplatesOption = Annotated[
         show_default=False,
     ),
 ]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        metavar="N",
+        min=1,
+        max=256,
+        help="Trials executed at once, where the backend can; one per processor if absent.",
+        show_default=False,
+    ),
+]
+ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="For scripts: ask nobody, also not before a bench moves.")
+]
+PortOption = Annotated[
+    str | None,
+    typer.Option(
+        "--port",
+        metavar="PORT",
+        help="Where the controller is; short for --set backend.port=PORT.",
+        show_default=False,
+    ),
+]
+FromOption = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="RUN",
+        help="The run to replay; short for --set backend.run=RUN.",
+        show_default=False,
+    ),
+]
 RESULTS = Path("results")
 
 
@@ -113,26 +146,70 @@ def run(
     results: ResultsOption = RESULTS,
     only: OnlyOption = None,
     changes: SetOption = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers",
-            metavar="N",
-            min=1,
-            max=256,
-            help="Trials executed at once, where the backend can; one per processor if absent.",
-            show_default=False,
-        ),
+    workers: WorkersOption = None,
+    report: ReportOption = False,
+    port: PortOption = None,
+    source: FromOption = None,
+    operator: Annotated[
+        str, typer.Option("--operator", metavar="NAME", help="Who is responsible for the run.")
+    ] = "",
+    note: Annotated[
+        str, typer.Option("--note", metavar="TEXT", help="Anything worth keeping with the run.")
+    ] = "",
+    tags: Annotated[
+        list[str] | None,
+        typer.Option("--tag", metavar="WORD", help="To find the run by; may be given again."),
     ] = None,
-    report: Annotated[bool, typer.Option("--report", help="Build the report as well.")] = False,
+    yes: YesOption = False,
     allow_large: LargeOption = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
-    from campaign.cli.prepare import Request
-    from campaign.cli.run import run_protocol
+    from campaign.cli.prepare import Request, short_settings
+    from campaign.cli.run import Remarks, run_protocol
 
-    request = Request(protocol, tuple(only or ()), tuple(changes or ()), backend, allow_large)
-    raise typer.Exit(run_protocol(request, results, workers=workers, report=report))
+    settings = (*(changes or ()), *short_settings(port, source, results))
+    request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
+    remarks = Remarks(operator, note, tuple(tags or ()))
+    raise typer.Exit(
+        run_protocol(request, results, workers=workers, report=report, yes=yes, remarks=remarks)
+    )
+
+
+@app.command()
+def resume(
+    run: RunArgument,
+    results: ResultsOption = RESULTS,
+    accept_changes: Annotated[
+        bool,
+        typer.Option(
+            "--accept-changes",
+            help="Go on although protocol, bench, backend or versions have changed since.",
+        ),
+    ] = False,
+    workers: WorkersOption = None,
+    report: ReportOption = False,
+    yes: YesOption = False,
+) -> None:
+    """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
+    from campaign.cli.resume import resume_run
+
+    raise typer.Exit(
+        resume_run(
+            run, results, accept_changes=accept_changes, workers=workers, report=report, yes=yes
+        )
+    )
+
+
+@app.command()
+def rerun(
+    run: RunArgument,
+    trial: Annotated[str, typer.Argument(metavar="TRIAL", help="Its number, or its name.")],
+    results: ResultsOption = RESULTS,
+) -> None:
+    """Execute one archived trial again on the simulated bench, and compare it bit by bit."""
+    from campaign.cli.rerun import rerun_trial
+
+    raise typer.Exit(rerun_trial(run, trial, results))
 
 
 @app.command()

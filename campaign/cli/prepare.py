@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from campaign.archive import find_run
 from campaign.backends import backends
 from campaign.backends.interface import Backend, BackendKind
 from campaign.errors import UsageError
@@ -17,17 +20,24 @@ from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
 from campaign.protocol.overrides import parse_overrides
 from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
+from campaign.trial import Trial
 
 
 @dataclass(frozen=True)
 class Request:
-    """What `plan` and `run` have in common, as typed."""
+    """What `plan` and `run` have in common, as typed.
+
+    Attributes:
+        changes: every `--set`, those of the backend included.
+        seed: for tests without their own; drawn when None.
+    """
 
     protocol: str
     only: tuple[str, ...] = ()
     changes: tuple[str, ...] = ()
     backend: str = "sim"
     allow_large: bool = False
+    seed: int | None = None
 
 
 @dataclass(frozen=True)
@@ -41,15 +51,7 @@ class Prepared:
 
     def open_backend(self) -> Backend:
         """A backend that accepts every trial of the plan. Raises UsageError when it does not."""
-        backend = self.kind.open(self.options)
-        for trial in self.plan.trials:
-            why = backend.refuses(trial)
-            if why:
-                raise UsageError(
-                    f"the backend {self.kind.name!r} cannot execute {trial.name} "
-                    f"({trial.label}): {why}"
-                )
-        return backend
+        return open_backend(self.kind, self.options, self.plan.trials)
 
 
 def prepare(request: Request) -> Prepared:
@@ -60,8 +62,32 @@ def prepare(request: Request) -> Prepared:
     theirs = tuple(text for text in request.changes if text not in ours)
     options = backend_options(kind, ours)
     protocol = load_protocol(path, experiments(), overrides=theirs, shipped=protocols_folder())
-    plan = make_plan(protocol, only=request.only, allow_large=request.allow_large)
+    plan = make_plan(
+        protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
+    )
     return Prepared(path, plan, kind, options)
+
+
+def open_backend(kind: BackendKind, options: Options, trials: Sequence[Trial]) -> Backend:
+    """A backend that accepts every one of `trials`. Raises UsageError when it does not."""
+    backend = kind.open(options)
+    for trial in trials:
+        why = backend.refuses(trial)
+        if why:
+            raise UsageError(
+                f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label}): {why}"
+            )
+    return backend
+
+
+def short_settings(port: str | None, source: str | None, results: Path) -> tuple[str, ...]:
+    """`--port` and `--from` as the `--set` they are short for; a run is looked for in `results`."""
+    settings = {"port": port, "run": str(find_run(results, source)) if source else None}
+    return tuple(
+        f"backend.{name}={json.dumps(value, ensure_ascii=False)}"  # a TOML string, too
+        for name, value in settings.items()
+        if value is not None
+    )
 
 
 def find_protocol(text: str) -> Path:

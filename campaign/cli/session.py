@@ -49,8 +49,20 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
     `open_archive` is called once the bench is connected: a bench that is not there leaves no run.
     """
     began = time.monotonic()
+    outcome, code = execute(session, open_archive)
+    codes = [code]
+    say_outcome(outcome, time.monotonic() - began)
+    try:
+        if report:
+            codes.append(_report(outcome))
+    finally:
+        print_line(str(outcome.archive))
+    return worst_exit_code(codes)
+
+
+def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[RunOutcome, ExitCode]:
+    """Connect, execute, seal and let go; also the exit code that follows from all of it."""
     outcome: RunOutcome | None = None
-    codes: list[ExitCode] = []
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
@@ -65,15 +77,8 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
         if outcome is None:
             raise
         print_warning(str(error))
-        codes.append(error.exit_code)
-    say_outcome(outcome, time.monotonic() - began)
-    codes.append(outcome.exit_code)
-    try:
-        if report:
-            codes.append(_report(outcome))
-    finally:
-        print_line(str(outcome.archive))
-    return worst_exit_code(codes)
+        return outcome, worst_exit_code([outcome.exit_code, error.exit_code])
+    return outcome, outcome.exit_code
 
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
@@ -107,7 +112,8 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     """How the run ended, and what can be done about it."""
     done = outcome.outcomes.get(Outcome.COMPLETED, 0)
     failed = {o.value: n for o, n in outcome.outcomes.items() if o is not Outcome.COMPLETED}
-    counts = ", ".join([f"{done} trials done", *(f"{n} {word}" for word, n in failed.items())])
+    trials = "trial" if done == 1 else "trials"
+    counts = ", ".join([f"{done} {trials} done", *(f"{n} {word}" for word, n in failed.items())])
     reason = f" ({outcome.reason})" if outcome.reason else ""
     go_on = ""
     if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from campaign.archive import PlannedTrial, RunReader, RunStatus
+from campaign.archive import PlannedTrial, RunReader
+from campaign.archive.journal import Decision, TrialFinished, parse_journal
+from campaign.archive.resuming import RESUMABLE
 from campaign.errors import UsageError
 from campaign.trial import Outcome, Tree, Trial, canonical_json
 
 SHOWN = 20
 """Differences that are shown one by one."""
-
-RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
 
 _SETTLED = (Outcome.COMPLETED, Outcome.LIMIT, Outcome.DIVERGED)
 _WIDTH = 60
@@ -39,12 +39,17 @@ class Conditions:
 def check_resumable(run: RunReader) -> None:
     """UsageError when there is nothing to go on with.
 
-    A folder whose end was written but which was killed while it was sealed can always go on.
+    A folder always can: if it tells of an end, the program was killed before it was sealed.
     """
     if run.sealed and run.status not in RESUMABLE:
         raise UsageError(
             f"{run.name}: is {run.status.value}: every planned trial was executed, and there is "
             "nothing to go on with; `campaign run` makes a new run"
+        )
+    if run.header.seed is None:
+        raise UsageError(
+            f"{run.name}: was begun by an earlier program, which did not keep the seed; start a "
+            "new run"
         )
 
 
@@ -54,7 +59,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     A fault is done when the policy skipped it; one without such a decision ended the run, or its
     retry never came.
     """
-    skipped = set(_skipped(run.journal))
+    skipped = set(_skipped(run))
     return {
         each.trial.number: each.ending.outcome
         for each in run.trials
@@ -63,17 +68,15 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     }
 
 
-def _skipped(journal: str) -> Iterator[int]:
+def _skipped(run: RunReader) -> Iterator[int]:
     """Numbers of the trials whose last attempt was followed by the decision to skip them."""
-    last: dict[int, str] = {}
-    for line in journal.splitlines():
-        entry = json.loads(line)
-        trial = entry.get("trial")
-        if entry["event"] == "trial finished":
-            last[trial] = "finished"
-        elif entry["event"] == "decision" and trial is not None:
-            last[trial] = entry["decision"]
-    return (trial for trial, what in last.items() if what == "skip")
+    skipped: dict[int, bool] = {}
+    for entry in parse_journal(run.path, run.journal.encode()).entries:
+        if isinstance(entry, TrialFinished):
+            skipped[entry.trial] = False
+        elif isinstance(entry, Decision) and entry.trial is not None and entry.decision == "skip":
+            skipped[entry.trial] = True
+    return (trial for trial, skip in skipped.items() if skip)
 
 
 def archived_conditions(run: RunReader) -> Conditions:

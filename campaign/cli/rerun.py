@@ -1,0 +1,107 @@
+"""`campaign rerun`: one archived trial again on the simulated bench, compared bit by bit."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+from campaign.archive import (
+    ArchivedTrial,
+    RunHeader,
+    RunReader,
+    RunStatus,
+    RunWriter,
+    find_run,
+    new_run_name,
+    open_run,
+)
+from campaign.cli.output import print_line, print_note
+from campaign.cli.prepare import find_backend, open_backend
+from campaign.cli.session import Session, execute
+from campaign.errors import ExitCode, UsageError
+from campaign.execution import provenance
+from campaign.execution.comparison import differences
+from campaign.policy import Policy
+from campaign.trial import Recording
+
+SIM = "sim"
+
+
+def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
+    """Execute an archived trial again; the new archive's path is the last line of output."""
+    run = open_run(find_run(results, name))
+    archived = find_trial(run, wanted)
+    before = archived.recording()
+    kind = find_backend(SIM)
+    simulated = run.header.backend == SIM
+    tree = run.header.backend_options if simulated else {}
+    options = kind.options.model_validate(tree, context={"si": True})
+    trial = archived.trial.model_copy(update={"number": 1})  # it is the only one of its run
+    session = Session(kind, open_backend(kind, options, [trial]), [trial], Policy(), workers=1)
+    header = _header(run, archived, results, options.model_dump(mode="json"))
+    outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial]))
+    if outcome.status is RunStatus.INTERRUPTED:
+        print_note("interrupted: nothing was compared")
+        print_line(str(outcome.archive))
+        return code
+    if not simulated:
+        print_note(
+            f"{run.name} was executed on {run.header.backend!r}: its samples were measured, those "
+            "beside them are the simulation's"
+        )
+    (again,) = open_run(outcome.archive).trials
+    code = _say(f"{archived.trial.name} of {run.name}", before, again.recording())
+    print_line(str(outcome.archive))
+    return code
+
+
+def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
+    """The executed trial of that number or name. Raises UsageError when there is none."""
+    match = re.fullmatch(r"(?:trial[-_])?([0-9]{1,10})", wanted)
+    if match is None:
+        raise UsageError(f"{wanted!r} is neither the number nor the name of a trial: trial-00017")
+    number = int(match.group(1))
+    for archived in run.trials:
+        if archived.trial.number == number:
+            return archived
+    planned = any(each.number == number for each in run.plan)
+    what = "was planned but not executed" if planned else f"is not among its {len(run.plan)} trials"
+    raise UsageError(f"{run.name}: trial {number} {what}")
+
+
+def _say(what: str, before: Recording, again: Recording) -> ExitCode:
+    found = differences(before, again)
+    if not found:
+        size = f"{len(before.channels)} channels of {len(before.time)} samples"
+        print_line(f"{what}: equal to the bit, {size}")
+        return ExitCode.DONE
+    print_line(f"{what}: different")
+    for line in found:
+        print_line(f"  {line}")
+    return ExitCode.TRIALS_FAILED
+
+
+def _header(
+    run: RunReader, archived: ArchivedTrial, results: Path, options: dict[str, object]
+) -> RunHeader:
+    now = datetime.now(UTC)
+    trial, was = archived.trial, run.header
+    stem = f"rerun-{trial.name}-{was.protocol_name or 'run'}"
+    return was.model_copy(
+        update={
+            "name": new_run_name(results, stem, now),
+            "created": now.isoformat(timespec="milliseconds"),
+            "title": f"{trial.label}, repeated",
+            "notes": f"repeats {trial.name} of {run.name}",
+            "tags": ("rerun",),
+            "tests": tuple(test for test in was.tests if test.get("name") == trial.test),
+            "only": (trial.test,),
+            "backend": SIM,
+            "backend_options": options,
+            "versions": provenance.versions(),
+            "host": provenance.host(),
+            "command": provenance.command(),
+            "protocol_path": "",
+        }
+    )

@@ -1,0 +1,146 @@
+"""`campaign resume`: go on with a run that was interrupted, killed or ended by a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive import RunReader, RunWriter, find_run, open_run
+from campaign.archive.full_plan import read_full_plan
+from campaign.backends.interface import BackendKind
+from campaign.cli.ask import allow_motion
+from campaign.cli.output import print_note
+from campaign.cli.prepare import Request, find_backend, open_backend, prepare
+from campaign.cli.session import Session, choose_workers, conduct, print_warning
+from campaign.errors import ExitCode, UsageError
+from campaign.execution import provenance
+from campaign.execution.attempt import utc_now
+from campaign.execution.resume import (
+    Conditions,
+    archived_conditions,
+    check_resumable,
+    differences,
+    listed,
+    not_repeated,
+    same_list,
+    trial_differences,
+)
+from campaign.options import Options
+from campaign.policy import Policy
+from campaign.protocol import PlannedTest, check_limits
+from campaign.trial import Trial
+
+
+@dataclass(frozen=True)
+class Remade:
+    """The plan as it would be executed today, and how it differs from the archived one."""
+
+    kind: BackendKind
+    options: Options
+    trials: tuple[Trial, ...]
+    tests: tuple[PlannedTest, ...]
+    policy: Policy
+    changes: tuple[str, ...]
+
+
+def resume_run(
+    name: str,
+    results: Path,
+    *,
+    accept_changes: bool,
+    workers: int | None,
+    report: bool,
+    yes: bool,
+) -> ExitCode:
+    """Execute what is left of a run; the archive's path is the last line of standard output."""
+    path = find_run(results, name)
+    run = open_run(path)
+    check_resumable(run)
+    remade = remake(run)
+    _check_changes(run, remade.changes, accepted=accept_changes)
+    finished = not_repeated(run)
+    left = [trial for trial in remade.trials if trial.number not in finished]
+    workers = choose_workers(remade.kind, len(left), workers)
+    backend = open_backend(remade.kind, remade.options, left)
+    print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
+    allow_motion(remade.kind, left, remade.tests, yes=yes)
+
+    def open_archive() -> RunWriter:
+        return RunWriter.resume(
+            path,
+            at=utc_now(),
+            host=provenance.host(),
+            versions=provenance.versions(),
+            command=provenance.command(),
+            changes=remade.changes,
+        )
+
+    session = Session(
+        remade.kind, backend, remade.trials, remade.policy, workers, yes, finished=finished
+    )
+    return conduct(session, open_archive, report=report)
+
+
+def remake(run: RunReader) -> Remade:
+    """Plan again from the protocol's file; from the archive when that is gone."""
+    protocol = Path(run.header.protocol_path)
+    if run.header.protocol_path and protocol.exists():
+        return _from_protocol(run, protocol)
+    where = f"the protocol {protocol} is gone" if run.header.protocol_path else "no protocol's file"
+    print_warning(f"{where}: going on with the plan that is in the archive")
+    return _from_archive(run)
+
+
+def _from_protocol(run: RunReader, protocol: Path) -> Remade:
+    header = run.header
+    request = Request(
+        str(protocol),
+        only=header.only,
+        changes=tuple(f"{path}={value}" for path, value in header.overrides.items()),
+        backend=header.backend,
+        allow_large=True,
+        seed=header.seed,
+    )
+    prepared = prepare(request)
+    plan = prepared.plan
+    now = Conditions(
+        plan.normalised,
+        prepared.kind.name,
+        prepared.options.model_dump(mode="json"),
+        provenance.versions(),
+    )
+    changes = differences(archived_conditions(run), now)
+    if not same_list(run.plan, plan.trials):
+        why = f":\n{listed(changes)}" if changes else ""
+        raise UsageError(
+            f"{run.name}: its {len(run.plan)} trials are not those that {protocol} makes today "
+            f"({len(plan.trials)}){why}\nstart a new run"
+        )
+    check_limits(plan)
+    changes = changes or trial_differences(run.plan, plan.trials)
+    return Remade(
+        prepared.kind, prepared.options, plan.trials, plan.tests, plan.policy, tuple(changes)
+    )
+
+
+def _from_archive(run: RunReader) -> Remade:
+    header = run.header
+    kind = find_backend(header.backend)
+    options = kind.options.model_validate(header.backend_options, context={"si": True})
+    was = archived_conditions(run)
+    now = Conditions(
+        was.normalised, kind.name, options.model_dump(mode="json"), provenance.versions()
+    )
+    policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
+    trials = tuple(read_full_plan(run.path).trials())
+    return Remade(kind, options, trials, (), policy, tuple(differences(was, now)))
+
+
+def _check_changes(run: RunReader, changes: Sequence[str], *, accepted: bool) -> None:
+    if not changes:
+        return
+    text = f"{run.name}: not everything is as it was when the run began:\n{listed(changes)}"
+    if not accepted:
+        raise UsageError(f"{text}\n--accept-changes goes on all the same, with what it is today")
+    print_warning(text)
