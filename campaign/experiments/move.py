@@ -1,0 +1,126 @@
+"""Moving the axis to an angle, or to and fro to warm it up: a trial like others, not analysed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from campaign.experiments.common import failures_note
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Column, Result, Table, Value
+from campaign.signals import Polyline
+from campaign.trial import Role, Task, TrialRequest
+from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
+
+LOOKED_AT = 0.1
+"""s at the end of a trial over which the reached angle is averaged."""
+
+
+class MoveOptions(Options):
+    """Options of a move."""
+
+    angle: Angle
+    """Angle of the load relative to the hull to move to."""
+    position: Angle = 0.0
+    """Angle of the load relative to the hull at the start."""
+    speed: AngularRate = Field(default=math.radians(5.0), gt=0)
+    """Rate between the ramps; a short way is over before it is reached."""
+    acceleration: AngularAcceleration = Field(default=math.radians(20.0), gt=0)
+    """Of the ramps at either end."""
+    role: Literal["home", "warm-up"] = "home"
+    """What it is for: brings the axis to where the next test begins, or warms it up."""
+    cycles: int = Field(default=0, ge=0, le=10_000)
+    """How often it goes there and back; 0: there, and stays."""
+    rest: Time = Field(default=0.5, ge=0.2)
+    """Standstill after each way."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def trapezoid(travel: float, speed: float, acceleration: float) -> tuple[float, float, float]:
+    """Duration of a ramp (s), of the stretch between the ramps (s), and the rate there (rad/s).
+
+    The integral over both ramps and the stretch is `travel` (rad), whatever its sign; where the way
+    is too short for `speed` (rad/s), it is a triangle.
+    """
+    way = abs(travel)
+    peak = min(speed, math.sqrt(way * acceleration))
+    ramp = peak / acceleration
+    stretch = max(0.0, way / peak - ramp)
+    return ramp, stretch, math.copysign(peak, travel)
+
+
+def _trials(options: MoveOptions, bench: Bench) -> Iterator[TrialRequest]:
+    travel = options.angle - options.position
+    if travel == 0:
+        raise ValueError("'angle' and 'position' are equal: there is nothing to move")
+    if options.role == "warm-up" and not options.cycles:
+        raise ValueError("a warm-up goes to and fro: set cycles")
+    ways = [travel, -travel] * options.cycles or [travel]
+    times, values = [0.0], [0.0]
+    for way in ways:
+        ramp, stretch, rate = trapezoid(way, options.speed, options.acceleration)
+        for step, value in ((ramp, rate), (stretch, rate), (ramp, 0.0), (options.rest, 0.0)):
+            times.append(times[-1] + step)
+            values.append(value)
+    yield TrialRequest(
+        Task(
+            mode="rate",
+            command=Polyline(times=tuple(times), values=tuple(values)),
+            duration=times[-1],
+            window=(times[-1] - options.rest, times[-1]),
+            sample_rate=options.sample_rate,
+            start_angle=options.position,
+        ),
+        role=Role(options.role),
+    )
+
+
+def _analyse(data: TestData) -> Result:
+    rows = [_row(item) for item in data.trials if item.ending.outcome == "completed"]
+    notes = failures_note(data)
+    if not rows:
+        return Result(notes=notes)
+    table = Table(
+        key="moves",
+        title="Where the axis was moved to",
+        columns=(
+            Column("trial", "Trial"),
+            Column("role", "Role"),
+            Column("target", "End of the command", "rad", "deg"),
+            Column("reached", "Reached", "rad", "deg"),
+            Column("deviation", "Deviation", "rad", "deg"),
+        ),
+        rows=tuple(rows),
+        thesis=(),
+        note="The rate loop follows a rate; what friction holds back on the way, it does not undo.",
+    )
+    return Result((table,), notes=notes)
+
+
+def _row(data: TrialData) -> dict[str, Value]:
+    options = MoveOptions.model_validate(data.trial.options, context={"si": True})
+    target = options.position if options.cycles else options.angle
+    recording = data.recording()
+    row: dict[str, Value] = {"trial": data.trial.name, "role": data.trial.role.value}
+    row |= {"target": target, "reached": None, "deviation": None}
+    last = recording["relative_angle"][recording.time >= data.trial.task.duration - LOOKED_AT]
+    if last.size and np.isfinite(last).all():
+        reached = float(last.mean())
+        row |= {"reached": reached, "deviation": reached - target}
+    return row
+
+
+EXPERIMENT = Experiment(
+    name="move",
+    summary="moving the axis to an angle, or to and fro to warm it up; nothing is measured",
+    options=MoveOptions,
+    trials=_trials,
+    analyse=_analyse,
+)
