@@ -90,7 +90,7 @@ class Numbering:
 
     def __init__(self) -> None:
         self._hello: tuple[int, int] | None = None
-        self._last = (0, 0)
+        self._last: tuple[int, int | None] = (0, None)
 
     def same_session(self, session: int) -> bool:
         """Whether HELLO renews the session there is."""
@@ -100,7 +100,7 @@ class Numbering:
         """An accepted HELLO; one that was heard before (late or twice) changes nothing."""
         if self._hello != (session, sequence):
             self._hello = (session, sequence)
-            self._last = (sequence, 0)
+            self._last = (sequence, None)
 
     def turn(self, kind: int, sequence: int, body: bytes) -> Turn:
         """Judge a command, and remember it when it is new and neither HELLO nor SAFE."""
@@ -108,7 +108,7 @@ class Numbering:
             return Turn.NEW
         if self._hello is None:
             return Turn.OUT_OF_ORDER
-        this = (sequence, zlib.crc32(body, kind))
+        this = (sequence, zlib.crc32(bytes((kind,)) + body))
         if this == self._last:
             return Turn.REPEATED
         if sequence != (self._last[0] + 1) % 2**16:
