@@ -23,29 +23,9 @@ LARGEST = 2**31 - 1
 
 _LONGEST = 63  # characters of a name
 _STRUCTS = ("units", "labels", "trial")
-_KEYWORDS = frozenset(
-    [
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-        "otherwise",
-        "parfor",
-        "persistent",
-        "return",
-        "spmd",
-        "switch",
-        "try",
-        "while",
-    ]
+_KEYWORDS = (
+    "break case catch classdef continue else elseif end for function global if otherwise parfor "
+    "persistent return spmd switch try while"
 )
 
 
@@ -76,7 +56,7 @@ def check_size(name: str, samples: int) -> None:
 
 def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """Each name as MATLAB accepts it: at most 63 letters, digits and `_`, and each once."""
-    used = set(taken) | _KEYWORDS
+    used = {*taken, *_KEYWORDS.split()}
     valid = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name)

@@ -1,0 +1,240 @@
+"""Archived recordings served to today's runner: raw data under a new protocol's analysis.
+
+A planned trial is answered by an archived one of the same bench and the same task; only the
+measuring window may differ, since it is the analysis' business. Every archived trial is served
+once; those that somebody interrupted are not.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
+from campaign.backends.interface import BackendKind
+from campaign.errors import ArchiveError
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.trial import (
+    ChannelInfo,
+    Ending,
+    Fault,
+    Outcome,
+    Recorder,
+    SafeState,
+    Task,
+    Tree,
+    Trial,
+    canonical_json,
+)
+
+_NOT_ASKED = {"window"}  # what a task says to an analysis alone
+_COMPARED = 2000  # archived trials among which the nearest is looked for, to explain a refusal
+_TOLD = 3  # differing fields that a refusal names
+_ABSENT = object()
+
+
+class ReplayOptions(Options):
+    """Options of the replay."""
+
+    run: str = Field(min_length=1)
+    """Path of the archive to replay, or a run's name in `results`."""
+
+
+@dataclass
+class _Alike:
+    """Archived trials of one bench and task, and the planned trials that they answer."""
+
+    archived: list[ArchivedTrial] = field(default_factory=list)
+    answers: dict[int, Trial] = field(default_factory=dict)  # by place in `archived`
+
+    def assign(self, trial: Trial) -> bool:
+        """Give `trial` the archived one that suits it best; False when all are taken.
+
+        A planned trial gives its recording up to one that it suits better, and takes the next best:
+        whatever the order of the plan, each gets its own when it is there.
+        """
+        if len(self.answers) == len(self.archived):
+            return False
+        asking: Trial | None = trial
+        while asking is not None:
+            asking = self._take(asking)
+        return True
+
+    def _take(self, trial: Trial) -> Trial | None:
+        """Assign the best place that is free or held by a trial it suits less; who had it."""
+        suits = [_likeness(trial, archived.trial) for archived in self.archived]
+        for place in sorted(range(len(suits)), key=lambda place: suits[place], reverse=True):
+            holder = self.answers.get(place)
+            if holder is None or _likeness(holder, self.archived[place].trial) < suits[place]:
+                self.answers[place] = trial
+                return holder
+        raise AssertionError("a free place suits everybody")
+
+    def answer_to(self, trial: Trial) -> ArchivedTrial | None:
+        """What was assigned to `trial`."""
+        for place, planned in self.answers.items():
+            if planned.number == trial.number:
+                return self.archived[place]
+        return None
+
+
+class ReplayBackend:
+    """Serves the trials of one archive, whichever order they are asked for in."""
+
+    def __init__(self, run: RunReader) -> None:
+        self._run = run
+        self._lock = threading.Lock()
+        self._trials = [t for t in run.trials if t.ending.outcome is not Outcome.INTERRUPTED]
+        self._alike: dict[str, _Alike] = {}
+        for archived in self._trials:
+            key = canonical_json(_asked_of_bench(archived.trial))
+            self._alike.setdefault(key, _Alike()).archived.append(archived)
+
+    def __enter__(self) -> ReplayBackend:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        return None
+
+    def refuses(self, trial: Trial) -> str | None:
+        """Why the archive has no recording for `trial`: the fields in which the nearest differs."""
+        return None if self._answer(trial) else self._why_not(trial)
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        """Copy channels, samples, events and ending of the archived trial; the same one again.
+
+        Nothing moves, so the state is safe, however the archived trial left its bench.
+        """
+        archived = self._answer(trial)
+        if archived is None:
+            return Ending(Outcome.FAULT, self._why_not(trial), fault=Fault.REFUSED)
+        if stopped():
+            return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+        try:
+            recording = archived.recording()
+        except ArchiveError as error:
+            return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
+        channels = list(recording.channels.values())
+        if channels:
+            recorder.start(
+                tuple(
+                    ChannelInfo(c.name, c.unit, c.label, c.display_unit, c.measured)
+                    for c in channels
+                )
+            )
+            recorder.append(recording.time, np.stack([channel.samples for channel in channels]))
+        for event in recording.events:
+            recorder.event(event)
+        return replace(archived.ending, safe_state=SafeState.CONFIRMED)
+
+    def make_safe(self) -> SafeState:
+        """A replay has nothing that moves."""
+        return SafeState.CONFIRMED
+
+    def _answer(self, trial: Trial) -> ArchivedTrial | None:
+        alike = self._alike.get(canonical_json(_asked_of_bench(trial)))
+        if alike is None:
+            return None
+        with self._lock:
+            if alike.answer_to(trial) is None and not alike.assign(trial):
+                return None
+            return alike.answer_to(trial)
+
+    def _why_not(self, trial: Trial) -> str:
+        asked = _asked_of_bench(trial)
+        alike = self._alike.get(canonical_json(asked))
+        if alike is not None:
+            count = len(alike.archived)
+            return f"{self._run.name} has {count} of such trials, and the plan asks for more"
+        if not self._trials:
+            return f"{self._run.name} has no recordings"
+        wanted = dict(_leaves(asked))
+        same_test_first = sorted(self._trials, key=lambda t: t.trial.test != trial.test)
+        nearest, differing = min(
+            (
+                (t, _differences(_asked_of_bench(t.trial), wanted))
+                for t in same_test_first[:_COMPARED]
+            ),
+            key=lambda pair: len(pair[1]),
+        )
+        more = f" and {len(differing) - _TOLD} more" if len(differing) > _TOLD else ""
+        return (
+            f"{self._run.name} has no such trial; the nearest, {nearest.trial.name} "
+            f"({nearest.trial.label}), differs in {'; '.join(differing[:_TOLD])}{more}"
+        )
+
+
+def _asked_of_bench(trial: Trial) -> dict[str, Any]:
+    """What determines a recording but for chance: the bench, and the task without its window.
+
+    Through today's classes, so that an option which is younger than the archive has its default.
+    """
+    task = Task.model_dump(trial.task, mode="json", exclude=_NOT_ASKED)
+    return {"bench": _normalised(canonical_json(trial.bench)), "task": task}
+
+
+@lru_cache(maxsize=256)
+def _normalised(bench: str) -> Tree:
+    tree: Tree = json.loads(bench)
+    try:
+        return Bench.model_validate(tree, context={"si": True}).model_dump(mode="json")
+    except ValueError:  # of a program that knows other benches; compared as it is
+        return tree
+
+
+def _likeness(trial: Trial, archived: Trial) -> tuple[bool, ...]:
+    """How well an archived trial of the same bench and task suits; the greater, the better."""
+    return (
+        trial.seed == archived.seed,
+        trial.test == archived.test,
+        trial.point == archived.point,
+        trial.repeat == archived.repeat,
+        trial.number == archived.number,
+    )
+
+
+def _differences(archived: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """`path: what it is there, what is asked for here`, the task's before the bench's."""
+    there = dict(_leaves(archived))
+    differing = [
+        f"{path}: {_told(there.get(path, _ABSENT))} there, {_told(wanted.get(path, _ABSENT))} here"
+        for path in dict.fromkeys((*there, *wanted))
+        if there.get(path, _ABSENT) != wanted.get(path, _ABSENT)
+    ]
+    return sorted(differing, key=lambda text: text.startswith("bench."))
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping) and value:
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _told(value: object) -> str:
+    text = "absent" if value is _ABSENT else canonical_json(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _open(options: Options) -> ReplayBackend:
+    chosen = ReplayOptions.model_validate(options.model_dump())
+    return ReplayBackend(open_run(find_run(Path("results"), chosen.run)))
+
+
+BACKEND = BackendKind(
+    name="replay",
+    summary="the recordings of an archived run",
+    options=ReplayOptions,
+    open=_open,
+    parallel=True,
+)
