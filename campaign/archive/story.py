@@ -34,7 +34,7 @@ class Lines:
     @property
     def finished(self) -> dict[int, TrialFinished]:
         """By trial, in the order of their numbers; of several attempts the last one counts."""
-        return dict(sorted((e.trial, e) for e in self.all(TrialFinished)))
+        return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
 
     @property
     def attempts(self) -> list[TrialFinished]:
