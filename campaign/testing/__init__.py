@@ -1,1 +1,16 @@
-"""A test kit that a laboratory runs against a backend of its own."""
+"""What a lab tests its own backend with; `docs/writing-a-backend.md` shows how.
+
+```python
+@pytest.mark.parametrize("name", backend_checks())
+def test_backend(name: str) -> None:
+    backend_checks()[name](UNDER_TEST)
+```
+"""
+
+from __future__ import annotations
+
+from campaign.testing.checks import backend_checks
+from campaign.testing.strict_recorder import StrictRecorder
+from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError
+
+__all__ = ["BackendUnderTest", "Check", "CheckFailedError", "StrictRecorder", "backend_checks"]

@@ -1,0 +1,243 @@
+"""The checks of a backend, each a function that can fail, and what they say of the interface."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+from campaign.backends.interface import Backend
+from campaign.errors import BackendError
+from campaign.testing.archiving import archived_as_recorded
+from campaign.testing.strict_recorder import StrictRecorder
+from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
+from campaign.trial import Ending, Outcome, Recording, SafeState, Trial, canonical_json
+from campaign.units import factor
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,62}\Z")
+
+
+def backend_checks() -> dict[str, Check]:
+    """Every check by its name, which says what is demanded."""
+    checks = (
+        accepts_a_possible_trial,
+        refuses_an_impossible_trial_naming_the_field,
+        announces_channels_once_before_samples,
+        describes_channels_in_known_units,
+        appends_blocks_that_fit_the_channels,
+        keeps_the_promised_sample_times,
+        keeps_the_duration_without_gaps,
+        ends_as_it_says,
+        ends_a_failing_trial_as_a_fault,
+        stops_in_mid_trial,
+        stops_before_the_first_sample,
+        makes_safe_as_often_as_asked,
+        executes_twice,
+        lets_go_when_left,
+        lets_exceptions_pass,
+        records_what_can_be_archived,
+    )
+    return {check.__name__: check for check in checks}
+
+
+def accepts_a_possible_trial(under_test: BackendUnderTest) -> None:
+    """`refuses` is None for what can be executed, though nothing is connected yet."""
+    reason = under_test.open().refuses(under_test.possible)
+    require(reason is None, f"refuses() said {reason!r} of the possible trial")
+
+
+def refuses_an_impossible_trial_naming_the_field(under_test: BackendUnderTest) -> None:
+    """`refuses` says why, with the name of the field that a user can change."""
+    reason = under_test.open().refuses(under_test.impossible)
+    require(reason, "refuses() had nothing against the impossible trial")
+    named = under_test.names in str(reason)
+    require(named, f"refuses() said {reason!r}, which does not name {under_test.names!r}")
+
+
+def announces_channels_once_before_samples(under_test: BackendUnderTest) -> None:
+    """`start` comes once, and first."""
+    recorder, _ = _executed(under_test)
+    require(not recorder.order, "; ".join(recorder.order))
+    require(recorder.channels, "no channel was announced")
+
+
+def describes_channels_in_known_units(under_test: BackendUnderTest) -> None:
+    """Names an archive can have, none twice; an SI unit that converts to the one displayed."""
+    recorder, _ = _executed(under_test)
+    names = [info.name for info in recorder.channels]
+    require(len(set(names)) == len(names), f"two channels share a name: {', '.join(names)}")
+    for info in recorder.channels:
+        good = _NAME.match(info.name) and info.name != "time"
+        require(good, f"{info.name!r}: a name has lower-case letters, digits and _; not 'time'")
+        require(info.label.strip(), f"{info.name}: has no label for people")
+        try:
+            to_si = factor(info.display_unit, info.unit) if info.unit != info.display_unit else 1.0
+        except Exception as error:  # noqa: BLE001 - whatever pint makes of the text
+            message = f"{info.name}: {info.display_unit!r} does not convert to {info.unit!r}"
+            raise CheckFailedError(f"{message}: {error}") from None
+        require(to_si > 0, f"{info.name}: {info.display_unit!r} is no multiple of {info.unit!r}")
+
+
+def appends_blocks_that_fit_the_channels(under_test: BackendUnderTest) -> None:
+    """Float64, time (n,), block (channels, n); events with a time and a text."""
+    recorder, _ = _executed(under_test)
+    require(not recorder.shapes, "; ".join(recorder.shapes))
+
+
+def keeps_the_promised_sample_times(under_test: BackendUnderTest) -> None:
+    """Sample i is at i / sample_rate, from 0 on, across blocks; to a thousandth of a sample."""
+    time = _recorded(under_test)[0].time
+    rate = under_test.possible.task.sample_rate
+    require(len(time) > 1, f"{len(time)} samples were recorded")
+    wrong = ~(np.abs(time * rate - np.arange(len(time))) < 1e-3)  # NaN is wrong, too
+    first = int(np.argmax(wrong))
+    where = f"sample {first} is at {time[first]:.9g} s, not at {first / rate:.9g} s"
+    require(not wrong.any(), where)
+
+
+def keeps_the_duration_without_gaps(under_test: BackendUnderTest) -> None:
+    """A completed trial has all samples of its duration, give or take one, and none is missing."""
+    recording, ending = _recorded(under_test)
+    told = f"{ending.outcome}: {ending.reason}"
+    require(ending.outcome is Outcome.COMPLETED, f"the possible trial ended as {told}")
+    task = under_test.possible.task
+    wanted = task.duration * task.sample_rate
+    found = len(recording.time)
+    require(abs(found - wanted) <= 1, f"{found} samples in place of {wanted:g}")
+    for name, channel in recording.channels.items():
+        missing = int(np.count_nonzero(~np.isfinite(channel.samples)))
+        require(not missing, f"{name}: {missing} samples are missing in a completed trial")
+
+
+def ends_as_it_says(under_test: BackendUnderTest) -> None:
+    """Completed: no reason, no fault, safe; telemetry is JSON."""
+    _, ending = _executed(under_test)
+    _consistent(ending)
+    safe = ending.safe_state is SafeState.CONFIRMED
+    require(safe, "the safe state was not confirmed after a completed trial")
+
+
+def ends_a_failing_trial_as_a_fault(under_test: BackendUnderTest) -> None:
+    """A bench that fails is an ending that names fault and reason, and no exception."""
+    if under_test.failing is None:
+        return
+    try:
+        with under_test.failing() as backend:
+            ending = backend.execute(under_test.possible, StrictRecorder(), lambda: False)
+    except BackendError as error:
+        raise CheckFailedError(f"a failing bench raised BackendError: {error}") from error
+    told = f"a failing bench ended the trial as {ending.outcome}"
+    require(ending.outcome in (Outcome.FAULT, Outcome.LIMIT, Outcome.DIVERGED), told)
+    _consistent(ending)
+
+
+def stops_in_mid_trial(under_test: BackendUnderTest) -> None:
+    """Once `stopped()` is true the trial ends within a few blocks, interrupted and safe."""
+    asked_after = 1
+    recorder = StrictRecorder()
+    _interrupted(under_test, recorder, lambda: recorder.blocks >= asked_after)
+    more = recorder.blocks - asked_after
+    allowed = under_test.most_blocks
+    require(more <= allowed, f"{more} blocks came after the stop; at most {allowed} may")
+
+
+def stops_before_the_first_sample(under_test: BackendUnderTest) -> None:
+    """A stop that is already asked for ends the trial at once."""
+    recorder = StrictRecorder()
+    _interrupted(under_test, recorder, lambda: True)
+    allowed = under_test.most_blocks
+    require(recorder.blocks <= allowed, f"{recorder.blocks} blocks came; at most {allowed} may")
+
+
+def makes_safe_as_often_as_asked(under_test: BackendUnderTest) -> None:
+    """Before any trial, after one, and once more: confirmed every time."""
+    with under_test.open() as backend:
+        seen = [backend.make_safe()]
+        backend.execute(under_test.possible, StrictRecorder(), lambda: False)
+        seen += [backend.make_safe(), backend.make_safe()]
+    for when, state in zip(("before", "after", "again after"), seen, strict=True):
+        confirmed = state is SafeState.CONFIRMED
+        require(confirmed, f"make_safe() {when} a trial answered {state!r}, not CONFIRMED")
+
+
+def executes_twice(under_test: BackendUnderTest) -> None:
+    """A second trial starts at time 0 and is as long as the first, with the same channels."""
+    with under_test.open() as backend:
+        found = [_on(backend, under_test.possible) for _ in range(2)]
+    (first, _), (second, ending) = found
+    require(ending.outcome is Outcome.COMPLETED, f"the second ended as {ending.outcome}")
+    require(first.channels == second.channels, "the second announced other channels")
+    times = [recorder.recording(ending).time for recorder, ending in found]
+    same = np.array_equal(times[0], times[1])
+    require(same, f"{len(times[0])} samples first, then {len(times[1])}, or at other times")
+
+
+def lets_go_when_left(under_test: BackendUnderTest) -> None:
+    """What was left can be had again at once: by a new backend, and by the same one."""
+    first = under_test.open()
+    for which, backend in (("first", first), ("second", under_test.open()), ("first", first)):
+        try:
+            with backend as entered:
+                state = entered.make_safe()
+        except Exception as error:
+            raise CheckFailedError(f"entering the {which} backend failed: {error!r}") from error
+        require(state is SafeState.CONFIRMED, f"the {which} backend answered {state!r}")
+
+
+def lets_exceptions_pass(under_test: BackendUnderTest) -> None:
+    """Leaving hides no exception of whoever used it."""
+    try:
+        with under_test.open():
+            raise KeyError("of the user")
+    except KeyError:
+        return
+    raise CheckFailedError("__exit__ returned true: it hides the exceptions of others")
+
+
+def records_what_can_be_archived(under_test: BackendUnderTest) -> None:
+    """A run with this one trial is sealed, and reads back as it was recorded."""
+    recorder, ending = _executed(under_test)
+    require(recorder.blocks, "nothing was recorded")
+    archived_as_recorded(under_test.possible, recorder.channels, recorder.recording(ending))
+
+
+def _executed(under_test: BackendUnderTest) -> tuple[StrictRecorder, Ending]:
+    with under_test.open() as backend:
+        return _on(backend, under_test.possible)
+
+
+def _recorded(under_test: BackendUnderTest) -> tuple[Recording, Ending]:
+    recorder, ending = _executed(under_test)
+    return recorder.recording(ending), ending
+
+
+def _on(backend: Backend, trial: Trial) -> tuple[StrictRecorder, Ending]:
+    recorder = StrictRecorder()
+    ending = backend.execute(trial, recorder, lambda: False)
+    return recorder, ending
+
+
+def _interrupted(
+    under_test: BackendUnderTest, recorder: StrictRecorder, stopped: Callable[[], bool]
+) -> None:
+    with under_test.open() as backend:
+        ending = backend.execute(under_test.possible, recorder, stopped)
+        state = backend.make_safe()
+    told = f"a stopped trial ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, told)
+    _consistent(ending)
+    require(state is SafeState.CONFIRMED, "the safe state was not confirmed after a stop")
+
+
+def _consistent(ending: Ending) -> None:
+    require(isinstance(ending, Ending), f"execute() returned {ending!r}, not an Ending")
+    failed = ending.outcome is Outcome.FAULT
+    require(failed == (ending.fault is not None), f"outcome {ending.outcome}, fault {ending.fault}")
+    completed = ending.outcome is Outcome.COMPLETED
+    require(completed or ending.reason, f"outcome {ending.outcome} without a reason")
+    require(not (completed and ending.reason), f"completed, with a reason: {ending.reason}")
+    try:
+        canonical_json(dict(ending.telemetry))
+    except (TypeError, ValueError) as error:
+        raise CheckFailedError(f"the telemetry is not JSON: {error}") from None

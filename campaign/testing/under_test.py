@@ -1,0 +1,45 @@
+"""What the kit must be told about a backend, and how it says that a check failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from campaign.backends.interface import Backend
+from campaign.trial import Trial
+
+
+class CheckFailedError(AssertionError):
+    """What the backend did, and what the interface asks for."""
+
+
+@dataclass(frozen=True)
+class BackendUnderTest:
+    """A backend and what it is tried with.
+
+    Attributes:
+        open: makes a new one, not yet entered.
+        possible: a trial that it executes to its end; several seconds of bench time, so that a stop
+            finds it under way, and no `stop_rate`.
+        impossible: a trial that it has to refuse.
+        names: what the refusal has to name: the field, such as `base_acceleration`.
+        most_blocks: how many blocks of samples may still come once a stop was asked for.
+        failing: makes a backend whose bench fails during `possible`; None when that cannot be had.
+    """
+
+    open: Callable[[], Backend]
+    possible: Trial
+    impossible: Trial
+    names: str
+    most_blocks: int = 3
+    failing: Callable[[], Backend] | None = None
+
+
+Check = Callable[[BackendUnderTest], None]
+"""Raises CheckFailedError."""
+
+
+def require(condition: object, message: str) -> None:
+    """Fail the check with `message` unless `condition` is true."""
+    if not condition:
+        raise CheckFailedError(message)

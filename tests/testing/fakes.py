@@ -1,0 +1,132 @@
+"""A backend that does all the interface asks for, and one broken copy for each thing it asks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from campaign.testing import BackendUnderTest
+from campaign.trial import (
+    ChannelInfo,
+    Ending,
+    Event,
+    Fault,
+    Outcome,
+    Recorder,
+    SafeState,
+    Task,
+    Trial,
+)
+
+RATE = 100.0
+BLOCK = 50
+CHANNELS = (
+    ChannelInfo("gyro_rate", "rad/s", "Rate of the load", "deg/s"),
+    ChannelInfo("motor_current", "A", "Motor current", "A"),
+)
+
+
+def trial(**task: Any) -> Trial:
+    told = {"mode": "rate", "duration": 5.0, "window": (0.0, 5.0), "sample_rate": RATE, **task}
+    return Trial(number=1, test="t", kind="move", seed=1, bench={}, task=Task.model_validate(told))
+
+
+COMPLETED = Ending(Outcome.COMPLETED)
+STOPPED = Ending(Outcome.INTERRUPTED, "stopped by the operator")
+UNDER_WAY = Event(0.1, "under way")
+
+
+@dataclass
+class Quirks:
+    """What a fake does; as it stands, all is well."""
+
+    refuses: Callable[[Trial], str | None] = lambda trial: (
+        "task.mode: it has no spring" if trial.task.mode == "spring" else None
+    )
+    channels: tuple[ChannelInfo, ...] = CHANNELS
+    announced: int = 1
+    announced_first: bool = True
+    block: Callable[[np.ndarray], np.ndarray] = lambda block: block
+    time: Callable[[np.ndarray], np.ndarray] = lambda time: time
+    samples: int = 500
+    event: Event = UNDER_WAY
+    ending: Ending = COMPLETED
+    stopped_ending: Ending = STOPPED
+    heeds_stop: bool = True
+    safe: Callable[[int], SafeState] = lambda asked: SafeState.CONFIRMED
+    once: bool = False
+    keeps_the_line: bool = False
+    hides_exceptions: bool = False
+    raises: Exception | None = None
+
+
+class Fake:
+    """Sines, as many as there are channels."""
+
+    def __init__(self, quirks: Quirks, line: list[object]) -> None:
+        self._quirks = quirks
+        self._line = line  # whoever holds it is in it
+        self._executed = self._asked = 0
+
+    def __enter__(self) -> Fake:
+        if self._line:
+            raise OSError("the line is taken")
+        self._line.append(self)
+        return self
+
+    def __exit__(self, *exception: object) -> bool:
+        if not self._quirks.keeps_the_line:
+            self._line.clear()
+        return self._quirks.hides_exceptions
+
+    def refuses(self, trial: Trial) -> str | None:
+        return self._quirks.refuses(trial)
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        quirks = self._quirks
+        if quirks.raises is not None:
+            raise quirks.raises
+        self._executed += 1
+        samples = 0 if quirks.once and self._executed > 1 else quirks.samples
+        for _ in range(quirks.announced if quirks.announced_first else 0):
+            recorder.start(quirks.channels)
+        recorder.event(quirks.event)
+        for first in range(0, samples, BLOCK):
+            if quirks.heeds_stop and stopped():
+                return quirks.stopped_ending
+            time = np.arange(first, min(first + BLOCK, samples)) / RATE
+            block = np.stack([np.sin(time + row) for row in range(len(quirks.channels))])
+            recorder.append(quirks.time(time), quirks.block(block))
+            if not quirks.announced_first and not first:
+                recorder.start(quirks.channels)
+        return quirks.ending
+
+    def make_safe(self) -> SafeState:
+        self._asked += 1
+        return self._quirks.safe(self._asked)
+
+
+def under_test(**quirks: Any) -> BackendUnderTest:
+    line: list[object] = []
+    failing = Quirks(ending=quirks.pop("failing", Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE)))
+    failing.raises = quirks.pop("failing_raises", None)
+    return BackendUnderTest(
+        open=lambda: Fake(Quirks(**quirks), line),
+        possible=trial(),
+        impossible=trial(mode="spring"),
+        names="task.mode",
+        failing=lambda: Fake(failing, []),
+    )
+
+
+def renamed(*names: str) -> tuple[ChannelInfo, ...]:
+    return tuple(replace(CHANNELS[0], name=name) for name in names)
+
+
+def nan_at_the_end(block: np.ndarray) -> np.ndarray:
+    block[0, -1] = math.nan
+    return block

@@ -1,0 +1,155 @@
+"""The kit passes what keeps the interface, and fails what does not, each for its own reason."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaign.backends.sim import SimBackend, SimOptions
+from campaign.errors import BackendError
+from campaign.testing import BackendUnderTest, CheckFailedError, backend_checks
+from campaign.trial import Ending, Event, Outcome, SafeState
+from tests.experiments.laboratory import trials
+from tests.physics.benches import bench
+from tests.testing.fakes import CHANNELS, nan_at_the_end, renamed, under_test
+
+CHECKS = backend_checks()
+
+
+def sim() -> BackendUnderTest:
+    (possible,) = trials("move", bench(), {"angle": "20 deg", "sample_rate": "500 Hz"})
+    task = possible.task.model_copy(update={"compensation": "witchcraft"})
+    return BackendUnderTest(
+        open=lambda: SimBackend(SimOptions()),
+        possible=possible,
+        impossible=possible.model_copy(update={"task": task}),
+        names="compensation",
+    )
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_the_simulated_bench_passes(name: str) -> None:
+    CHECKS[name](sim())
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_a_good_backend_passes(name: str) -> None:
+    CHECKS[name](under_test())
+
+
+NOT_SAFE = SafeState.NOT_CONFIRMED
+BROKEN: list[tuple[str, dict[str, Any], str]] = [
+    ("accepts_a_possible_trial", {"refuses": lambda t: "no"}, "'no' of the possible trial"),
+    (
+        "refuses_an_impossible_trial_naming_the_field",
+        {"refuses": lambda t: None},
+        "nothing against the impossible trial",
+    ),
+    (
+        "refuses_an_impossible_trial_naming_the_field",
+        {"refuses": lambda t: "cannot"},
+        "does not name 'task.mode'",
+    ),
+    ("announces_channels_once_before_samples", {"announced": 2}, "announced twice"),
+    ("announces_channels_once_before_samples", {"announced_first": False}, "samples came before"),
+    ("announces_channels_once_before_samples", {"announced": 0, "samples": 0}, "no channel was"),
+    ("describes_channels_in_known_units", {"channels": renamed("a", "a")}, "share a name"),
+    ("describes_channels_in_known_units", {"channels": renamed("Rate (x)")}, "lower-case"),
+    ("describes_channels_in_known_units", {"channels": renamed("time")}, "not 'time'"),
+    (
+        "describes_channels_in_known_units",
+        {"channels": (replace(CHANNELS[0], label=" "),)},
+        "no label",
+    ),
+    (
+        "describes_channels_in_known_units",
+        {"channels": (replace(CHANNELS[0], display_unit="kg"),)},
+        "'kg' does not convert to 'rad/s'",
+    ),
+    ("appends_blocks_that_fit_the_channels", {"block": lambda b: b[:1]}, r"not \(channels, n\)"),
+    ("appends_blocks_that_fit_the_channels", {"block": np.transpose}, r"not \(channels, n\)"),
+    ("appends_blocks_that_fit_the_channels", {"block": np.float32}, "no array of float64"),
+    ("appends_blocks_that_fit_the_channels", {"time": list}, "time is no array"),
+    ("appends_blocks_that_fit_the_channels", {"time": lambda t: t[:, None]}, r"not \(n,\)"),
+    ("appends_blocks_that_fit_the_channels", {"event": Event(0.1, "")}, "event without"),
+    ("appends_blocks_that_fit_the_channels", {"event": Event(np.nan, "x")}, "event without"),
+    ("keeps_the_promised_sample_times", {"time": lambda t: t + 1}, "sample 0 is at 1 s"),
+    (
+        "keeps_the_promised_sample_times",
+        {"time": lambda t: t - t[0]},
+        "sample 50 is at 0 s, not at 0.5 s",
+    ),
+    (
+        "keeps_the_promised_sample_times",
+        {"time": lambda t: t[::-1].copy()},
+        "sample 0 is at 0.49 s",
+    ),
+    ("keeps_the_promised_sample_times", {"samples": 1}, "1 samples were recorded"),
+    ("keeps_the_duration_without_gaps", {"samples": 400}, "400 samples in place of 500"),
+    ("keeps_the_duration_without_gaps", {"block": nan_at_the_end}, "gyro_rate: 10 samples are"),
+    ("keeps_the_duration_without_gaps", {"ending": Ending(Outcome.LIMIT, "l")}, "ended as limit"),
+    ("ends_as_it_says", {"ending": None}, "not an Ending"),
+    ("ends_as_it_says", {"ending": Ending(Outcome.COMPLETED, "well")}, "with a reason: well"),
+    ("ends_as_it_says", {"ending": Ending(Outcome.LIMIT)}, "without a reason"),
+    ("ends_as_it_says", {"ending": Ending(Outcome.COMPLETED, "", NOT_SAFE)}, "not confirmed"),
+    (
+        "ends_as_it_says",
+        {"ending": Ending(Outcome.COMPLETED, telemetry={"latency_s": np.float32(1)})},  # type: ignore[dict-item]
+        "telemetry is not JSON",
+    ),
+    ("ends_a_failing_trial_as_a_fault", {"failing": Ending(Outcome.FAULT, "hot")}, "fault None"),
+    ("ends_a_failing_trial_as_a_fault", {"failing": Ending(Outcome.COMPLETED)}, "as completed"),
+    ("ends_a_failing_trial_as_a_fault", {"failing_raises": BackendError("gone")}, "gone"),
+    ("stops_in_mid_trial", {"heeds_stop": False}, "ended as completed"),
+    (
+        "stops_in_mid_trial",
+        {"heeds_stop": False, "ending": Ending(Outcome.INTERRUPTED, "late")},
+        "9 blocks came after the stop",
+    ),
+    ("stops_in_mid_trial", {"stopped_ending": Ending(Outcome.INTERRUPTED)}, "without a reason"),
+    ("stops_in_mid_trial", {"safe": lambda n: NOT_SAFE}, "not confirmed after a stop"),
+    ("stops_before_the_first_sample", {"heeds_stop": False}, "ended as completed"),
+    (
+        "stops_before_the_first_sample",
+        {"heeds_stop": False, "ending": Ending(Outcome.INTERRUPTED, "late")},
+        "10 blocks came",
+    ),
+    (
+        "makes_safe_as_often_as_asked",
+        {"safe": lambda n: NOT_SAFE if n == 1 else SafeState.CONFIRMED},
+        r"make_safe\(\) before",
+    ),
+    (
+        "makes_safe_as_often_as_asked",
+        {"safe": lambda n: NOT_SAFE if n == 3 else SafeState.CONFIRMED},
+        "again after",
+    ),
+    ("makes_safe_as_often_as_asked", {"safe": lambda n: None}, "answered None"),
+    ("executes_twice", {"once": True}, "500 samples first, then 0"),
+    ("lets_go_when_left", {"keeps_the_line": True}, "the line is taken"),
+    ("lets_exceptions_pass", {"hides_exceptions": True}, "hides the exceptions"),
+    ("records_what_can_be_archived", {"samples": 0}, "nothing was recorded"),
+    ("records_what_can_be_archived", {"channels": renamed("a/b", "c")}, "cannot be archived"),
+]
+
+
+@pytest.mark.parametrize(("name", "quirks", "message"), BROKEN)
+def test_a_broken_backend_fails(name: str, quirks: dict[str, Any], message: str) -> None:
+    with pytest.raises(CheckFailedError) as caught:
+        CHECKS[name](under_test(**quirks))
+    assert re.search(message, str(caught.value))
+
+
+def test_every_check_can_fail() -> None:
+    assert {name for name, _, _ in BROKEN} == set(CHECKS)
+
+
+def test_the_kit_needs_no_test_framework() -> None:
+    code = "import sys, campaign.testing; sys.exit('pytest' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
