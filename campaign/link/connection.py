@@ -1,0 +1,136 @@
+"""The host's side of the relay: starts it, hands it frames, takes what comes from the port."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import subprocess
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import BinaryIO, cast
+
+from campaign.errors import UsageError
+from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
+
+OPENING = 15.0
+"""s that the relay may take to open the port: a process has to start first."""
+LEAVING = 5.0
+"""s that it may take to leave; it sends SAFE for up to two of them."""
+
+BEATS = 400
+"""Heartbeats that are remembered: ten seconds of them."""
+
+
+class LineLostError(Exception):
+    """The line to the controller is gone; never seen by a user, who is told by an Ending."""
+
+
+class Connection:
+    """An open line to a controller, kept by a relay process.
+
+    Any thread may write; one at a time may receive.
+
+    Attributes:
+        beats: when (steady clock, s) the latest heartbeats were sent, by counter.
+    """
+
+    def __init__(self, port: str, baud: int) -> None:
+        """Open `port`. Raises UsageError when that cannot be done, saying why."""
+        self._incoming: queue.SimpleQueue[tuple[Kind, bytes]] = queue.SimpleQueue()
+        self.beats: dict[int, float] = {}
+        self._lost = ""
+        self._sending = threading.Lock()
+        # A session of its own: Ctrl-C in a terminal is for the host, which then stops in order.
+        # -P: nothing in the user's folder can stand in for a module of ours.
+        self._relay = subprocess.Popen(  # noqa: S603 - our own program, no shell
+            [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+        )
+        self._out = cast(BinaryIO, self._relay.stdin)
+        self._in = cast(BinaryIO, self._relay.stdout)
+        self._reader = threading.Thread(target=self._read, name="line", daemon=True)
+        self._reader.start()
+        try:
+            kind, payload = self._incoming.get(timeout=OPENING)
+        except queue.Empty:
+            kind, payload = Kind.REFUSED, f"port {port!r} did not open in time".encode()
+        if kind is not Kind.OPENED:
+            self.close()
+            raise UsageError(payload.decode(errors="replace") or f"port {port!r} cannot be opened")
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def relay(self) -> int:
+        """Its process id."""
+        return self._relay.pid
+
+    def write(self, data: bytes) -> None:
+        """Hand bytes to the port. Raises LineLostError."""
+        self._send(Kind.WRITE, data)
+
+    def wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
+        """Say in every heartbeat from now on which record is wanted next. Raises LineLostError."""
+        self._send(Kind.WANTED, WANTED.pack(trial, record, at_once))
+
+    def receive(self, timeout: float) -> bytes:
+        """What has come from the port; empty after `timeout` (s). Raises LineLostError."""
+        if self._lost:
+            raise LineLostError(self._lost)
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                kind, payload = self._incoming.get(timeout=max(0.0, deadline - time.monotonic()))
+            except queue.Empty:
+                return b""
+            if kind is Kind.BYTES:
+                return payload
+            if kind is Kind.BEAT:
+                counter, sent = BEAT.unpack(payload)
+                self.beats[counter] = sent
+                self.beats.pop((counter - BEATS) % 2**32, None)
+            if kind is Kind.LOST:
+                self._lost = payload.decode(errors="replace") or "the line is lost"
+                raise LineLostError(self._lost)
+
+    def close(self) -> None:
+        """Let the relay go: it sends SAFE, waits briefly for the answer, and leaves."""
+        with contextlib.suppress(OSError):
+            self._out.close()
+        try:
+            self._relay.wait(LEAVING)
+        except subprocess.TimeoutExpired:
+            self._relay.kill()
+            self._relay.wait()
+        self._reader.join(LEAVING)  # it drains the pipe until the relay has left
+        with contextlib.suppress(OSError):
+            self._in.close()
+
+    def _send(self, kind: Kind, payload: bytes) -> None:
+        if self._lost:
+            raise LineLostError(self._lost)
+        try:
+            with self._sending:
+                send(self._out, kind, payload)
+        except (OSError, ValueError) as error:
+            self._lost = "the process that keeps the port has ended"
+            raise LineLostError(self._lost) from error
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            while (item := receive(self._in)) is not None:
+                self._incoming.put(item)
+        self._incoming.put((Kind.LOST, b"the process that keeps the port has ended"))

@@ -1,0 +1,120 @@
+"""Records in order: what has come of a trial, what is missing, and what has to be asked for again.
+
+A device numbers everything that it records in a trial in one sequence. Here the numbers are put in
+order, doubles are dropped, and a number that stays away is asked for again with growing patience.
+Pure: time is an argument, nothing is sent from here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from campaign.wire.messages import End, Record
+
+FIRST_PATIENCE = 0.1
+"""s after a request until the next; each one doubles it."""
+LONGEST_PATIENCE = 0.5
+TRIES = 12
+"""Requests until a record counts as lost: more than four seconds."""
+MOST = 32
+"""Records asked for in one request: an answer must not drown what is new."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Records `first` to `first + count - 1` cannot be had."""
+
+    first: int
+    count: int
+
+
+@dataclass
+class _Wanted:
+    due: float
+    tries: int = 0
+
+
+class RecordOrder:
+    """The records of one trial, from number 0.
+
+    Attributes:
+        next: the number of the next record that has not been taken.
+        resends: requests made.
+    """
+
+    def __init__(self) -> None:
+        self.next = 0
+        self.resends = 0
+        self._come: dict[int, Record] = {}
+        self._lost: set[int] = set()
+        self._wanted: dict[int, _Wanted] = {}
+        self._beyond = 0  # all records before this number are known to exist
+        self._end: int | None = None
+
+    def add(self, record: Record, now: float) -> None:
+        """A record has come, in whatever order."""
+        number = record.number
+        if number < self.next or number in self._come:
+            return
+        self._come[number] = record
+        self._lost.discard(number)
+        self._wanted.pop(number, None)
+        if isinstance(record, End):
+            self._end = number
+        self.exists(number + 1, now)
+
+    def exists(self, beyond: int, now: float) -> None:
+        """Every record before number `beyond` has been made and was sent once."""
+        if self._end is not None:
+            beyond = min(beyond, self._end + 1)
+        for number in range(max(self._beyond, self.next), beyond):
+            if number not in self._come and number not in self._lost:
+                self._wanted[number] = _Wanted(now)
+        self._beyond = max(self._beyond, beyond)
+
+    def lost(self, first: int, count: int) -> None:
+        """The device no longer has these."""
+        for number in range(max(first, self.next), min(first + count, self._beyond)):
+            if number not in self._come:
+                self._lost.add(number)
+                self._wanted.pop(number, None)
+
+    def take(self) -> list[Record | Missing]:
+        """What can be taken in order; a run of lost records as one Missing."""
+        taken: list[Record | Missing] = []
+        while True:
+            if self.next in self._come:
+                taken.append(self._come.pop(self.next))
+            elif self.next in self._lost:
+                self._lost.remove(self.next)
+                last = taken[-1] if taken else None
+                if isinstance(last, Missing):
+                    taken[-1] = Missing(last.first, last.count + 1)
+                else:
+                    taken.append(Missing(self.next, 1))
+            else:
+                return taken
+            self.next += 1
+
+    def requests(self, now: float) -> list[tuple[int, int]]:
+        """(first, count) to ask for again now; what was asked for too often is given up."""
+        due = []
+        for number, wanted in sorted(self._wanted.items()):
+            if wanted.due > now:
+                continue
+            if wanted.tries == TRIES:
+                self._lost.add(number)
+                del self._wanted[number]
+                continue
+            wanted.due = now + min(LONGEST_PATIENCE, FIRST_PATIENCE * 2**wanted.tries)
+            wanted.tries += 1
+            due.append(number)
+        runs: list[tuple[int, int]] = []
+        for number in due:
+            first, count = runs[-1] if runs else (number, 0)
+            if first + count == number and count < MOST:
+                runs[-1:] = [(first, count + 1)]
+            else:
+                runs.append((number, 1))
+        self.resends += len(runs)
+        return runs

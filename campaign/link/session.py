@@ -1,0 +1,316 @@
+"""A conversation with one controller: commands with answers, and whatever it says by itself."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from campaign.errors import BackendError
+from campaign.link.connection import Connection, LineLostError
+from campaign.link.errors import RefusedError, ResetError, SilenceError
+from campaign.link.safe import is_safe, safe_frame
+from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
+from campaign.wire.frames import FrameDecoder, encode_frame
+from campaign.wire.messages import (
+    Ack,
+    Arm,
+    Capabilities,
+    Channel,
+    Channels,
+    Clear,
+    End,
+    Event,
+    Hello,
+    Lost,
+    Message,
+    Nak,
+    Release,
+    Samples,
+    Start,
+    Status,
+    Value,
+    configuration_crc,
+    decode,
+    encode,
+    parameter_messages,
+)
+
+FIRST_WAIT = 0.1
+"""s for an answer until a command is sent again; each repetition waits longer, up to LONGEST."""
+LONGEST_WAIT = 0.5
+POLL = 0.02
+"""s that a look at the line waits at most."""
+SAFE_INTERVAL = 0.03
+HOST = "campaign"
+GIVEN_UP = "given up: the bench is being made safe"
+
+
+@dataclass
+class Traffic:
+    """What a session measures of its own work.
+
+    Attributes:
+        round_trips: heartbeat to status and back, through relay, line and controller (s).
+        ring_used: most records that the controller ever held.
+    """
+
+    received: int = 0
+    repeated_commands: int = 0
+    ring_used: int = 0
+    round_trips: list[float] = field(default_factory=list)
+
+
+class Session:
+    """Speaks the protocol over an open connection. Used by one thread at a time.
+
+    Attributes:
+        capabilities: of the controller, after `hello`.
+        status: the newest one, None before the first.
+        records: called with every record and LOST that arrives, in the order of the line.
+        traffic: since it was last replaced.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        silence: float,
+        given_up: Callable[[], bool] = lambda: False,
+        name: int = 1,
+    ) -> None:
+        """`silence` (s) without a word is a lost connection; `given_up` ends every waiting.
+
+        `name` is a random number of the host's, the same one after a lost connection.
+        """
+        self._connection = connection
+        self._silence = silence
+        self._given_up = given_up
+        self._decoder = FrameDecoder()
+        self._sequence = random.SystemRandom().randrange(2**16)
+        self._answers: dict[int, Ack | Nak | Capabilities] = {}
+        self._channels: dict[int, dict[int, Channels]] = {}
+        self._heard = time.monotonic()
+        self._name = name
+        self.capabilities: Capabilities | None = None
+        self.status: Status | None = None
+        self.records: Callable[[Samples | Event | End | Lost], None] = lambda record: None
+        self.traffic = Traffic()
+
+    @property
+    def bad_frames(self) -> int:
+        """Frames that arrived damaged since the connection was opened."""
+        return self._decoder.counts.bad
+
+    def hello(self) -> Capabilities:
+        """Begin the session. Raises BackendError when the two cannot talk, else SilenceError."""
+        try:
+            answer = self._command(Hello(VERSION, VERSION, self._name, HOST))
+        except RefusedError as error:
+            raise BackendError(f"the controller will not talk: {error}") from None
+        except SilenceError:
+            if self._decoder.counts.wrong_version:
+                raise BackendError(
+                    "the controller speaks another version of the protocol than this program's "
+                    f"({VERSION}); update its firmware or this program"
+                ) from None
+            raise
+        if not isinstance(answer, Capabilities):
+            raise BackendError("the controller broke the protocol: no capabilities")
+        if answer.version != VERSION:
+            raise BackendError(
+                f"the controller {answer.name!r} speaks versions {answer.lowest} to "
+                f"{answer.highest} of the protocol, this program version {VERSION}; update its "
+                "firmware or this program"
+            )
+        self.capabilities = answer
+        self._channels.clear()
+        return answer
+
+    def configure(self, parameters: Mapping[str, Value]) -> tuple[float, tuple[Channel, ...]]:
+        """Clear, set, arm: what will be recorded, and at which rate (Hz). LinkFaultError."""
+        self._become_idle()
+        self._channels.clear()
+        bodies = []
+        for message in parameter_messages(parameters):
+            bodies.append(encode(message)[1])
+            self._command(message)
+        self._command(Arm(configuration_crc(bodies)))
+        first = next(iter(self._channels[self._sequence].values()))
+        parts = sorted(self._channels[self._sequence].values(), key=lambda part: part.first)
+        return first.sample_rate, tuple(channel for part in parts for channel in part.channels)
+
+    def _become_idle(self) -> None:
+        """Whatever an earlier trial or host has left behind is over."""
+        deadline = time.monotonic() + self._silence
+        while (state := self._fresh_status().state) is not State.IDLE:
+            try:
+                if state is State.RUNNING:
+                    self.safe(deadline)
+                elif state is State.ENDED:
+                    self._command(Release(self._fresh_status().trial))
+                else:
+                    self._command(Clear())
+            except RefusedError as error:
+                passing = (NakCode.WRONG_STATE, NakCode.NOT_READY, NakCode.WRONG_TRIAL)
+                hopeless = error.nak is None or error.nak.code not in passing
+                if hopeless or time.monotonic() > deadline:
+                    raise
+            if time.monotonic() > deadline:
+                raise RefusedError(f"the controller does not leave the state {state.text}")
+
+    def _fresh_status(self) -> Status:
+        """What the controller says of itself now."""
+        self._drain()
+        self.status = None
+        while True:
+            self.look(POLL)
+            status: Status | None = self.status
+            if status is not None:
+                return status
+            if self._given_up():
+                raise SilenceError(GIVEN_UP)
+
+    def start(self, trial: int) -> None:
+        """Set the axis in motion. LinkFaultError."""
+        self._connection_wanted(trial, 0)
+        self._command(Start(trial))
+
+    def command(self, message: Message) -> None:
+        """Send a command until it is answered. LinkFaultError."""
+        self._command(message)
+
+    def send(self, message: Message) -> None:
+        """Send once, without waiting for an answer. SilenceError when the line is lost."""
+        kind, body = encode(message)
+        self._write(encode_frame(kind, 0, body))
+
+    def wanted(self, trial: int, record: int, *, at_once: bool) -> None:
+        """Have the heartbeats say which record is wanted next."""
+        self._connection_wanted(trial, record, at_once=at_once)
+
+    def safe(self, deadline: float) -> bool:
+        """Send SAFE until the controller says that it is; False after `deadline` (steady clock)."""
+        self._drain()
+        self.status = None  # only what it says from now on counts
+        while time.monotonic() < deadline:
+            self._write(safe_frame())
+            again = time.monotonic() + SAFE_INTERVAL
+            while time.monotonic() < again:
+                self.look(max(0.0, again - time.monotonic()))
+                status: Status | None = self.status
+                if status is not None and is_safe(status):
+                    return True
+        return False
+
+    def rested(self, deadline: float) -> bool:
+        """Whether the controller is seen at rest with its drive off, waiting until `deadline`."""
+        self._drain()
+        self.status = None
+        while time.monotonic() < deadline:
+            self.look(POLL)
+            status: Status | None = self.status
+            if status is not None and status.at_rest and not status.drive_on:
+                return True
+        return False
+
+    def look(self, timeout: float = POLL) -> bool:
+        """Take what has come, waiting up to `timeout` (s) for it; whether anything had.
+
+        Raises SilenceError after too long without a word, ResetError when the controller has
+        started anew since `hello`.
+        """
+        try:
+            data = self._connection.receive(timeout)
+        except LineLostError as error:
+            raise SilenceError(f"the connection was lost: {error}") from None
+        now = time.monotonic()
+        if not data:
+            if now - self._heard > self._silence:
+                raise SilenceError(f"the controller has not been heard for {self._silence:g} s")
+            return False
+        self.traffic.received += len(data)
+        for frame in self._decoder.feed(data):
+            try:
+                message = decode(frame.kind, frame.body)
+            except WireError:
+                continue  # whole, but of no use: a newer firmware's, perhaps
+            self._heard = now
+            self._take(message, now)
+        return True
+
+    def _take(self, message: Message, now: float) -> None:
+        if isinstance(message, Samples | Event | End | Lost):
+            self.records(message)
+        elif isinstance(message, Status):
+            self._check_boot(message.boot)
+            self.status = message
+            self.traffic.ring_used = max(self.traffic.ring_used, message.ring_used)
+            sent = self._connection.beats.pop(message.heartbeat, None)
+            if sent is not None:
+                self.traffic.round_trips.append(now - sent)
+        elif isinstance(message, Channels):
+            self._channels.setdefault(message.sequence, {})[message.first] = message
+        elif isinstance(message, Ack | Nak | Capabilities):
+            if isinstance(message, Ack):
+                self._check_boot(message.boot)
+            self._answers[message.sequence] = message
+
+    def _check_boot(self, boot: int) -> None:
+        if self.capabilities is not None and boot != self.capabilities.boot:
+            self.capabilities = None  # said once; what comes next needs a new `hello`
+            raise ResetError("the controller started anew")
+
+    def _command(self, message: Message) -> Ack | Capabilities:
+        """Send until answered, with growing patience."""
+        kind, body = encode(message)
+        self._sequence = (self._sequence + 1) % 2**16
+        self._answers.clear()
+        frame = encode_frame(kind, self._sequence, body)
+        now = time.monotonic()
+        deadline, wait = now + self._silence, FIRST_WAIT
+        while now < deadline:
+            self._write(frame)
+            again = min(deadline, now + wait)
+            while now < again:
+                self.look(min(POLL, again - now))
+                answer = self._answer(kind)
+                if answer is not None:
+                    return answer
+                if self._given_up():
+                    raise SilenceError(GIVEN_UP)
+                now = time.monotonic()
+            wait = min(LONGEST_WAIT, 2 * wait)
+            self.traffic.repeated_commands += 1
+        raise SilenceError(f"the controller did not answer {kind.name} for {self._silence:g} s")
+
+    def _answer(self, kind: Kind) -> Ack | Capabilities | None:
+        answer = self._answers.get(self._sequence)
+        if isinstance(answer, Nak):
+            name = f"{answer.name}: " if answer.name else ""
+            why = answer.text or answer.code.text
+            raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer)
+        if answer is None or isinstance(answer, Capabilities) != (kind is Kind.HELLO):
+            return None
+        if kind is Kind.ARM:
+            parts = self._channels.get(self._sequence, {}).values()
+            listed = sum(len(part.channels) for part in parts)
+            if not parts or listed < next(iter(parts)).total:
+                return None
+        return answer
+
+    def _drain(self) -> None:
+        while self.look(0.0):
+            pass
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self._connection.write(data)
+        except LineLostError as error:
+            raise SilenceError(f"the connection was lost: {error}") from None
+
+    def _connection_wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
+        try:
+            self._connection.wanted(trial, record, at_once=at_once)
+        except LineLostError as error:
+            raise SilenceError(f"the connection was lost: {error}") from None
