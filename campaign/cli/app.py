@@ -325,6 +325,88 @@ def show(run: RunArgument, results: ResultsOption = RESULTS) -> None:
 
 
 @app.command()
+def verify(
+    runs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RUN...",
+            help="A path, a run's name, a unique beginning of it, or a pattern such as '2026-*'.",
+            show_default=False,
+        ),
+    ],
+    results: ResultsOption = RESULTS,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Check every byte of archives against checksums, journal, format and fingerprints."""
+    from campaign.cli.verify import verify_archives
+
+    raise typer.Exit(verify_archives(runs, results, as_json=as_json))
+
+
+@app.command()
+def device(
+    bench: Annotated[
+        str,
+        typer.Option(
+            "--bench",
+            metavar="BENCH",
+            help="The bench behind the controller: a TOML file, or a shipped bench's name.",
+        ),
+    ],
+    pty: Annotated[bool, typer.Option("--pty", help="Serve a pseudo-terminal.")] = False,
+    tcp: Annotated[
+        str | None,
+        typer.Option(
+            "--tcp",
+            metavar="HOST:PORT",
+            help="Serve TCP there, port 0 for any; without --pty and --tcp 127.0.0.1:0.",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        str,
+        typer.Option("--speed", metavar="X", help="Times the wall clock, or max."),
+    ] = "1",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="NAME[=VALUE][@trial=N][@time=S]",
+            help="What shall go wrong, e.g. drop=1e-4 or reboot@trial=2; may be given again.",
+        ),
+    ] = None,
+    fault_seed: Annotated[
+        int, typer.Option("--fault-seed", metavar="N", min=0, help="Of what fails by chance.")
+    ] = 0,
+    heartbeat_timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--heartbeat-timeout",
+            metavar="S",
+            min=0.01,
+            max=60.0,
+            help="Silence after which it switches off; 0.1 s, at --speed max 3 s if absent.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Be a servo controller with a simulated bench, to rehearse against; Ctrl-C ends it."""
+    from campaign.cli.device import run_device
+
+    raise typer.Exit(
+        run_device(
+            bench,
+            tcp=tcp,
+            pty=pty,
+            speed=speed,
+            heartbeat_timeout=heartbeat_timeout,
+            faults=faults or (),
+            fault_seed=fault_seed,
+        )
+    )
+
+
+@app.command()
 def kinds(
     name: Annotated[
         str | None,

@@ -31,7 +31,12 @@ class FaultName(StrEnum):
 BYTE_FAULTS = (FaultName.DROP, FaultName.DUPLICATE, FaultName.REORDER, FaultName.CORRUPT)
 RATES = (*BYTE_FAULTS, FaultName.LOST_BLOCKS)
 
-SECONDS = {FaultName.STALL: 0.05, FaultName.REBOOT: 0.2, FaultName.UNPLUG: 1.0}
+SECONDS = {
+    FaultName.STALL: 0.05,
+    FaultName.REBOOT: 0.2,
+    FaultName.UNPLUG: 1.0,
+    FaultName.OVER_TEMPERATURE: 0.0,
+}
 """Faults that last a while, with how long when the user names no time (s of the wall clock)."""
 DEFAULT_TIME = 0.5
 """s into the trial."""

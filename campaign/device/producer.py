@@ -70,6 +70,12 @@ class Producer:
             return self._made - self._taken
 
     @property
+    def finished(self) -> bool:
+        """Whether the simulation has ended; samples of it may be left to take."""
+        with self._changed:
+            return self._ending is not None
+
+    @property
     def ending(self) -> Ending | None:
         """How the simulation ended; None until it has and all its samples were taken."""
         with self._changed:

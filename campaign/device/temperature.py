@@ -8,6 +8,7 @@ import numpy as np
 
 from campaign.trial import Array
 
+ZERO_CELSIUS = 273.15
 ROOM = 293.15
 """K."""
 THERMAL_RESISTANCE = 0.4
@@ -28,6 +29,16 @@ class Winding:
     def __init__(self, resistance: float) -> None:
         self._resistance = resistance
         self.temperature = ROOM
+
+    @property
+    def celsius(self) -> float:
+        """Its temperature in degrees Celsius, as in STATUS."""
+        return self.temperature - ZERO_CELSIUS
+
+    def overheat(self) -> float:
+        """Be too hot all of a sudden; how hot (degree Celsius)."""
+        self.temperature = LIMIT + 5.0
+        return self.celsius
 
     def heat(self, current: Array, duration: float) -> None:
         """`duration` (s) has passed with `current` (A), shape (n,), in the motor."""

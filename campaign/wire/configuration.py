@@ -11,9 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from campaign.trial import Trial
-
-Value = float | int | bool | str | tuple[float, ...]
-"""What one name is set to: f64, i64, bool, text, or an array of f64."""
+from campaign.wire.parameters import Value
 
 REHEARSAL = "rehearsal"
 SIMULATED_TASK = ("base_acceleration", "disturbance", "start_angle")

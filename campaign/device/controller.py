@@ -1,0 +1,353 @@
+"""The controller: commands in, answers and records out. It has no input or output of its own.
+
+What a command does to the state is `campaign.wire.statemachine`; here is what it does besides.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from campaign.device.configuration import Refused, make_trial
+from campaign.device.faults import FaultName
+from campaign.device.machine import Machine, Setup
+from campaign.device.motion import Strike
+from campaign.device.session import LONGEST_ARRAY, Configuration, Session
+from campaign.physics.compensation import compensation_methods
+from campaign.trial import Ending, Fault, Outcome
+from campaign.wire import codes
+from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
+from campaign.wire.device import Ack, Capabilities, Nak, Status
+from campaign.wire.fields import clipped
+from campaign.wire.frames import Frame
+from campaign.wire.host import Arm, Clear, Heartbeat, Hello, Release, Resend, Set, Start, Stop
+from campaign.wire.messages import Item, Message, Record, channels_messages, decode
+from campaign.wire.statemachine import (
+    WATCHED,
+    Turn,
+    after,
+    after_end,
+    after_hello,
+    after_silence,
+)
+
+HEARTBEAT_TIMEOUT = 0.1
+"""s of the wall clock."""
+PATIENCE = 3.0
+"""s of silence that count as a loss where the clock is the messages'."""
+FASTEST_RECORDING = 1e5
+"""Hz."""
+STOPPED = Ending(Outcome.INTERRUPTED, "stopped by the operator")
+FEATURES = ("rate", "torque", "prescribed", "spring", "base-motion", "rehearsal")
+
+Send = Callable[[int | None, Message], None]
+"""Sends a message to one client, or to all of them (None)."""
+
+
+@dataclass(frozen=True)
+class Interruption:
+    """What a fault has done to the line, until a moment of the steady clock.
+
+    Attributes:
+        unplugged: the line is cut, and the controller goes on; else the controller hangs.
+    """
+
+    until: float = -math.inf
+    unplugged: bool = False
+
+
+class Controller:
+    """One controller with its bench, whoever talks to it.
+
+    Attributes:
+        machine: the axis.
+        state: as in STATUS.
+        interruption: whoever keeps the line must look at it.
+        bad_frames: how many had to be thrown away; whoever decodes them counts.
+    """
+
+    def __init__(self, setup: Setup, send: Send, timeout: float = HEARTBEAT_TIMEOUT) -> None:
+        """`timeout`: heartbeats must not be further apart (s of the wall clock)."""
+        self._setup = setup
+        self._now = setup.now
+        self._timeout = timeout
+        self._send = send
+        self.machine = Machine(setup, self._emit)
+        self.interruption = Interruption()
+        self.bad_frames = 0
+        self._boot = 0
+        self._hot_until = -math.inf
+        self.state = State.IDLE
+        self._switch_on()
+
+    def handle(self, client: int, frame: Frame) -> None:
+        """Do what a frame says that `client` sent, and answer."""
+        if frame.kind & 0x80:
+            return  # an echo of what a device said
+        if frame.kind == Kind.SAFE:
+            self._safe(client, frame)
+        elif frame.kind == Kind.HELLO:
+            self._hello(client, frame)
+        elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND):
+            self._unnumbered(client, frame)
+        elif client != self._session.client:
+            self._refuse(client, frame, Refused(NakCode.BUSY, "", "another session has the line"))
+        else:
+            self._command(client, frame)
+
+    def tick(self) -> None:
+        """Do what is due."""
+        if self.state in WATCHED and self._now() >= self._silent_at():
+            self._silence()
+        for strike in self.machine.tick():
+            self._strike(strike)
+        if self.machine.outcome is not None and self.state is State.RUNNING:
+            if self.machine.outcome is Outcome.FAULT:
+                self._fault = codes.Fault.OTHER
+            self._enter(after_end(self.state, codes.Outcome[self.machine.outcome.name]))
+
+    def deadline(self) -> float:
+        """When (of the steady clock) `tick` is due at the latest; infinite when nothing is."""
+        silent_at = self._silent_at() if self.state in WATCHED else math.inf
+        return min(silent_at, self.machine.deadline())
+
+    # Answers
+
+    def status(self) -> Status:
+        """How it is now."""
+        ring, now = self.machine.ring, self._now()
+        heard = self._session.heard_at
+        return Status(
+            state=self.state,
+            fault=self._fault,
+            at_rest=self.machine.at_rest,
+            drive_on=self.machine.drive_on,
+            boot=self._boot,
+            clock=now - self._on_since,
+            heartbeat=self._session.heartbeat,
+            heartbeat_age=now - max(heard, self._on_since),
+            trial=ring.trial,
+            first_record=ring.first,
+            next_record=ring.next,
+            ring_used=ring.used,
+            bad_frames=self.bad_frames,
+            temperature=self.machine.winding.celsius,
+        )
+
+    def _capabilities(self, sequence: int, version: int) -> Capabilities:
+        clock = ("message-clock",) if math.isinf(self._setup.speed) else ()
+        return Capabilities(
+            sequence=sequence,
+            version=version,
+            lowest=VERSION,
+            highest=VERSION,
+            boot=self._boot,
+            state=self.state,
+            heartbeat_timeout=self._timeout,
+            ring_records=self.machine.ring.capacity,
+            longest_array=LONGEST_ARRAY,
+            sample_rate=FASTEST_RECORDING,
+            name=clipped(f"rehearsal of {self._setup.bench.name}"),
+            firmware="campaign device",
+            features=(*FEATURES, *clock),
+            compensations=tuple(compensation_methods()),
+            limits=tuple(Item(f"limits.{name}", bound) for name, bound in self._setup.bench.limits),
+        )
+
+    def _refuse(self, client: int, frame: Frame, why: Refused) -> Nak:
+        name, text = clipped(why.name), clipped(why.text)
+        nak = Nak(frame.sequence, frame.kind, why.code, self.state, name, text)
+        self._send(client, nak)
+        return nak
+
+    def _emit(self, record: Record) -> None:
+        if self._session.client is not None:
+            self._send(self._session.client, record)
+
+    def _enter(self, state: State) -> None:
+        if state is State.IDLE:
+            self._configuration = Configuration()
+            self._fault = codes.Fault.NONE
+        if state is not self.state:
+            self.state = state
+            self._send(None, self.status())
+
+    # Messages that are not numbered
+
+    def _safe(self, client: int, frame: Frame) -> None:
+        ending = Ending(Outcome.INTERRUPTED, "switched off by SAFE")
+        self.machine.switch_off(ending)
+        state = after(self.state, Kind.SAFE)
+        if isinstance(state, State):
+            self._enter(state)
+        self._send(client, Ack(frame.sequence, Kind.SAFE, self.state, self._boot))
+        self._send(client, self.status())
+
+    def _hello(self, client: int, frame: Frame) -> None:
+        message = self._decoded(client, frame)
+        if not isinstance(message, Hello):
+            return
+        same = self._session.numbering.same_session(message.session)
+        state = after_hello(self.state, same)
+        if isinstance(state, NakCode):
+            self._refuse(client, frame, Refused(state, "", "another session is using it"))
+            return
+        if not message.lowest <= VERSION <= message.highest:
+            self._send(client, self._capabilities(frame.sequence, 0))
+            return
+        self._session.begin(client, message.session, frame.sequence)
+        self._enter(state)
+        self._send(client, self._capabilities(frame.sequence, VERSION))
+
+    def _unnumbered(self, client: int, frame: Frame) -> None:
+        try:
+            message = decode(frame.kind, frame.body)
+        except WireError:
+            return  # it would come again if it mattered
+        ring = self.machine.ring
+        if isinstance(message, Heartbeat):
+            if client == self._session.client:
+                self._session.heard_at = self._now()
+                self._session.heartbeat = message.counter
+                if message.trial == ring.trial:
+                    ring.free(message.next)
+            self._send(client, self.status())
+        elif isinstance(message, Resend) and message.trial == ring.trial:
+            for record in ring.again(message.first, message.count):
+                self._send(client, record)
+
+    # Commands
+
+    def _command(self, client: int, frame: Frame) -> None:
+        turn = self._session.numbering.turn(frame.kind, frame.sequence, frame.body)
+        if turn is Turn.OUT_OF_ORDER:
+            text = "neither the next command nor the last one again"
+            self._refuse(client, frame, Refused(NakCode.OUT_OF_ORDER, "", text))
+            return
+        if turn is Turn.REPEATED:
+            for answer in self._session.answers:
+                self._send(client, answer)
+            return
+        message = self._decoded(client, frame)
+        if message is not None:
+            self._session.answers = self._carried_out(client, frame, message)
+
+    def _decoded(self, client: int, frame: Frame) -> Message | None:
+        try:
+            return decode(frame.kind, frame.body)
+        except WireError as error:
+            known = frame.kind in set(Kind)
+            code = NakCode.MALFORMED if known else NakCode.UNKNOWN_MESSAGE
+            self._session.answers = (self._refuse(client, frame, Refused(code, "", str(error))),)
+            return None
+
+    def _carried_out(self, client: int, frame: Frame, message: Message) -> tuple[Message, ...]:
+        """Carry out a new command; what was answered."""
+        state = after(self.state, Kind(frame.kind))
+        if isinstance(state, NakCode):
+            text = f"not in state {self.state.text}"
+            return (self._refuse(client, frame, Refused(state, "", text)),)
+        try:
+            further = self._do(message, frame)
+        except Refused as why:
+            return (self._refuse(client, frame, why),)
+        # STOP leaves the state to the end of the trial; START's motion may have none to wait for.
+        ack = Ack(frame.sequence, Kind(frame.kind), state, self._boot)
+        for answer in (ack, *further):
+            self._send(client, answer)
+        self._enter(state)
+        return (ack, *further)
+
+    def _do(self, message: Message, frame: Frame) -> tuple[Message, ...]:
+        """What a command does besides changing the state. Raises Refused."""
+        match message:
+            case Set():
+                self._configuration.add(frame.body, message.items)
+            case Arm():
+                return self._arm(message, frame)
+            case Start():
+                self._check_heard()
+                self.machine.start(message.trial)
+            case Stop():
+                self.machine.switch_off(STOPPED)
+            case Release():
+                if message.trial != self.machine.ring.trial:
+                    text = f"the records are of trial {self.machine.ring.trial}"
+                    raise Refused(NakCode.WRONG_TRIAL, "", text)
+                self.machine.ring.begin(0)
+            case Clear():
+                self._clear()
+        return ()
+
+    def _arm(self, message: Arm, frame: Frame) -> tuple[Message, ...]:
+        self._check_heard()
+        trial = make_trial(self._setup.bench, self._configuration.whole(message.crc))
+        why = self.machine.refuses(trial)
+        if why is not None:
+            raise Refused(NakCode.OUT_OF_RANGE, "", why)
+        channels = self.machine.arm(trial)
+        return tuple(channels_messages(frame.sequence, trial.task.sample_rate, channels))
+
+    def _clear(self) -> None:
+        if not self.machine.at_rest:
+            raise Refused(NakCode.NOT_READY, "", "the axis is not yet at rest")
+        if self._now() < self._hot_until:
+            raise Refused(NakCode.CAUSE_PERSISTS, "", "the motor is still too hot")
+        self.machine.drop()
+        self.machine.ring.begin(0)
+
+    def _check_heard(self) -> None:
+        if self._now() >= self._silent_at():
+            raise Refused(NakCode.NO_HEARTBEAT, "", "no heartbeat has been heard lately")
+
+    # What happens by itself
+
+    def _silent_at(self) -> float:
+        return self._session.heard_at + self._timeout
+
+    def _silence(self) -> None:
+        reason = f"no heartbeat for {self._timeout * 1e3:g} ms"
+        self._fail(Fault.HEARTBEAT, reason)
+        self._enter(after_silence(self.state))
+
+    def _fail(self, fault: Fault, reason: str) -> None:
+        self._fault = codes.Fault[fault.name]
+        self.machine.switch_off(Ending(Outcome.FAULT, reason, fault=fault), told=True)
+        self._enter(State.FAULT)
+
+    def _strike(self, strike: Strike) -> None:
+        """A fault that was asked for."""
+        fault = strike.fault
+        until = self._now() + fault.seconds
+        match fault.name:
+            case FaultName.STALL:
+                self.interruption = Interruption(until)
+            case FaultName.UNPLUG:
+                self.interruption = Interruption(until, unplugged=True)
+            case FaultName.REBOOT:
+                self._switch_on()
+                self.interruption = Interruption(until)
+            case FaultName.SENSOR:
+                self._fail(Fault.SENSOR, f"{fault.channel} is stuck")
+            case FaultName.OVER_TEMPERATURE:
+                self._hot_until = until
+                celsius = self.machine.winding.overheat()
+                self._fail(Fault.OVER_TEMPERATURE, f"the motor is too hot: {celsius:.0f} degC")
+            case FaultName.LIMIT_SWITCH:
+                self._fail(Fault.LIMIT_SWITCH, "the axis has run into a limit switch")
+
+    def _switch_on(self) -> None:
+        """As after a reset: nothing is remembered, and the boot number is another one."""
+        self.machine.drop()
+        self.machine.ring.begin(0)
+        self.machine.outcome = None
+        before = self._boot
+        while self._boot == before:
+            self._boot = secrets.randbits(32)
+        self._on_since = self._now()
+        self._session = Session()
+        self._configuration = Configuration()
+        self._fault = codes.Fault.NONE
+        self.state = State.IDLE

@@ -1,0 +1,75 @@
+"""Who holds the line, and what was asked and answered last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from campaign.device.configuration import Refused, check_name
+from campaign.wire.codes import NakCode, WireError
+from campaign.wire.messages import Message
+from campaign.wire.parameters import ArraySlice, Item, Value, assembled, configuration_crc
+from campaign.wire.statemachine import Numbering
+
+LONGEST_ARRAY = 65536
+MOST_BYTES = 4 * 1024 * 1024
+"""of a configuration."""
+
+
+@dataclass
+class Session:
+    """One host's session, until another one's begins.
+
+    Attributes:
+        client: the connection that holds the line; None before the first HELLO.
+        numbering: of its commands.
+        answers: to the last numbered command, for when it comes again.
+        heard_at: when (of the steady clock) the last heartbeat came.
+        heartbeat: its counter.
+    """
+
+    client: int | None = None
+    numbering: Numbering = field(default_factory=Numbering)
+    answers: tuple[Message, ...] = ()
+    heard_at: float = -math.inf
+    heartbeat: int = 0
+
+    def begin(self, client: int, number: int, sequence: int) -> None:
+        """A HELLO was accepted: `client` holds the line, and commands are numbered from it on."""
+        if not self.numbering.same_session(number):
+            self.heard_at, self.heartbeat = -math.inf, 0
+        self.client = client
+        self.numbering.begin(number, sequence)
+
+
+class Configuration:
+    """What SET has brought since the controller was idle."""
+
+    def __init__(self) -> None:
+        self._bodies: list[bytes] = []
+        self._items: list[Item] = []
+        self._size = 0
+
+    def add(self, body: bytes, items: Sequence[Item]) -> None:
+        """Add one SET. Raises Refused, and then has added nothing."""
+        for item in items:
+            check_name(item.name)
+            if isinstance(item.value, ArraySlice) and item.value.total > LONGEST_ARRAY:
+                text = f"an array of more than {LONGEST_ARRAY} values"
+                raise Refused(NakCode.TOO_LARGE, item.name, text)
+        if self._size + len(body) > MOST_BYTES:
+            raise Refused(NakCode.TOO_LARGE, "", f"more than {MOST_BYTES} bytes of parameters")
+        self._size += len(body)
+        self._bodies.append(body)
+        self._items += items
+
+    def whole(self, crc: int) -> dict[str, Value]:
+        """All parameters, if they are what the host meant. Raises Refused."""
+        if configuration_crc(self._bodies) != crc:
+            text = "the parameters that arrived are not those that were sent"
+            raise Refused(NakCode.CHECKSUM, "", text)
+        try:
+            return assembled(self._items)
+        except WireError as error:
+            raise Refused(NakCode.INCOMPLETE, "", str(error)) from None

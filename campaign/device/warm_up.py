@@ -1,0 +1,16 @@
+"""Compiling the simulation before anybody waits for it."""
+
+from __future__ import annotations
+
+from campaign.backends.sim import SimBackend, SimOptions
+from campaign.physics.bench import Bench
+from campaign.trial import MemoryRecorder, Task, Trial
+
+
+def warm_up(bench: Bench) -> None:
+    """Simulate some milliseconds, so that everything is compiled and imported afterwards."""
+    rate = bench.controller.sample_rate or 1000.0
+    task = Task(mode="rate", duration=2.5 / rate, window=(0.0, 0.0), sample_rate=rate)
+    tree = bench.model_dump(mode="json")
+    trial = Trial(number=1, test="warm-up", kind="warm-up", seed=0, bench=tree, task=task)
+    SimBackend(SimOptions()).execute(trial, MemoryRecorder(), lambda: False)
