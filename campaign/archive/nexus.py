@@ -9,6 +9,7 @@ from a bench without one of the required channels, is archived all the same, wit
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -57,6 +58,9 @@ def write_definition(entry: h5py.Group, bench: Tree, channels: Iterable[ChannelI
     h5o.copy(template.id, b"instrument", entry.id, b"instrument")
 
 
+_TEMPLATES = itertools.count(1)
+
+
 @dataclass(frozen=True)
 class _Described:
     """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
@@ -84,7 +88,8 @@ def _template(bench: _Described) -> h5py.File:
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(1 << 14, False)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    file = h5py.File(h5f.create(b"instrument", h5f.ACC_TRUNC, fapl=access))
+    label = f"instrument-{next(_TEMPLATES)}".encode()  # HDF5 knows files in memory by their names
+    file = h5py.File(h5f.create(label, h5f.ACC_TRUNC, fapl=access))
     instrument = hdf5.make_group(file, "instrument", "NXinstrument")
     hdf5.put_text(instrument, "name", bench.name)
     for name, channel in _SENSORS.items():

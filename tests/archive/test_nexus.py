@@ -46,3 +46,14 @@ def test_the_checker_finds_what_is_wrong(sealed):
         file["trial_00001/data"].attrs["NX_class"] = "NXnonsense"
     errors, _, _ = nxcheck(sealed)
     assert errors > 0
+
+
+def test_a_run_may_have_many_benches(tmp_path, kit):
+    trials = [
+        kit.trial(number).model_copy(update={"bench": {"name": f"bench {number}"}})
+        for number in (1, 2, 3)
+    ]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        kit.record(writer, trial, 5)
+    assert len(list(writer.folder.glob("trial-*.nxs"))) == 3
