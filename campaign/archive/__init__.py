@@ -6,7 +6,7 @@ format is described in `docs/archive-format.md`. Importing this package does not
 
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
-from campaign.archive.listing import RunSummary, find_run, list_runs
+from campaign.archive.listing import RunSummary, find_run, find_runs, list_runs
 from campaign.archive.reader import RunReader, open_run
 from campaign.archive.writer import RunWriter, TrialWriter
 
@@ -20,6 +20,7 @@ __all__ = [
     "RunWriter",
     "TrialWriter",
     "find_run",
+    "find_runs",
     "list_runs",
     "new_run_name",
     "open_run",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -63,25 +63,36 @@ def write_lines_atomically(path: Path, lines: Iterable[str]) -> None:
     publish(part, path)
 
 
-def sha256_of(path: Path, blank: tuple[int, int] = (0, 0)) -> str:
+def sha256_of(
+    path: Path,
+    blank: tuple[int, int] = (0, 0),
+    progress: Callable[[int], object] = lambda count: None,
+) -> str:
     """SHA-256 of a file in flat memory.
 
     Args:
         path: the file.
         blank: offset and length of bytes that count as `0` digits: where the hash itself stands.
+        progress: is told how many bytes were read, now and then.
     """
     offset, length = blank
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        _digest(file, digest, offset)
+        _digest(file, digest, offset, progress)
         digest.update(b"0" * len(file.read(length)))
-        _digest(file, digest, None)
+        _digest(file, digest, None, progress)
     return digest.hexdigest()
 
 
-def _digest(file: BinaryIO, digest: hashlib._Hash, length: int | None) -> None:
+def _digest(
+    file: BinaryIO,
+    digest: hashlib._Hash,
+    length: int | None,
+    progress: Callable[[int], object],
+) -> None:
     """Feed the next `length` bytes, or all that are left."""
     left = length
     while block := file.read(_BLOCK if left is None else min(_BLOCK, left)):
         digest.update(block)
+        progress(len(block))
         left = None if left is None else left - len(block)

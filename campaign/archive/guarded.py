@@ -80,6 +80,28 @@ def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     return group
 
 
+def member(parent: h5py.Group, name: str) -> h5py.Group | None:
+    """The group `name`, of whatever class; None when it is a dataset. No link is followed."""
+    found = _own(parent, name)
+    if isinstance(found, h5py.Dataset):
+        return None
+    if not isinstance(found, h5py.Group):
+        raise ArchiveError(f"{_place(parent, name)}: is neither a group nor a dataset")
+    return found
+
+
+def check_dataset(parent: h5py.Group, name: str) -> int:
+    """Read a dataset of any kind against its checksum; returns the bytes it has in the file."""
+    dataset = _dataset_at(parent, name)
+    if dataset.shape == () and dataset.dtype.kind == "S":
+        text_at(parent, name)
+    elif dataset.shape == () and dataset.dtype in (np.dtype("<i8"), SAMPLE):
+        _check(dataset, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
+    else:
+        check_samples(samples_at(parent, name))
+    return int(dataset.id.get_storage_size())
+
+
 def names(group: h5py.Group) -> list[str]:
     """Names of what `group` holds, sorted."""
     return sorted(group)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from campaign.archive.damage import DamageList
@@ -91,6 +92,22 @@ def find_run(results: Path, name: str | None = None) -> Path:
     if matching:
         raise UsageError(f"{name!r} begins several runs: {_some(matching)}")
     raise UsageError(f"{results}: there is no run {name!r}; there are {_some(list(runs))}")
+
+
+def find_runs(results: Path, name: str) -> list[Path]:
+    """The runs that a user means by a name, a path, or a pattern of either such as `2026-11-*`.
+
+    Raises UsageError when there is none.
+    """
+    if not any(mark in name for mark in "*?[") or _as_path(name):
+        return [find_run(results, name)]
+    wanted = Path(name)
+    folder = wanted.parent if wanted.parent != Path() else results
+    pattern = wanted.name.removesuffix(SEALED).removesuffix(PARTIAL)
+    found = [path for path in run_paths(folder) if fnmatchcase(path.stem, pattern)]
+    if not found:
+        raise UsageError(f"{folder}: there is no run that {name!r} matches")
+    return found
 
 
 def _as_path(name: str) -> Path | None:

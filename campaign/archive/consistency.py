@@ -1,0 +1,149 @@
+"""Whether the parts of a run agree: journal, plan, fingerprints, and the trials that are there."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.damage import DamageList
+from campaign.archive.full_plan import FullPlan
+from campaign.archive.header import PlannedTrial, RunHeader
+from campaign.archive.journal import RunStarted, TrialFinished
+from campaign.archive.story import Lines
+from campaign.archive.trial_file import earlier_entry_name, entry_name
+from campaign.errors import ArchiveError
+from campaign.trial import Trial, canonical_json
+
+_BESIDE = {"published", "policy"}
+"""Of the normalised protocol, what determines no trial and is not part of its fingerprint."""
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What is compared of a trial that is there; its bench and samples are let go of.
+
+    Attributes:
+        entry: its name in a sealed run, e.g. `trial_00017_attempt_1`.
+        place: where it lies, for messages.
+    """
+
+    entry: str
+    place: str
+    number: int
+    test: str
+    kind: str
+    role: str
+    fingerprint: str
+    outcome: str
+    reason: str
+    safe_state: str
+
+    @classmethod
+    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> Executed:
+        trial, ending = archived.trial, archived.ending
+        return cls(
+            entry=entry,
+            place=place,
+            number=trial.number,
+            test=trial.test,
+            kind=trial.kind,
+            role=trial.role,
+            fingerprint=fingerprint,
+            outcome=ending.outcome,
+            reason=ending.reason,
+            safe_state=ending.safe_state,
+        )
+
+
+def attempts(story: Lines) -> dict[str, TrialFinished]:
+    """Every finished attempt by the name of its group in a sealed run."""
+    last = {number: finished.attempt for number, finished in story.finished.items()}
+    return {
+        entry_name(e.trial)
+        if e.attempt == last[e.trial]
+        else earlier_entry_name(e.trial, e.attempt): e
+        for e in story.attempts
+    }
+
+
+def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
+    """Whole lines, and the beginning that the header tells of."""
+    for number in story.damaged:
+        found.add(f"{place}:{number}", "is not a line of a journal")
+    started = story.all(RunStarted)
+    if not started or not isinstance(story.entries[0], RunStarted):
+        found.add(place, "does not begin with the start of a run")
+    elif started[0].run != header.name:
+        found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
+    elif started[0].trials != header.trials:
+        found.add(place, f"tells of {started[0].trials} trials; {header.trials} are planned")
+
+
+def check_trials(
+    story: Lines, there: Mapping[str, Executed], unreadable: Iterable[str], found: DamageList
+) -> None:
+    """Each finished trial of the journal is there, ended as it says; `unreadable` are told of."""
+    told = attempts(story)
+    for entry in told.keys() - there.keys() - set(unreadable):
+        found.add(f"/{entry}", "is missing, and the journal says that it finished")
+    for entry, trial in there.items():
+        finished = told.get(entry)
+        if finished is None:
+            found.add(trial.place, "is there, and no line of the journal says that it finished")
+            continue
+        for what in ("outcome", "reason", "safe_state"):
+            mine, theirs = getattr(trial, what), str(getattr(finished, what))
+            if mine != theirs:
+                found.add(trial.place, f"has {what} {mine!r}, and the journal says {theirs!r}")
+
+
+def check_plan(
+    plan: tuple[PlannedTrial, ...],
+    header: RunHeader,
+    there: Iterable[Executed],
+    place: str,
+    found: DamageList,
+) -> None:
+    """Each executed trial is the one that was planned."""
+    if len(plan) != header.trials:
+        found.add(place, f"has {len(plan)} trials, and the header says {header.trials}")
+    planned = {trial.number: trial for trial in plan}
+    for trial in there:
+        wanted = planned.get(trial.number)
+        if wanted is None:
+            found.add(trial.place, "is not in the plan")
+            continue
+        for what in ("test", "kind", "role", "fingerprint"):
+            mine, theirs = getattr(trial, what), str(getattr(wanted, what))
+            if mine != theirs:
+                found.add(trial.place, f"has {what} {mine!r}, and the plan says {theirs!r}")
+
+
+def check_full_plan(
+    full: FullPlan, plan: tuple[PlannedTrial, ...], place: str, found: DamageList
+) -> None:
+    """The whole description of each planned trial is that of which the plan has the fingerprint."""
+    if not len(full):
+        return  # format 1 has none
+    if len(full) != len(plan):
+        found.add(place, f"has {len(full)} trials, and the plan has {len(plan)}")
+        return
+    for planned in plan:
+        with found.noting():
+            trial: Trial = full.trial(planned.number)
+            if trial.fingerprint != planned.fingerprint:
+                raise ArchiveError(
+                    f"{found.path}: {place}: trial {planned.number} does not match its fingerprint"
+                )
+
+
+def check_protocol(header: RunHeader, place: str, found: DamageList) -> None:
+    """The normalised protocol is that of which the header has the fingerprint."""
+    if not header.fingerprint and not header.normalised:
+        return
+    what = {name: tree for name, tree in header.normalised.items() if name not in _BESIDE}
+    digest = hashlib.sha256(canonical_json(what).encode()).hexdigest()
+    if digest != header.fingerprint:
+        found.add(place, "the normalised protocol does not match its fingerprint")

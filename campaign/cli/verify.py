@@ -1,0 +1,77 @@
+"""`campaign verify`: whether archives are, to the last byte, what was written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from campaign.archive import find_runs
+from campaign.archive.damage import Damage
+from campaign.archive.verification import Verification, verify_run
+from campaign.cli.output import error_console, print_line, print_note
+from campaign.errors import ExitCode
+
+
+def verify_archives(names: Sequence[str], results: Path, *, as_json: bool) -> ExitCode:
+    """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them."""
+    paths = list(dict.fromkeys(path for name in names for path in find_runs(results, name)))
+    found = []
+    for path in paths:
+        with _progress(path) as progress:
+            found.append(verify_run(path, progress))
+        if not as_json:
+            _print(found[-1])
+    if as_json:
+        print_line(json.dumps([_tree(one) for one in found], indent=2))
+    return ExitCode.DONE if all(one.sound for one in found) else ExitCode.ARCHIVE
+
+
+def _print(found: Verification) -> None:
+    """One line per problem on standard output; one in all when there is none."""
+    for damage in found.problems:
+        print_line(f"{found.path}: {_told(damage)}")
+    if found.sound:
+        print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets)")
+    for damage in found.remarks:
+        print_note(f"{found.path}: note: {damage}", style="yellow")
+
+
+def _told(damage: Damage) -> str:
+    if damage.trial and damage.channel:
+        return f"{damage.trial}, {damage.channel}: {damage}"
+    return f"{damage.trial}: {damage}" if damage.trial else str(damage)
+
+
+def _tree(found: Verification) -> dict[str, object]:
+    return {
+        "path": str(found.path),
+        "sound": found.sound,
+        "trials": found.trials,
+        "datasets": found.datasets,
+        "problems": [vars(damage) for damage in found.problems],
+        "remarks": [vars(damage) for damage in found.remarks],
+    }
+
+
+@contextlib.contextmanager
+def _progress(path: Path) -> Iterator[Callable[[int], object]]:
+    """A bar on a terminal; what is read is about twice what the run has in bytes."""
+    console = error_console()
+    if not console.is_terminal:
+        yield lambda count: None
+        return
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(path.name, total=2 * _bytes(path))
+        yield lambda count: bar.advance(task, count)
+
+
+def _bytes(path: Path) -> int:
+    files = path.iterdir() if path.is_dir() else [path]
+    with contextlib.suppress(OSError):
+        return sum(file.stat().st_size for file in files)
+    return 0

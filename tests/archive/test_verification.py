@@ -1,0 +1,196 @@
+"""`verify_run` finds whatever is not as it was written, and says where."""
+
+import hashlib
+import json
+import random
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from campaign.archive import RunWriter
+from campaign.archive.journal import JOURNAL
+from campaign.archive.verification import STRUCTURE, UNFINISHED, verify_run
+from campaign.trial import Ending, Fault, Outcome
+
+KEPT = Path(__file__).parent / "kept"
+PROTOCOL = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}], "published": "x"}
+FINGERPRINT = hashlib.sha256(
+    b'{"tests":[{"name":"map","numbers":[1,1.0,1e-300,null,true]}]}'
+).hexdigest()
+PROVENANCE = {"normalised": PROTOCOL, "fingerprint": FINGERPRINT}
+
+
+@pytest.fixture
+def good(tmp_path, kit):
+    """A sealed run with a short trial, a failed one, one of two chunks with a preview."""
+    return kit.run(tmp_path, [50, None, 40_000], **PROVENANCE)
+
+
+@pytest.fixture
+def folder(tmp_path, kit):
+    """A killed run: three trials finished, the second at its second attempt; one was begun."""
+    trials = [kit.trial(number) for number in range(1, 5)]
+    writer = RunWriter.create(tmp_path, kit.header(**PROVENANCE), trials)
+    kit.record(writer, trials[0], 20)
+    failed = writer.begin(trials[1])
+    failed.finish(Ending(Outcome.FAULT, "no power", fault=Fault.DRIVE), kit.STARTED, kit.ENDED)
+    kit.record(writer, trials[1], 30)
+    kit.record(writer, trials[2], 40)
+    writer.begin(trials[3])
+    return writer.folder
+
+
+def places(path):
+    return [damage.place for damage in verify_run(path).problems]
+
+
+@pytest.mark.parametrize("name", ["format-1.nxs", "format-1.partial"])
+def test_an_archive_of_the_first_format_is_sound(name):
+    found = verify_run(KEPT / name)
+    assert (found.problems, found.remarks) == ((), ())
+
+
+def test_a_sealed_run_is_sound_and_every_dataset_was_read(good):
+    found = verify_run(good)
+    assert (found.problems, found.remarks, found.trials) == ((), (), 3)
+    with_checksum = []
+
+    def visit(name, item):
+        if "sha256" in item.attrs:
+            with_checksum.append(name)
+
+    with h5py.File(good) as file:
+        file.visititems(visit)
+    assert found.datasets == len(with_checksum)
+
+
+def test_a_killed_run_is_sound_and_what_is_not_its_is_named(folder):
+    found = verify_run(folder)
+    assert (found.problems, found.trials) == ((), 4)
+    assert [remark.place for remark in found.remarks] == ["trial-00004.nxs.part"]
+
+
+def flips(path: Path, count: int, seed: int) -> None:
+    """Change one byte anywhere, `count` times, and verify."""
+    content = path.read_bytes()
+    rng = random.Random(seed)
+    for _ in range(count):
+        place = rng.randrange(len(content))
+        mutated = bytearray(content)
+        mutated[place] ^= rng.randrange(1, 256)
+        path.write_bytes(mutated)
+        assert not verify_run(path).sound, f"a flip at byte {place} was not found"
+    path.write_bytes(content)
+    assert verify_run(path).sound
+
+
+def test_a_byte_that_is_not_as_it_was_is_always_found(tmp_path, kit):
+    flips(kit.run(tmp_path, [50, None], **PROVENANCE), 120, 1)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(4))
+def test_a_byte_that_is_not_as_it_was_is_always_found_in_thousands(tmp_path, kit, seed):
+    flips(kit.run(tmp_path, [50, None, 200], **PROVENANCE), 1000, seed)
+
+
+@pytest.mark.parametrize("place", [0, 20_000, 39_999])
+def test_a_flip_in_the_samples_is_named_by_trial_and_channel(good, place):
+    with h5py.File(good, "r+") as file:
+        chunk = file["trial_00003/data/gyro_rate"].id.get_chunk_info(place // 32_768)
+    content = bytearray(good.read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 1
+    good.write_bytes(content)
+    (problem,) = verify_run(good).problems
+    assert (problem.trial, problem.channel) == ("trial-00003", "gyro_rate")
+
+
+def test_a_flip_that_no_dataset_shows_is_structure(good):
+    with h5py.File(good) as file:
+        digest = file["run/outcome/file_sha256"].id.get_offset()
+    content = bytearray(good.read_bytes())
+    content[digest] ^= 1
+    good.write_bytes(content)
+    assert [damage.reason for damage in verify_run(good).problems] == [STRUCTURE]
+
+
+@pytest.mark.parametrize(
+    ("place", "old", "new", "told"),
+    [
+        ("run/provenance/normalised", "map", "mop", "/run/provenance"),
+        ("run/plan/data", '"role":"measurement"', '"role":"warm-up"', "/trial_00001"),
+        ("run/journal/data", '"outcome":"fault"', '"outcome":"limit"', "/trial_00002"),
+        ("run/journal/data", '"status":"failed trials"', '"status":"complete"', "/run/outcome/"),
+        ("run/journal/data", "2026-11-21T09-36-58-tiny", "another", "/run/journal"),
+        ("trial_00001/record/channels", "gyro_rate", "gyro", "/trial_00001/data/gyro"),
+        ("trial_00001/record/fingerprint", "a", "b", "/trial_00001/record"),
+    ],
+)
+def test_parts_that_do_not_agree_are_named(good, place, old, new, told):
+    with h5py.File(good, "r+") as file:
+        text = file[place][()].decode()
+        assert old in text
+        del file[place]
+        changed = text.replace(old, new).encode()
+        kind = h5py.string_dtype("utf-8", len(changed))
+        file.create_dataset(place, data=np.array(changed, dtype=kind))
+        file[place].attrs["sha256"] = hashlib.sha256(changed).hexdigest()
+    assert any(found.startswith(told) for found in places(good)), verify_run(good).problems
+
+
+def test_what_is_missing_and_what_is_unknown_are_named(good):
+    with h5py.File(good, "r+") as file:
+        del file["trial_00001/record/outcome"], file["trial_00003"], file["run/source_001/data"]
+        del file["trial_00001/data"].attrs["axes"]
+        file["run/extra"] = 1.0
+    found = verify_run(good)
+    assert {
+        "/trial_00001/record/outcome",
+        "/trial_00003",
+        "/run/source_001/data",
+        "/trial_00001/data@axes",
+    } <= {damage.place for damage in found.problems}
+    assert [remark.place for remark in found.remarks] == ["/run/extra"]
+
+
+@pytest.mark.parametrize("name", ["run.nxs", "run.partial"])
+def test_what_is_no_run_is_a_problem_and_no_error(tmp_path, name):
+    (tmp_path / "run.nxs").write_bytes(b"nonsense")
+    (tmp_path / "run.partial").mkdir()
+    assert len(verify_run(tmp_path / name).problems) == 1
+
+
+def test_a_trial_file_that_changed_is_named(folder):
+    path = folder / "trial-00001.nxs"
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    assert {damage.trial for damage in verify_run(folder).problems} == {"trial-00001"}
+    (folder / "trial-00002-2.nxs").unlink()
+    assert "trial-00002 (attempt 2)" in {damage.trial for damage in verify_run(folder).problems}
+
+
+def test_a_trial_file_of_another_hash_is_named(folder):
+    journal = folder / JOURNAL
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    lines[1]["sha256"] = "0" * 64
+    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    (problem,) = verify_run(folder).problems
+    assert (problem.place, problem.reason) == ("trial-00001.nxs", UNFINISHED)
+
+
+@pytest.mark.parametrize("line", [0, 1, 2])
+def test_a_damaged_line_of_the_journal_is_named(folder, line):
+    journal = folder / JOURNAL
+    lines = journal.read_bytes().split(b"\n")
+    lines[line] = lines[line][:-9]
+    journal.write_bytes(b"\n".join(lines))
+    assert f"{JOURNAL}:{line + 1}" in places(folder)
+
+
+def test_progress_tells_of_the_bytes_that_were_read(good):
+    told = []
+    verify_run(good, told.append)
+    assert good.stat().st_size < sum(told) <= 2 * good.stat().st_size
