@@ -5,10 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
-from campaign.archive import RunWriter
+from campaign.archive import RunStatus, RunWriter
 from campaign.archive.hdf5 import CHUNK
+from campaign.archive.nexus import REQUIRED
+from campaign.trial import ChannelInfo, Ending, Outcome
 
 
 def nxcheck(path: Path) -> tuple[int, int, str]:
@@ -55,5 +58,9 @@ def test_a_run_may_have_many_benches(tmp_path, kit):
     ]
     writer = RunWriter.create(tmp_path, kit.header(), trials)
     for trial in trials:
-        kit.record(writer, trial, 5)
-    assert len(list(writer.folder.glob("trial-*.nxs"))) == 3
+        recorder = writer.begin(trial)
+        recorder.start(tuple(ChannelInfo(name, "rad", name, "rad") for name in REQUIRED))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    with h5py.File(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)) as file:
+        names = [file[f"trial_0000{n}/instrument/name"][()].decode() for n in (1, 2, 3)]
+    assert names == ["bench 1", "bench 2", "bench 3"]
