@@ -96,7 +96,10 @@ class RunReader:
             return self.full_plan.trial(number)
         executed = {archived.trial.number: archived.trial for archived in self.trials}
         if number not in executed:
-            raise ArchiveError(f"{self.path}: has no trial {number}, or not all that was planned")
+            raise ArchiveError(
+                f"{self.path}: has no trial {number}; an archive of format 1 holds only those that "
+                "were executed"
+            )
         return executed[number]
 
     def unchanged(self) -> bool:
