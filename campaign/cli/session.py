@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from campaign.archive import RunStatus, RunWriter
+from campaign.archive.header import SEALED
 from campaign.backends.interface import Backend, BackendKind
 from campaign.cli.ask import attendance_of
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
-from campaign.execution.naming import reference
+from campaign.execution.naming import how_to_go_on, reference
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.runner import run_plan
-from campaign.execution.safety import NOT_SAFE, connected, safe_when_broken_off
+from campaign.execution.safety import (
+    NOT_SAFE,
+    AbortedError,
+    NotSafeError,
+    connected,
+    safe_when_broken_off,
+)
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Policy
 from campaign.trial import Outcome, Trial
@@ -71,7 +78,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
         ):
             with safe_when_broken_off(backend):
                 writer = open_archive()
-            with closing(writer):
+            with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
     except BackendError as error:
         if outcome is None:
@@ -79,6 +86,19 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
         print_warning(str(error))
         return outcome, worst_exit_code([outcome.exit_code, error.exit_code])
     return outcome, outcome.exit_code
+
+
+@contextmanager
+def _saying_what_is_kept(folder: Path) -> Iterator[None]:
+    """A run that breaks off without an outcome: say where it is and what can be done with it."""
+    try:
+        yield
+    except (AbortedError, NotSafeError):
+        raise  # they say so themselves, after what matters more
+    except Exception:
+        kept = folder if folder.is_dir() else folder.with_suffix(SEALED)
+        print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
+        raise
 
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
