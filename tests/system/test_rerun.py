@@ -1,0 +1,96 @@
+"""One archived trial is executed again on the simulated bench, and held against the archive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import open_run
+from campaign.backends.sim import SimBackend
+from campaign.cli.prepare import Request
+from campaign.cli.rerun import rerun_trial
+from campaign.cli.run import run_protocol
+from campaign.errors import ExitCode, UsageError
+from campaign.execution.comparison import differences
+from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
+from tests.system.user import SEA, write
+
+
+@pytest.fixture
+def archive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    request = Request(str(write(tmp_path, SEA)))
+    run_protocol(request, tmp_path / "results", workers=1, report=False)
+    capsys.readouterr()
+    return next((tmp_path / "results").glob("*.nxs"))
+
+
+@pytest.mark.parametrize("wanted", ["2", "trial-00002", "trial_00002"])
+def test_the_same_samples_come_out(archive: Path, capsys: pytest.CaptureFixture[str], wanted: str):
+    assert rerun_trial(archive.stem, wanted, archive.parent) is ExitCode.DONE
+    said, path = capsys.readouterr().out.splitlines()
+    assert "trial-00002" in said
+    assert "equal to the bit, 11 channels" in said
+    again = open_run(Path(path))
+    assert "rerun-trial-00002" in again.name
+    assert again.header.notes == f"repeats trial-00002 of {archive.stem}"
+    (trial,) = again.trials
+    assert trial.trial.fingerprint == open_run(archive).trials[1].trial.fingerprint
+
+
+def test_another_sample_is_found_and_named(
+    archive: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    execute = SimBackend.execute
+
+    def with_an_error(backend, trial, recorder, stopped):
+        append = recorder.append
+
+        class Disturbed:
+            start, event = recorder.start, recorder.event
+
+            @staticmethod
+            def append(time, block):
+                block = block.copy()
+                block[2, 0] += 1e-12
+                append(time, block)
+
+        return execute(backend, trial, Disturbed(), stopped)
+
+    monkeypatch.setattr(SimBackend, "execute", with_an_error)
+    assert rerun_trial(archive.stem, "1", archive.parent) is ExitCode.TRIALS_FAILED
+    first, found, _ = capsys.readouterr().out.splitlines()
+    assert first.endswith("different")
+    assert found.strip().startswith("gyro_rate [rad/s]: ")
+    assert "the first at index 0, by at most 1e-12" in found
+
+
+@pytest.mark.parametrize("wanted", ["99", "sea", "-1"])
+def test_a_trial_that_is_not_there_is_said(archive: Path, wanted: str):
+    with pytest.raises(UsageError, match="trial"):
+        rerun_trial(archive.stem, wanted, archive.parent)
+
+
+def recording(*samples: float, outcome: Outcome = Outcome.COMPLETED) -> Recording:
+    recorder = MemoryRecorder()
+    recorder.start((ChannelInfo("rate", "rad/s", "Rate", "deg/s"),))
+    recorder.append(np.arange(len(samples), dtype=float), np.array([samples]))
+    return recorder.recording(Ending(outcome))
+
+
+def test_bits_are_compared_not_values():
+    nan = float("nan")
+    assert differences(recording(0.0, nan), recording(0.0, nan)) == []
+    (zero,) = differences(recording(0.0, 1.0), recording(-0.0, 1.0))
+    assert zero == "rate [rad/s]: 1 of 2 samples differ, the first at index 0, by at most 0"
+
+
+def test_lengths_outcomes_and_missing_channels_are_differences():
+    long, short = recording(1.0, 2.0), recording(1.0, outcome=Outcome.INTERRUPTED)
+    assert differences(short, long) == [
+        "outcome: interrupted → completed",
+        "samples: 1 → 2; compared are those that both have",
+    ]
+    assert differences(long, replace(long, channels={})) == ["rate: is only in the archive"]

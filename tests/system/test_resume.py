@@ -1,0 +1,213 @@
+"""A run that did not come to its end is gone on with, as if nothing had happened."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import open_run
+from campaign.archive.journal import Decision, RunResumed, parse_journal
+from campaign.backends.sim import SimBackend
+from campaign.cli.prepare import Request
+from campaign.cli.resume import resume_run
+from campaign.cli.run import Remarks, run_protocol
+from campaign.errors import ExitCode, UsageError
+from campaign.trial import Ending, Fault, Outcome
+from tests.archive.test_resuming import content, documented_differences
+from tests.system.user import SEA, campaign, command, environment, write
+
+BENCH = (Path(__file__).parents[2] / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
+OWN_BENCH = SEA.replace('bench = "simulink"', 'bench = "bench.toml"\nseed = 5\nrepeat = 2')
+
+
+class Lab:
+    """A folder with a protocol and its bench; runs go on in this process."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder = folder
+        self.results = folder / "results"
+        self.patch = monkeypatch
+        self.protocol = write(folder, OWN_BENCH)
+        self.bench = write(folder, BENCH, "bench.toml")
+
+    def run(self, results: str = "results") -> tuple[ExitCode, Path]:
+        request = Request(str(self.protocol), seed=7)
+        remarks = Remarks("me", "a note", ("tag",))
+        into = self.folder / results
+        code = run_protocol(request, into, workers=1, report=False, remarks=remarks)
+        return code, next(into.glob("*.nxs"))
+
+    def stopped_in(self, trial: int, ending: Ending | None = None) -> Path:
+        """A run that Ctrl-C, or the given ending, meets in the middle of a trial."""
+        execute = SimBackend.execute
+
+        def stop(backend, what, recorder, stopped):
+            if what.number != trial:
+                return execute(backend, what, recorder, stopped)
+            if ending is None:
+                signal.raise_signal(signal.SIGINT)
+            ended = execute(backend, what, recorder, stopped)
+            return ending or ended
+
+        with self.patch.context() as patch:
+            patch.setattr(SimBackend, "execute", stop)
+            _, archive = self.run()
+        return archive
+
+    def resume(self, archive: Path, *, accept: bool = False) -> ExitCode:
+        return resume_run(
+            str(archive), self.results, accept_changes=accept, workers=1, report=False, yes=False
+        )
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
+    return Lab(tmp_path, monkeypatch)
+
+
+def interrupted(lab: Lab) -> Path:
+    """Stopped in the third of four trials; the signal comes while it is being executed."""
+    archive = lab.stopped_in(3, Ending(Outcome.INTERRUPTED, "stopped"))
+    assert open_run(archive).status == "interrupted"
+    return archive
+
+
+def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented(lab: Lab):
+    archive = interrupted(lab)
+    assert lab.resume(archive) is ExitCode.DONE
+    _, whole = lab.run("other")
+    ours, theirs = content(archive), content(whole)
+    missing = object()
+    differing = {
+        path
+        for path in ours.keys() | theirs.keys()
+        if str(ours.get(path, missing)) != str(theirs.get(path, missing))
+    }
+    allowed = documented_differences()
+    assert {path for path in differing if not allowed.fullmatch(path)} == set()
+    assert "/trial_00003_attempt_1/data/gyro_rate" in differing
+
+
+def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Lab):
+    archive = interrupted(lab)
+    executed = []
+    execute = SimBackend.execute
+    lab.patch.setattr(
+        SimBackend, "execute", lambda *a: (executed.append(a[1].number), execute(*a))[1]
+    )
+    lab.resume(archive)
+    assert executed == [3, 4]
+    with pytest.raises(UsageError, match="is complete"):
+        lab.resume(archive)
+
+
+def test_white_space_and_comments_are_no_change(lab: Lab):
+    archive = interrupted(lab)
+    write(lab.folder, "# mine\n\n" + OWN_BENCH.replace(" = ", "   =  ") + "\n")
+    write(lab.folder, "# mine\n" + BENCH, "bench.toml")
+    assert lab.resume(archive) is ExitCode.DONE
+
+
+def change_protocol(lab: Lab) -> None:
+    write(lab.folder, OWN_BENCH.replace("settle_cycles = 1", "settle_cycles = 2"))
+
+
+def change_bench(lab: Lab) -> None:
+    limits = lab.bench.read_text(encoding="utf-8")
+    assert 'angle = "' in limits
+    write(lab.folder, limits.replace('angle = "', 'angle = "1', 1), "bench.toml")
+
+
+def change_version(lab: Lab) -> None:
+    real = lab.patch
+    from campaign.execution import provenance
+
+    versions = {**provenance.versions(), "numba": "0.1"}
+    real.setattr(provenance, "versions", lambda: versions)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (change_protocol, r"sea\.settle_cycles: 1(\.0)? → 2"),
+        (change_bench, r"sea\.bench\.limits\.angle: .* → "),
+        (change_version, r"versions\.numba: .* → 0\.1"),
+    ],
+)
+def test_what_has_changed_is_named_by_field_and_refused_unless_accepted(lab: Lab, change, field):
+    archive = interrupted(lab)
+    before = archive.read_bytes()
+    change(lab)
+    with pytest.raises(UsageError, match=field) as refused:
+        lab.resume(archive)
+    assert refused.value.exit_code is ExitCode.USAGE
+    assert "--accept-changes" in str(refused.value)
+    assert archive.read_bytes() == before, "a refused resume touches nothing"
+    assert lab.resume(archive, accept=True) is ExitCode.DONE
+    story = parse_journal(archive, open_run(archive).journal.encode())
+    (resumed,) = [entry for entry in story.entries if isinstance(entry, RunResumed)]
+    assert len(resumed.changes) == 1
+
+
+def test_another_list_of_trials_is_another_run_whatever_is_accepted(lab: Lab):
+    archive = interrupted(lab)
+    write(lab.folder, OWN_BENCH.replace('"lugre"]', '"lugre", "static"]'))
+    with pytest.raises(UsageError, match="start a new run") as refused:
+        lab.resume(archive, accept=True)
+    assert "matrix.compensation" in str(refused.value)
+
+
+def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: Lab, capsys):
+    archive = interrupted(lab)
+    planned = [trial.fingerprint for trial in open_run(archive).plan]
+    lab.protocol.unlink()
+    lab.bench.unlink()
+    assert lab.resume(archive) is ExitCode.DONE
+    assert "is gone" in capsys.readouterr().err
+    assert [each.trial.fingerprint for each in open_run(archive).trials] == planned
+
+
+@pytest.mark.parametrize(("policy", "repeated"), [("skip", False), ("abort", True)])
+def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
+    lab: Lab, policy: str, repeated: bool
+):
+    lab.protocol = write(lab.folder, f'faults = {{ reset = "{policy}" }}\n{OWN_BENCH}')
+    fault = Ending(Outcome.FAULT, "it started anew", fault=Fault.RESET)
+    archive = lab.stopped_in(2, fault)
+    status = open_run(archive).status
+    if repeated:
+        assert status == "fault"
+        assert lab.resume(archive) is ExitCode.DONE
+    else:
+        assert status == "failed trials"
+        with pytest.raises(UsageError, match="failed trials"):
+            lab.resume(archive)
+    story = parse_journal(archive, open_run(archive).journal.encode())
+    decisions = [entry.decision for entry in story.entries if isinstance(entry, Decision)]
+    assert decisions == [policy]
+
+
+def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
+    """The real thing, from the command line: Ctrl-C once, and the command that is then shown."""
+    write(tmp_path, SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 30\n", 1))
+    with subprocess.Popen(
+        command("run", "protocol.toml", "--workers", "1"),
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    ) as process:
+        process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == 130
+    name = Path(out.splitlines()[-1]).stem
+    assert f"`campaign resume {name}` goes on from there" in err
+    done = campaign(tmp_path, "resume", name)
+    assert done.last_line == f"results/{name}.nxs"
+    assert done.err.splitlines()[-1].startswith("complete: 60 trials done")
