@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.archive.files import PART, sha256_of, why
 from campaign.archive.header import PARTIAL, SEALED, RunStatus
-from campaign.archive.journal import JOURNAL, Story, read_journal
+from campaign.archive.journal import JOURNAL, Journal, Story, read_journal
 from campaign.archive.run_folder import read_format
 from campaign.archive.run_lock import RunLock
 from campaign.errors import ArchiveError, UsageError
@@ -19,8 +19,10 @@ RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
 _FIRST_FORMAT = 2  # before, an archive did not hold the trials that had not been executed
 
 
-def reopen(path: Path) -> tuple[Path, Story, RunLock]:
-    """The folder of the run at `path`, what its journal tells, and the right to write it.
+def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
+    """The folder of the run at `path`, what its journal tells, that, and the right to write it.
+
+    A folder that was killed while it was sealed may be reopened whatever it says of its end.
 
     Raises:
         UsageError: there is nothing to go on with, or another process writes the run.
@@ -35,7 +37,9 @@ def reopen(path: Path) -> tuple[Path, Story, RunLock]:
             from campaign.archive.unsealing import unseal
 
             unseal(sealed)
-        return folder, _read_folder(folder), lock
+        story = _read_folder(folder)
+        journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
+        return folder, story, journal, lock
 
 
 @contextmanager
@@ -47,6 +51,9 @@ def _locked(folder: Path) -> Iterator[RunLock]:
         raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
     try:
         yield lock
+    except OSError as error:
+        lock.release()
+        raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
     except BaseException:
         lock.release()
         raise
@@ -77,14 +84,14 @@ def _read_folder(folder: Path) -> Story:
     """What is in the folder, checked. Raises ArchiveError naming the trial file that is wrong."""
     _check_format(folder, read_format(folder))
     story = read_journal(folder / JOURNAL)
-    try:
-        for finished in story.files:
-            if sha256_of(folder / finished.file) != finished.sha256:
-                raise ArchiveError(
-                    f"{folder / finished.file}: is not what the journal says was written"
-                )
-        for part in folder.glob(f"*{PART}"):
-            part.unlink()
-    except OSError as error:
-        raise ArchiveError(f"{error.filename or folder}: cannot be used: {why(error)}") from None
+    for finished in story.files:
+        path = folder / finished.file
+        try:
+            digest = sha256_of(path)
+        except OSError as error:
+            raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
+        if digest != finished.sha256:
+            raise ArchiveError(f"{path}: is not what the journal says was written")
+    for part in folder.glob(f"*{PART}"):
+        part.unlink()
     return story

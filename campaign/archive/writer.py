@@ -2,112 +2,30 @@
 
 from __future__ import annotations
 
-import contextlib
-import shutil
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from campaign.archive.files import PART, sync_folder, write_atomically, write_lines_atomically
-from campaign.archive.full_plan import write_full_plan
-from campaign.archive.header import FORMAT, PARTIAL, SEALED, PlannedTrial, RunHeader, RunStatus
+from campaign.archive.beginning import make_folder
+from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.journal import (
-    JOURNAL,
     Decision,
     Entry,
     Journal,
     OperatorStep,
     RunEnded,
     RunResumed,
-    RunStarted,
-    TrialAbandoned,
     TrialFinished,
 )
 from campaign.archive.resuming import reopen
-from campaign.archive.run_folder import HEADER, PLAN, header_document
 from campaign.archive.run_lock import RunLock
+from campaign.archive.trial_writer import TrialWriter
 from campaign.errors import UsageError
-from campaign.trial import ChannelInfo, Ending, Event, Outcome, SafeState, Trial, canonical_json
+from campaign.trial import Outcome, SafeState, Trial
 
-if TYPE_CHECKING:
-    from campaign.archive.trial_file import TrialFile
-
-Array = NDArray[np.float64]
-
-
-class TrialWriter:
-    """Takes one trial's recording: a `campaign.trial.Recorder` that ends in a file.
-
-    Use it from one thread; several may be open at once. End it with `finish` or `abandon`.
-    """
-
-    def __init__(
-        self, trial: Trial, attempt: int, file: TrialFile, note: Callable[[Entry], None]
-    ) -> None:
-        """`note` puts a line into the run's journal."""
-        self._trial = trial
-        self._attempt = attempt
-        self._file = file
-        self._note = note
-        self._open = True
-
-    @property
-    def attempt(self) -> int:
-        """How often the trial is executed with this one, from 1."""
-        return self._attempt
-
-    def start(self, channels: tuple[ChannelInfo, ...]) -> None:
-        self._file.start(channels)
-
-    def append(self, time: Array, block: Array) -> None:
-        self._file.append(time, block)
-
-    def event(self, event: Event) -> None:
-        self._file.event(event)
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it was neither finished nor abandoned."""
-        return self._open
-
-    def finish(self, ending: Ending, started: str, ended: str) -> None:
-        """Keep the trial. When this returns, no crash can lose it.
-
-        Args:
-            ending: however it ended: a failed trial is kept too.
-            started, ended: ISO 8601 with a time zone.
-
-        Raises:
-            ArchiveError: it could not be written; nothing of it remains.
-        """
-        self._open = False
-        file = self._file.close(ending, started, ended)
-        self._note(
-            TrialFinished(
-                at=ended,
-                trial=self._trial.number,
-                attempt=self._attempt,
-                file=file.name,
-                sha256=file.sha256,
-                bytes=file.bytes,
-                outcome=ending.outcome,
-                reason=ending.reason,
-                safe_state=ending.safe_state,
-            )
-        )
-
-    def abandon(self, at: str, reason: str = "") -> None:
-        """Keep nothing of the trial but that it was begun."""
-        if not self._open:
-            return
-        self._open = False
-        self._file.discard()
-        self._note(TrialAbandoned(at=at, trial=self._trial.number, reason=reason))
+__all__ = ["RunWriter", "TrialWriter"]
 
 
 class RunWriter:
@@ -142,7 +60,7 @@ class RunWriter:
             try:
                 if folder.exists() or folder.with_suffix(SEALED).exists():
                     raise taken
-                journal = _make_folder(folder, header, trials)
+                journal = make_folder(folder, header, trials)
             except BaseException:
                 lock.release()
                 raise
@@ -178,12 +96,11 @@ class RunWriter:
             UsageError: there is nothing to go on with, or another process writes the run.
             ArchiveError: the run is damaged, named by file, or cannot be written. It is as it was.
         """
-        folder, story, lock = reopen(path)
+        folder, story, journal, lock = reopen(path)
+        writer = cls(folder, journal, lock)
+        writer._last = dict(story.finished)
+        writer._told = story.entries
         try:
-            journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
-            writer = cls(folder, journal, lock)
-            writer._last = dict(story.finished)
-            writer._told = story.entries
             journal.append(
                 RunResumed(
                     at=at,
@@ -194,7 +111,7 @@ class RunWriter:
                 )
             )
         except BaseException:
-            lock.release()
+            writer.close()
             raise
         return writer
 
@@ -281,32 +198,6 @@ class RunWriter:
         if isinstance(entry, TrialFinished):
             with self._lock:
                 self._last[entry.trial] = entry
-
-
-def _make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Journal:
-    """Make a run's folder, under another name until everything is in it."""
-    part = folder.with_name(folder.name + PART)
-    if part.is_dir():
-        shutil.rmtree(part)
-    part.mkdir()
-    try:
-        write_full_plan(part, trials)
-        lines = (canonical_json(PlannedTrial.of(t).model_dump(mode="json")) + "\n" for t in trials)
-        write_lines_atomically(part / PLAN, lines)
-        header = header.model_copy(update={"trials": len(trials)})
-        write_atomically(part / HEADER, header_document(header))
-        journal = Journal(part / JOURNAL)
-        journal.append(
-            RunStarted(at=header.created, run=header.name, format=FORMAT, trials=len(trials))
-        )
-        sync_folder(part)
-        part.rename(folder)
-        sync_folder(folder.parent)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            shutil.rmtree(part)
-        raise
-    return journal
 
 
 def _now() -> str:

@@ -1,0 +1,38 @@
+"""The folder of a new run: there with everything that is known before the first trial, or not."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from campaign.archive.files import PART, sync_folder, write_atomically, write_lines_atomically
+from campaign.archive.full_plan import write_full_plan
+from campaign.archive.header import FORMAT, PlannedTrial, RunHeader
+from campaign.archive.journal import JOURNAL, Journal, RunStarted
+from campaign.archive.run_folder import HEADER, PLAN, header_document
+from campaign.trial import Trial, canonical_json
+
+
+def make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Journal:
+    """Make a run's folder, under another name until everything is in it."""
+    part = folder.with_name(folder.name + PART)
+    if part.is_dir():
+        shutil.rmtree(part)
+    part.mkdir()
+    try:
+        write_full_plan(part, trials)
+        lines = (canonical_json(PlannedTrial.of(t).model_dump(mode="json")) + "\n" for t in trials)
+        write_lines_atomically(part / PLAN, lines)
+        header = header.model_copy(update={"trials": len(trials)})
+        write_atomically(part / HEADER, header_document(header))
+        started = RunStarted(at=header.created, run=header.name, format=FORMAT, trials=len(trials))
+        write_atomically(part / JOURNAL, canonical_json(started.model_dump(mode="json")) + "\n")
+        part.rename(folder)
+        sync_folder(folder.parent)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(part)
+        raise
+    return Journal(folder / JOURNAL)
