@@ -6,8 +6,9 @@ format is described in `docs/archive-format.md`. Importing this package does not
 
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
-from campaign.archive.listing import RunSummary, find_run, find_runs, list_runs
+from campaign.archive.listing import find_run, find_runs, list_runs
 from campaign.archive.reader import RunReader, open_run
+from campaign.archive.summary import RunSummary
 from campaign.archive.writer import RunWriter, TrialWriter
 
 __all__ = [

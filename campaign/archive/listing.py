@@ -3,60 +3,26 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from campaign.archive.damage import DamageList
-from campaign.archive.header import PARTIAL, SEALED, RunStatus
-from campaign.archive.journal import JOURNAL, read_journal
-from campaign.archive.run_folder import read_header
-from campaign.errors import ArchiveError, UsageError
-from campaign.trial import Outcome
+from campaign.archive.header import PARTIAL, SEALED
+from campaign.archive.index import Index
+from campaign.archive.summary import RunSummary
+from campaign.errors import UsageError
 
 _DATED = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}-\d{2}-\d{2}-")
 
 
-@dataclass(frozen=True)
-class RunSummary:
-    """One line of `campaign list`.
-
-    Attributes:
-        trials: finished ones, failed ones included; `planned` counts the whole plan.
-        problem: why the run cannot be read; everything but name, path and bytes is empty then.
-    """
-
-    name: str
-    path: Path
-    bytes: int
-    created: str = ""
-    status: RunStatus | None = None
-    protocol: str = ""
-    backend: str = ""
-    planned: int = 0
-    trials: int = 0
-    failed: int = 0
-    problem: str = ""
-
-
 def list_runs(results: Path) -> list[RunSummary]:
-    """Every run in `results`, oldest first; a bad file is listed with its problem."""
-    return [summarise(path) for path in run_paths(results)]
+    """Every run in `results`, oldest first; a bad file is listed with its problem.
 
-
-def summarise(path: Path) -> RunSummary:
-    """A run at a glance, without its trials."""
-    size = 0
-    try:
-        if path.is_dir():
-            size = sum(file.stat().st_size for file in path.iterdir())
-            return _summarise_folder(path, size)
-        size = path.stat().st_size
-        return _summarise_file(path, size)
-    except ArchiveError as error:
-        return RunSummary(path.stem, path, size, problem=str(error))
-    except OSError as error:
-        return RunSummary(path.stem, path, size, problem=f"{path}: {error.strerror}")
+    Runs that are as they were when they were listed last are not opened: see `index`.
+    """
+    index = Index.load(results)
+    runs = [index.summary(path) for path in run_paths(results)]
+    index.save()
+    return runs
 
 
 def run_paths(results: Path) -> list[Path]:
@@ -120,42 +86,3 @@ def _as_path(name: str) -> Path | None:
 def _some(names: list[str]) -> str:
     latest = names[-10:]
     return ", ".join(latest) + (f" and {len(names) - 10} more" if len(names) > 10 else "")
-
-
-def _summarise_folder(folder: Path, size: int) -> RunSummary:
-    header = read_header(folder)
-    story = read_journal(folder / JOURNAL)
-    return RunSummary(
-        name=folder.stem,
-        path=folder,
-        bytes=size,
-        created=header.created,
-        status=story.ended.status if story.ended else RunStatus.INCOMPLETE,
-        protocol=header.protocol_name,
-        backend=header.backend,
-        planned=header.trials,
-        trials=len(story.finished),
-        failed=sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values()),
-    )
-
-
-def _summarise_file(path: Path, size: int) -> RunSummary:
-    from campaign.archive import guarded
-    from campaign.archive.provenance import read_provenance
-
-    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
-        run = guarded.group_at(file, "run", "NXentry")
-        header = read_provenance(run, DamageList(path))
-        outcome = guarded.group_at(run, "outcome", "NXcollection")
-        return RunSummary(
-            name=path.stem,
-            path=path,
-            bytes=size,
-            created=header.created,
-            status=RunStatus(guarded.text_at(outcome, "status")),
-            protocol=header.protocol_name,
-            backend=header.backend,
-            planned=header.trials,
-            trials=guarded.integer_at(outcome, "trials_finished"),
-            failed=guarded.integer_at(outcome, "trials_failed"),
-        )

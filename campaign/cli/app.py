@@ -309,19 +309,58 @@ def export(
 
 
 @app.command("list")
-def list_command(results: ResultsOption = RESULTS) -> None:
-    """List the archived runs, the newest first."""
+def list_command(
+    results: ResultsOption = RESULTS,
+    protocol: Annotated[
+        list[str] | None,
+        typer.Option("--protocol", metavar="NAME", help="Runs of it; a pattern will do."),
+    ] = None,
+    since: Annotated[
+        str, typer.Option("--since", metavar="DATE", help="Begun then or later.")
+    ] = "",
+    until: Annotated[str, typer.Option("--until", metavar="DATE", help="Begun by then.")] = "",
+    backend: Annotated[
+        list[str] | None, typer.Option("--backend", metavar="NAME", help="Executed by it.")
+    ] = None,
+    bench: Annotated[
+        list[str] | None,
+        typer.Option("--bench", metavar="NAME", help="With a test on it; a pattern will do."),
+    ] = None,
+    status: Annotated[
+        list[str] | None,
+        typer.Option("--status", metavar="STATUS", help="As `complete` or `failed trials`."),
+    ] = None,
+    tag: Annotated[
+        list[str] | None, typer.Option("--tag", metavar="TAG", help="With every tag given.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List the archived runs, the newest first; options but --since and --until may be repeated."""
     from campaign.cli.archives import list_archives
+    from campaign.cli.selection import Selection, statuses
 
-    list_archives(results)
+    selection = Selection(
+        protocols=tuple(protocol or ()),
+        since=since,
+        until=until,
+        backends=tuple(backend or ()),
+        benches=tuple(bench or ()),
+        statuses=statuses(status or ()),
+        tags=tuple(tag or ()),
+    )
+    list_archives(results, selection, as_json=as_json)
 
 
 @app.command()
-def show(run: RunArgument, results: ResultsOption = RESULTS) -> None:
-    """Show what a run was, how it ended, and which trials failed."""
-    from campaign.cli.archives import show_archive
+def show(
+    run: NewestRunArgument = None,
+    results: ResultsOption = RESULTS,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show what a run was, how it ended, and all that did not go as planned."""
+    from campaign.cli.show import show_archive
 
-    show_archive(run, results)
+    show_archive(run, results, as_json=as_json)
 
 
 @app.command()

@@ -1,45 +1,36 @@
-"""`campaign list`, `campaign show` and `campaign init`."""
+"""`campaign list` and `campaign init`."""
 
 from __future__ import annotations
 
-from collections import Counter
+import json
+from datetime import datetime
 from pathlib import Path
 
-from campaign.archive import RunReader, RunSummary, find_run, list_runs, open_run
+from campaign.archive import RunSummary, list_runs
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
+from campaign.cli.selection import Selection
 from campaign.resources import copy_shipped
-from campaign.trial import Outcome
+
+_HEADINGS = (
+    "run", "date", "duration", "status", "trials", "failed", "protocol", "backend", "tags", "size",
+)  # fmt: skip
 
 
-def list_archives(results: Path) -> None:
+def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None:
     """The runs in `results`, the newest first; one that cannot be read says why."""
     runs = list_runs(results)
-    if not runs:
+    shown = selection.of(runs)[::-1]
+    if as_json:
+        print_line(json.dumps([_tree(run) for run in shown], indent=2))
+    elif not runs:
         print_note(f"{results}: there are no runs; `campaign run` makes one")
-        return
-    headings = ("run", "status", "trials", "failed", "protocol", "backend", "size")
-    print_table(headings, [_row(run) for run in reversed(runs)])
+    elif not shown:
+        print_note(f"{results}: none of {len(runs)} runs is like that")
+    else:
+        print_table(_HEADINGS, [_row(run) for run in shown])
     for run in runs:
         if run.problem:
             print_note(f"{run.name}: {run.problem}", style="yellow")
-
-
-def show_archive(name: str, results: Path) -> None:
-    """What a run was, how it ended, its tests, and the trials that failed."""
-    run = open_run(find_run(results, name))
-    for label, value in _facts(run):
-        if value:
-            print_line(f"{label + ':':<13}{value}")
-    print_line()
-    headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
-    print_table(headings, _tests(run))
-    failed = [trial for trial in run.trials if trial.ending.outcome is not Outcome.COMPLETED]
-    if failed:
-        print_line()
-        rows = [
-            (t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed
-        ]
-        print_table(("trial", "what", "outcome", "reason"), rows)
 
 
 def init_folder(folder: Path) -> None:
@@ -50,43 +41,41 @@ def init_folder(folder: Path) -> None:
 
 
 def _row(run: RunSummary) -> tuple[str, ...]:
-    if run.problem:
-        return (run.name, "unreadable", "", "", "", "", bytes_text(run.bytes))
-    trials = f"{run.trials}" if run.trials == run.planned else f"{run.trials} of {run.planned}"
-    status = run.status.value if run.status else ""
     size = bytes_text(run.bytes)
-    return (run.name, status, trials, str(run.failed), run.protocol, run.backend, size)
+    if run.problem:
+        return (run.name, "", "", "unreadable", "", "", "", "", "", size)
+    return (
+        run.name,
+        f"{datetime.fromisoformat(run.created):%Y-%m-%d %H:%M}",
+        _duration(run),
+        run.status.value if run.status else "",
+        f"{run.trials}" if run.trials == run.planned else f"{run.trials} of {run.planned}",
+        str(run.failed),
+        run.protocol,
+        run.backend,
+        ", ".join(run.tags),
+        size,
+    )
 
 
-def _facts(run: RunReader) -> list[tuple[str, str]]:
-    header = run.header
-    versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
-    return [
-        ("run", run.name),
-        ("title", header.title),
-        ("archive", str(run.path)),
-        ("status", f"{run.status.value}{f': {run.reason}' if run.reason else ''}"),
-        ("safe state", run.safe_state.value),
-        ("started", header.created),
-        ("ended", run.ended),
-        ("protocol", header.protocol_name),
-        ("backend", header.backend),
-        ("only", ", ".join(header.only)),
-        ("set", "; ".join(f"{path}={value}" for path, value in header.overrides.items())),
-        ("operator", header.operator),
-        ("notes", header.notes),
-        ("tags", ", ".join(header.tags)),
-        ("revision", header.git_revision),
-        ("versions", versions),
-        ("fingerprint", header.fingerprint),
-    ]
+def _seconds(run: RunSummary) -> float | None:
+    """From the run's start to its end (s); None while it has none."""
+    try:
+        passed = datetime.fromisoformat(run.ended) - datetime.fromisoformat(run.created)
+    except (ValueError, TypeError):
+        return None
+    return passed.total_seconds()
 
 
-def _tests(run: RunReader) -> list[tuple[str, ...]]:
-    kinds = {planned.test: planned.kind for planned in run.plan}
-    planned = Counter(planned.test for planned in run.plan)
-    ended = Counter((trial.trial.test, trial.ending.outcome) for trial in run.trials)
-    return [
-        (test, kind, str(planned[test]), *(str(ended[test, outcome]) for outcome in Outcome))
-        for test, kind in kinds.items()
-    ]
+def _duration(run: RunSummary) -> str:
+    seconds = _seconds(run)
+    if seconds is None:
+        return ""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}"
+
+
+def _tree(run: RunSummary) -> dict[str, object]:
+    more = {"path": str(run.path), "duration_s": _seconds(run)}
+    return vars(run) | more

@@ -1,0 +1,138 @@
+"""`campaign show`: what a run was, how it went, and what became of it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from campaign.archive import RunReader, find_run, open_run
+from campaign.archive.damage import Damage
+from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
+from campaign.archive.story import Lines, read_lines
+from campaign.cli.output import print_line, print_table
+from campaign.trial import Outcome
+
+
+def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
+    """What a run was, how it ended, its tests, and all that did not go as planned."""
+    run = open_run(find_run(results, name))
+    story = read_lines(run.journal.encode())
+    if as_json:
+        print_line(json.dumps(_tree(run, story), indent=2))
+        return
+    for label, value in _facts(run):
+        if value:
+            print_line(f"{label + ':':<13}{value}")
+    print_line()
+    headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
+    print_table(headings, _tests(run))
+    failed = [trial for trial in run.trials if trial.ending.outcome is not Outcome.COMPLETED]
+    rows = [(t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed]
+    _section(("trial", "what", "outcome", "reason"), rows)
+    _section(("trial", "attempt", "outcome", "reason"), [_attempt(a) for a in _repeated(story)])
+    _section(("trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
+    _section(("trial", "operator step", "answer"), [_step(s) for s in story.all(OperatorStep)])
+    _section(("resumed", "changes"), [(r.at, "; ".join(r.changes)) for r in story.all(RunResumed)])
+    _section(("damaged", "why"), [_damage(damage) for damage in run.damaged])
+
+
+def _section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    if rows:
+        print_line()
+        print_table(headings, rows)
+
+
+def _name(trial: int | None) -> str:
+    return "" if trial is None else f"trial-{trial:05d}"
+
+
+def _repeated(story: Lines) -> list[TrialFinished]:
+    """Every attempt at the trials that took more than one."""
+    counts = Counter(attempt.trial for attempt in story.attempts)
+    several = [attempt for attempt in story.attempts if counts[attempt.trial] > 1]
+    return sorted(several, key=lambda attempt: (attempt.trial, attempt.attempt))
+
+
+def _attempt(attempt: TrialFinished) -> tuple[str, ...]:
+    return (_name(attempt.trial), str(attempt.attempt), attempt.outcome.value, attempt.reason)
+
+
+def _decision(decision: Decision) -> tuple[str, ...]:
+    return (_name(decision.trial), decision.decision, decision.reason)
+
+
+def _step(step: OperatorStep) -> tuple[str, ...]:
+    return (_name(step.trial), step.step, step.answer)
+
+
+def _damage(damage: Damage) -> tuple[str, ...]:
+    return (damage.place or "the file", damage.reason)
+
+
+def _tree(run: RunReader, story: Lines) -> dict[str, object]:
+    """Everything that is known without a sample, SI."""
+    return {
+        "path": str(run.path),
+        "header": run.header.model_dump(mode="json", exclude={"sources"}),
+        "status": run.status,
+        "reason": run.reason,
+        "safe_state": run.safe_state,
+        "ended": run.ended,
+        "trials": [
+            {
+                "trial": trial.trial.name,
+                "test": trial.trial.test,
+                "role": trial.trial.role,
+                "point": trial.trial.point,
+                "outcome": trial.ending.outcome,
+                "reason": trial.ending.reason,
+                "safe_state": trial.ending.safe_state,
+                "started": trial.started,
+                "ended": trial.ended,
+            }
+            for trial in run.trials
+        ],
+        "attempts": [a.model_dump(mode="json", exclude={"event"}) for a in _repeated(story)],
+        "decisions": [d.model_dump(mode="json", exclude={"event"}) for d in story.all(Decision)],
+        "operator_steps": [
+            s.model_dump(mode="json", exclude={"event"}) for s in story.all(OperatorStep)
+        ],
+        "resumed": [r.model_dump(mode="json", exclude={"event"}) for r in story.all(RunResumed)],
+        "damaged": [vars(damage) for damage in run.damaged],
+    }
+
+
+def _facts(run: RunReader) -> list[tuple[str, str]]:
+    header = run.header
+    versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
+    return [
+        ("run", run.name),
+        ("title", header.title),
+        ("archive", str(run.path)),
+        ("status", f"{run.status.value}{f': {run.reason}' if run.reason else ''}"),
+        ("safe state", run.safe_state.value),
+        ("started", header.created),
+        ("ended", run.ended),
+        ("protocol", header.protocol_name),
+        ("backend", header.backend),
+        ("only", ", ".join(header.only)),
+        ("set", "; ".join(f"{path}={value}" for path, value in header.overrides.items())),
+        ("operator", header.operator),
+        ("notes", header.notes),
+        ("tags", ", ".join(header.tags)),
+        ("revision", header.git_revision),
+        ("versions", versions),
+        ("fingerprint", header.fingerprint),
+    ]
+
+
+def _tests(run: RunReader) -> list[tuple[str, ...]]:
+    kinds = {planned.test: planned.kind for planned in run.plan}
+    planned = Counter(planned.test for planned in run.plan)
+    ended = Counter((trial.trial.test, trial.ending.outcome) for trial in run.trials)
+    return [
+        (test, kind, str(planned[test]), *(str(ended[test, outcome]) for outcome in Outcome))
+        for test, kind in kinds.items()
+    ]
