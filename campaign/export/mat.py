@@ -39,8 +39,8 @@ def _write(trial: TrialView, recording: Recording, path: Path) -> None:
     units = ["s", *(channel.unit for channel in channels)]
     labels = ["Time", *(channel.label for channel in channels)]
     variables: dict[str, Any] = dict(zip(names, series, strict=True))
-    variables["units"] = dict(zip(names, units, strict=True))
-    variables["labels"] = dict(zip(names, labels, strict=True))
+    variables["units"] = dict(zip(names, map(_ascii, units), strict=True))
+    variables["labels"] = dict(zip(names, map(_ascii, labels), strict=True))
     variables["trial"] = _about(trial)
     savemat(path, variables, long_field_names=True, do_compression=True, oned_as="column")
 
@@ -74,14 +74,14 @@ def _about(trial: TrialView) -> dict[str, Any]:
     executed, ending = trial.trial, trial.ending
     return {
         "number": float(executed.number),
-        "test": executed.test,
-        "kind": executed.kind,
+        "test": _ascii(executed.test),
+        "kind": _ascii(executed.kind),
         "role": executed.role.value,
         "repeat": float(executed.repeat),
         "point": _struct(executed.point),
         "seed": np.uint64(executed.seed),  # a double has no room for its 63 bits
         "outcome": ending.outcome.value,
-        "reason": ending.reason,
+        "reason": _ascii(ending.reason),
         "json": canonical_json(executed.model_dump(mode="json")),
     }
 
@@ -92,11 +92,16 @@ def _struct(tree: Mapping[str, Any]) -> dict[str, Any]:
         float(value)
         if isinstance(value, int | float) and not isinstance(value, bool)
         else value
-        if isinstance(value, bool | str)
-        else canonical_json(value)
+        if isinstance(value, bool)
+        else _ascii(value if isinstance(value, str) else canonical_json(value))
         for value in tree.values()
     ]
     return dict(zip(matlab_names(tree), plain, strict=True))
+
+
+def _ascii(text: str) -> str:
+    r"""Other letters as escapes such as `\xb0`: Octave cuts a text that has them."""
+    return text.encode("ascii", "backslashreplace").decode("ascii")
 
 
 EXPORT = ExportKind("mat", "version 5, for MATLAB and Octave", ".mat", _write)

@@ -1,24 +1,42 @@
 """The archive is valid NeXus by the judgement of the NeXus community's own checker."""
 
+import hashlib
 import re
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter
 from campaign.archive.hdf5 import CHUNK
-from campaign.archive.nexus import REQUIRED
+from campaign.archive.nexus import REQUIRED, VERSION, definition_path
+from campaign.archive.preview import PREVIEW_POINTS
+from campaign.backends.sim import CHANNELS
 from campaign.trial import ChannelInfo, Ending, Outcome
 
 
 def nxcheck(path: Path) -> tuple[int, int, str]:
-    """Errors, warnings and the output of `nxcheck`, which exits with 0 whatever it finds."""
-    command = "import sys; from nexusformat.scripts.nxcheck import main; sys.exit(main())"
+    """Errors, warnings and output of `nxcheck`: is each group valid NeXus?"""
+    return judged_by("nxcheck", str(path))
+
+
+def nxvalidate(path: Path, trial: int = 1) -> tuple[int, int, str]:
+    """Errors, warnings and output of `nxvalidate`: does a trial follow `NXfriction_trial`?"""
+    return judged_by(
+        "nxvalidate", "-a", str(definition_path()), "-p", f"/trial_{trial:05d}", str(path)
+    )
+
+
+def judged_by(script: str, *arguments: str) -> tuple[int, int, str]:
+    """Errors, warnings and the output of a checker, which exits with 0 whatever it finds."""
+    command = f"import sys; from nexusformat.scripts.{script} import main; sys.exit(main())"
     done = subprocess.run(
-        [sys.executable, "-c", command, str(path)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", command, *arguments], capture_output=True, text=True, check=True
     )
     output = done.stdout + done.stderr
     errors = re.search(r"Total number of errors: (\d+)", output)
@@ -43,8 +61,6 @@ def test_a_trial_file_of_a_run_in_progress_is_valid_by_itself(tmp_path, kit):
 
 def test_the_checker_finds_what_is_wrong(sealed):
     """The test above would pass on anything if this did not fail."""
-    import h5py
-
     with h5py.File(sealed, "r+") as file:
         file["trial_00001/data"].attrs["NX_class"] = "NXnonsense"
     errors, _, _ = nxcheck(sealed)
@@ -64,3 +80,125 @@ def test_a_run_may_have_many_benches(tmp_path, kit):
     with h5py.File(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)) as file:
         names = [file[f"trial_0000{n}/instrument/name"][()].decode() for n in (1, 2, 3)]
     assert names == ["bench 1", "bench 2", "bench 3"]
+
+
+BENCH = {
+    "name": "tiny",
+    "controller": {
+        "rate": {"form": "ideal", "proportional": 2.0, "integral": 30.0},
+        "current": {"form": "parallel", "proportional": 0.5, "integral": 7.0},
+    },
+}
+
+
+def write_whole(kit, results: Path, samples: int = 50, bench: object = BENCH) -> tuple[Path, Path]:
+    """A trial with a simulated bench's channels: its own file, copied, and the sealed run."""
+    trial = kit.trial(1).model_copy(update={"bench": bench})
+    writer = RunWriter.create(results, kit.header(), [trial])
+    recorder = writer.begin(trial)
+    recorder.start(CHANNELS)
+    block = np.random.default_rng(1).normal(size=(len(CHANNELS), samples))
+    recorder.append(np.arange(samples) / 1000, block)
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    own = Path(shutil.copy(writer.folder / "trial-00001.nxs", results / "own.h5"))
+    return own, writer.seal(RunStatus.COMPLETE, "", ended="2026-11-21T09:40:00Z")
+
+
+@pytest.mark.parametrize("samples", [50, PREVIEW_POINTS + 1])
+def test_trials_follow_the_definition_sealed_or_not(tmp_path, kit, samples):
+    for path in write_whole(kit, tmp_path, samples):
+        for judge in (nxvalidate, nxcheck):
+            errors, warnings, output = judge(path)
+            assert (errors, warnings) == (0, 0), output
+        with h5py.File(path) as file:
+            assert file["trial_00001/definition"][()] == b"NXfriction_trial"
+            assert file["trial_00001/definition"].attrs["version"] == VERSION
+
+
+def test_a_bench_that_tells_no_gains_has_no_controllers(tmp_path, kit):
+    _, sealed = write_whole(kit, tmp_path, bench={"name": "tiny", "controller": {"rate": "?"}})
+    assert nxvalidate(sealed)[:2] == (0, 0)
+    with h5py.File(sealed) as file:
+        assert list(file["trial_00001/instrument/motor"]) == ["physical_quantity"]
+
+
+def test_gains_are_those_of_the_parallel_form(tmp_path, kit):
+    _, sealed = write_whole(kit, tmp_path)
+    with h5py.File(sealed) as file:
+        motor = file["trial_00001/instrument/motor"]
+        loops = [loop for loop in motor if loop.endswith("_controller")]
+        gains = {loop: (motor[loop]["K_p"][()], motor[loop]["K_i"][()]) for loop in loops}
+        assert gains == {"rate_controller": (2.0, 60.0), "current_controller": (0.5, 7.0)}
+        gain = motor["rate_controller/K_i"]
+        assert gain.attrs["units"] == "A/rad"
+        assert gain.attrs["sha256"] == hashlib.sha256(np.float64(60.0).tobytes()).hexdigest()
+
+
+def without(name: str) -> Callable[[h5py.Group], None]:
+    return lambda entry: entry.__delitem__(name)
+
+
+def without_units(name: str) -> Callable[[h5py.Group], None]:
+    return lambda entry: entry[name].attrs.__delitem__("units")
+
+
+def shorter(entry: h5py.Group) -> None:
+    units = entry["data/motor_current"].attrs["units"]
+    del entry["data/motor_current"]
+    entry["data/motor_current"] = np.zeros(30)
+    entry["data/motor_current"].attrs["units"] = units
+
+
+def renamed(entry: h5py.Group) -> None:
+    del entry["record/outcome"]
+    entry["record/outcome"] = "fine"
+
+
+@pytest.mark.parametrize(
+    ("damage", "expected"),
+    [
+        (without("data/motor_current"), (1, 0)),
+        (without("data/time"), (1, 0)),
+        (without("start_time"), (1, 0)),
+        (without("instrument/gyro"), (1, 0)),
+        (without("record/trial"), (1, 0)),
+        (renamed, (1, 0)),
+        (shorter, (0, 3)),  # one line for the fact, one for each of some sizes
+        (without_units("data/gyro_rate"), (0, 1)),
+        (without_units("data/time"), (0, 1)),
+        (without_units("data/friction_torque"), (0, 1)),
+    ],
+)
+def test_what_does_not_follow_it_is_found(tmp_path, kit, damage, expected):
+    own, _ = write_whole(kit, tmp_path)
+    with h5py.File(own, "r+") as file:
+        damage(file["trial_00001"])
+    errors, warnings, output = nxvalidate(own)
+    assert errors == expected[0], output
+    assert bool(warnings) == bool(expected[1]), output
+
+
+def test_a_recording_without_a_required_channel_does_not_say_that_it_follows(sealed, kit):
+    assert not {channel.name for channel in kit.CHANNELS}.issuperset(REQUIRED)
+    with h5py.File(sealed) as file:
+        assert "definition" not in file["trial_00001"]
+
+
+def test_the_definition_is_well_formed_by_the_rules_for_definitions():
+    """`nxlint` checks it against the schema of the definition language."""
+    from nexusformat.nexus.validate import lint_nxdl
+
+    assert lint_nxdl(definition_path()) == []
+
+
+def test_the_default_plot_has_few_points_in_a_long_recording(tmp_path, kit):
+    """The chain of `default` and `signal`, as H5Web, silx and NeXpy follow it."""
+    _, sealed = write_whole(kit, tmp_path, samples=70_000)
+    with h5py.File(sealed) as file:
+        entry = file[file.attrs["default"]]
+        plotted = entry[entry.attrs["default"]]
+        signal, (axis,) = plotted[plotted.attrs["signal"]], plotted.attrs["axes"]
+        assert signal.name.endswith("/preview/gyro_rate")
+        assert 10_000 <= len(signal) == len(plotted[axis]) <= PREVIEW_POINTS
+        whole = entry["data/gyro_rate"][()]
+        assert (signal[()].min(), signal[()].max()) == (whole.min(), whole.max())
