@@ -446,6 +446,26 @@ def device(
 
 
 @app.command()
+def stop(
+    port: Annotated[
+        str,
+        typer.Option("--port", metavar="PORT", help="Where the controller is."),
+    ],
+    baud: Annotated[
+        int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
+    ] = 2_000_000,
+    patience: Annotated[
+        float,
+        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
+    ] = 10.0,
+) -> None:
+    """Panic stop: switch the drive off, whoever has the port; works while another process hangs."""
+    from campaign.cli.stop import stop_bench
+
+    raise typer.Exit(stop_bench(port, baud, patience))
+
+
+@app.command()
 def kinds(
     name: Annotated[
         str | None,
