@@ -12,7 +12,7 @@ from campaign.cli.selection import Selection
 from campaign.resources import copy_shipped
 
 _HEADINGS = (
-    "run", "date", "duration", "status", "trials", "failed", "protocol", "backend", "tags", "size",
+    "run", "status", "date", "duration", "trials", "failed", "protocol", "backend", "tags", "size",
 )  # fmt: skip
 
 
@@ -43,12 +43,12 @@ def init_folder(folder: Path) -> None:
 def _row(run: RunSummary) -> tuple[str, ...]:
     size = bytes_text(run.bytes)
     if run.problem:
-        return (run.name, "", "", "unreadable", "", "", "", "", "", size)
+        return (run.name, "unreadable", "", "", "", "", "", "", "", size)
     return (
         run.name,
+        run.status.value if run.status else "",
         f"{datetime.fromisoformat(run.created):%Y-%m-%d %H:%M}",
         _duration(run),
-        run.status.value if run.status else "",
         f"{run.trials}" if run.trials == run.planned else f"{run.trials} of {run.planned}",
         str(run.failed),
         run.protocol,

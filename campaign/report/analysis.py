@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from campaign.archive import ArchivedTrial, RunReader
+from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData, bench_of
 from campaign.physics.bench import Bench
 from campaign.published.scoreboard import Evidence, evidence_of
@@ -79,7 +80,16 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
     trials = tuple(trial for trial in run.trials if trial.trial.test == name)
     experiment = experiments.get(kind)
     data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
-    result, problem = _result(data, experiment)
+    try:
+        result, problem = _result(data, experiment)
+    except ArchiveError:
+        trials, damaged = _readable(trials)
+        data = replace(data, trials=trials)
+        try:
+            result, problem = _result(data, experiment)
+        except ArchiveError as error:
+            result, problem = Result(), one_line(error)
+        problem = "; ".join([*damaged, *filter(None, [problem])])
     return AnalysedTest(
         name=name,
         kind=kind,
@@ -97,6 +107,21 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
     )
 
 
+def _readable(
+    trials: tuple[ArchivedTrial, ...],
+) -> tuple[tuple[ArchivedTrial, ...], tuple[str, ...]]:
+    """The trials whose samples are as they were recorded, and a line about each of the others."""
+    good, damaged = [], []
+    for trial in trials:
+        try:
+            trial.recording()
+        except ArchiveError as error:
+            damaged.append(f"{trial.trial.name} is left out: {error}")
+        else:
+            good.append(trial)
+    return tuple(good), tuple(damaged)
+
+
 def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]:
     if experiment is None:
         return Result(), f"no experiment is called {data.kind!r} here; install what provides it"
@@ -104,6 +129,8 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
         return Result(), "none of its trials was executed"
     try:
         return experiment.analyse(data), ""
+    except ArchiveError:
+        raise
     except Exception as error:  # noqa: BLE001 (one bad analysis must not cost the other tests)
         return Result(), f"the analysis failed: {one_line(error)}"
 
