@@ -21,11 +21,14 @@ def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
     """Send SAFE until the controller says that it is at rest with its drive off.
 
     Needs no session and no other process: another one may hang, or read the same port beside us.
-    `patience` in s. Raises UsageError when the port cannot be opened at all.
+    `patience` in s. A port that cannot be opened is said at once, as what it is: not confirmed.
     """
     deadline = time.monotonic() + patience
-    line = open_port(port, baud, exclusive=False)  # not there at all: said at once
     watch, trouble = SafeWatch(), ""
+    try:
+        line = open_port(port, baud, exclusive=False)
+    except UsageError as error:
+        return _not_confirmed(str(error))
     while not watch.confirmed.is_set() and time.monotonic() < deadline:
         try:
             _insist(line, watch, deadline)
@@ -43,8 +46,12 @@ def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
     if watch.confirmed.is_set():
         print_line(CONFIRMED)
         return ExitCode.DONE
+    return _not_confirmed(f"{_why(watch, patience)}{f'; {trouble}' if trouble else ''}")
+
+
+def _not_confirmed(why: str) -> ExitCode:
     print_line(NOT_CONFIRMED)
-    print_note(f"{_why(watch, patience)}{f'; {trouble}' if trouble else ''}", "bold red")
+    print_note(why, "bold red")
     print_note("Switch the drive off by hand: use the emergency stop.", "bold red")
     return ExitCode.NOT_SAFE
 
