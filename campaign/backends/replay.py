@@ -154,7 +154,7 @@ class ReplayBackend:
         alike = self._alike.get(canonical_json(asked))
         if alike is not None:
             count = len(alike.archived)
-            return f"{self._run.name} has {count} of such trials, and the plan asks for more"
+            return f"{self._run.name} has no more such trials; all {count} are asked for"
         if not self._trials:
             return f"{self._run.name} has no recordings"
         wanted = dict(_leaves(asked))
