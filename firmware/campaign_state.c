@@ -1,4 +1,4 @@
-#include "campaign_state.h"
+#include "campaign_internal.h"
 
 #include <string.h>
 
@@ -8,150 +8,6 @@ static struct campaign_refusal refused(enum campaign_nak code, const char *text)
 {
     const struct campaign_refusal refusal = {code, text};
     return refusal;
-}
-
-/* Sending */
-
-static struct campaign_writer begin(struct campaign_device *device)
-{
-    const struct campaign_writer writer = {device->body, CAMPAIGN_MAX_BODY, 0, false};
-    return writer;
-}
-
-static void send(struct campaign_device *device, unsigned kind, const campaign_octet *body,
-                 size_t length)
-{
-    const size_t used =
-        campaign_frame_encode(kind, device->frames_sent, body, length, device->frame);
-    device->frames_sent = (device->frames_sent + 1u) & 0xFFFFu;
-    device->hooks->send(device->hooks->context, device->frame, used);
-}
-
-static void send_body(struct campaign_device *device, unsigned kind,
-                      const struct campaign_writer *writer)
-{
-    if (!writer->failed)
-        send(device, kind, writer->data, writer->used);
-}
-
-static void send_ack(struct campaign_device *device, unsigned sequence, unsigned kind)
-{
-    struct campaign_writer writer = begin(device);
-    campaign_put_u16(&writer, sequence);
-    campaign_put_u8(&writer, kind);
-    campaign_put_u8(&writer, device->state);
-    campaign_put_u32(&writer, device->identity->boot);
-    send_body(device, CAMPAIGN_ACK, &writer);
-}
-
-static void send_nak(struct campaign_device *device, unsigned sequence, unsigned kind,
-                     enum campaign_nak code, const char *name, const char *text)
-{
-    struct campaign_writer writer = begin(device);
-    campaign_put_u16(&writer, sequence);
-    campaign_put_u8(&writer, kind);
-    campaign_put_u8(&writer, code);
-    campaign_put_u8(&writer, device->state);
-    campaign_put_short(&writer, name);
-    campaign_put_short(&writer, text);
-    send_body(device, CAMPAIGN_NAK, &writer);
-}
-
-static void send_words(struct campaign_writer *writer, const char *const *words, size_t count)
-{
-    campaign_put_u8(writer, (uint32_t)count);
-    for (size_t i = 0; i < count; i++)
-        campaign_put_short(writer, words[i]);
-}
-
-static void send_capabilities(struct campaign_device *device, unsigned sequence, unsigned version)
-{
-    const struct campaign_identity *identity = device->identity;
-    struct campaign_writer writer = begin(device);
-    campaign_put_u16(&writer, sequence);
-    campaign_put_u8(&writer, version);
-    campaign_put_u8(&writer, CAMPAIGN_VERSION);
-    campaign_put_u8(&writer, CAMPAIGN_VERSION);
-    campaign_put_u32(&writer, identity->boot);
-    campaign_put_u8(&writer, device->state);
-    campaign_put_f64(&writer, identity->heartbeat_timeout_us / 1e6);
-    campaign_put_u32(&writer, device->ring_records);
-    campaign_put_u32(&writer, identity->longest_array);
-    campaign_put_f64(&writer, identity->highest_sample_rate);
-    campaign_put_short(&writer, identity->name);
-    campaign_put_short(&writer, identity->firmware);
-    send_words(&writer, identity->features, identity->feature_count);
-    send_words(&writer, identity->compensations, identity->compensation_count);
-    campaign_put_u8(&writer, (uint32_t)identity->limit_count);
-    for (size_t i = 0; i < identity->limit_count; i++) {
-        campaign_put_short(&writer, identity->limits[i].name);
-        campaign_put_u8(&writer, CAMPAIGN_F64);
-        campaign_put_f64(&writer, identity->limits[i].value);
-    }
-    send_body(device, CAMPAIGN_CAPABILITIES, &writer);
-}
-
-static void put_channel(struct campaign_writer *writer, const struct campaign_channel *channel)
-{
-    campaign_put_short(writer, channel->name);
-    campaign_put_short(writer, channel->unit);
-    campaign_put_short(writer, channel->display_unit);
-    campaign_put_short(writer, channel->label);
-    campaign_put_u8(writer, channel->measured);
-    campaign_put_u8(writer, channel->format);
-    campaign_put_f64(writer, channel->scale);
-}
-
-/* As many frames as it takes; each as full as channels come. */
-static void send_channels(struct campaign_device *device, unsigned sequence)
-{
-    size_t count, first = 0;
-    double rate;
-    const struct campaign_channel *channels =
-        device->hooks->channels(device->hooks->context, &count, &rate);
-    while (first < count) {
-        struct campaign_writer writer = begin(device);
-        size_t next = first;
-        campaign_put_u16(&writer, sequence);
-        campaign_put_u8(&writer, (uint32_t)count);
-        campaign_put_u8(&writer, (uint32_t)first);
-        campaign_put_f64(&writer, rate);
-        campaign_put_u8(&writer, 0);
-        while (next < count) {
-            struct campaign_writer trial = writer;
-            put_channel(&trial, &channels[next]);
-            if (trial.failed)
-                break;
-            writer = trial;
-            next++;
-        }
-        if (next == first)
-            return; /* a channel that fits into no frame is the application's mistake */
-        writer.data[12] = (campaign_octet)(next - first);
-        send_body(device, CAMPAIGN_CHANNELS, &writer);
-        first = next;
-    }
-}
-
-void campaign_device_status(struct campaign_device *device)
-{
-    const struct campaign_hooks *hooks = device->hooks;
-    struct campaign_writer writer = begin(device);
-    campaign_put_u8(&writer, device->state);
-    campaign_put_u8(&writer, device->fault);
-    campaign_put_u8(&writer, hooks->at_rest(hooks->context));
-    campaign_put_u8(&writer, hooks->drive_on(hooks->context));
-    campaign_put_u32(&writer, device->identity->boot);
-    campaign_put_f64(&writer, (double)device->now / 1e6);
-    campaign_put_u32(&writer, device->heartbeat);
-    campaign_put_f64(&writer, (double)(device->now - device->heartbeat_at) / 1e6);
-    campaign_put_u32(&writer, device->trial);
-    campaign_put_u32(&writer, device->first_record);
-    campaign_put_u32(&writer, device->next_record);
-    campaign_put_u32(&writer, device->next_record - device->first_record);
-    campaign_put_u32(&writer, campaign_bad_frames(&device->decoder.counts));
-    campaign_put_f64(&writer, hooks->temperature(hooks->context));
-    send_body(device, CAMPAIGN_STATUS, &writer);
 }
 
 /* States */
@@ -195,13 +51,13 @@ static bool store(struct campaign_device *device, unsigned kind,
     record->length = writer->used;
     memcpy(record->body, writer->data, writer->used * sizeof *writer->data);
     device->next_record++;
-    send(device, kind, record->body, record->length);
+    campaign_send(device, kind, record->body, record->length);
     return true;
 }
 
 static struct campaign_writer begin_record(struct campaign_device *device)
 {
-    struct campaign_writer writer = begin(device);
+    struct campaign_writer writer = campaign_begin(device);
     campaign_put_u32(&writer, device->trial);
     campaign_put_u32(&writer, device->next_record);
     return writer;
@@ -304,76 +160,6 @@ void campaign_device_tick(struct campaign_device *device, uint64_t now_us)
     device->ending = false;
     if (device->state == CAMPAIGN_RUNNING)
         enter(device, CAMPAIGN_ENDED);
-}
-
-/* Items of a SET */
-
-static bool is_name(const campaign_octet *data, size_t count)
-{
-    bool word = false; /* something stands since the last dot */
-    for (size_t i = 0; i < count; i++) {
-        const unsigned c = data[i] & 0xFFu;
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')
-                            || (c >= '0' && c <= '9') || c == '_' || c == '-';
-        if (!letter && !(c == '.' && word))
-            return false;
-        word = letter;
-    }
-    return word;
-}
-
-static void get_array(struct campaign_reader *reader, struct campaign_item *item)
-{
-    item->total = campaign_get_u32(reader);
-    item->offset = campaign_get_u32(reader);
-    item->count = campaign_get_u8(reader);
-    if (item->count > CAMPAIGN_LONGEST_SLICE || item->offset > item->total
-        || item->count > item->total - item->offset || (item->count == 0 && item->total > 0)) {
-        reader->failed = true;
-        return;
-    }
-    for (uint32_t i = 0; i < item->count; i++)
-        item->values[i] = campaign_get_f64(reader);
-}
-
-void campaign_get_item(struct campaign_reader *reader, struct campaign_item *item)
-{
-    const size_t length = campaign_get_u8(reader);
-    const campaign_octet *name = campaign_get_octets(reader, length);
-    uint32_t truth;
-    memset(item, 0, sizeof *item);
-    if (name == NULL || length > CAMPAIGN_LONGEST_NAME || !is_name(name, length)) {
-        reader->failed = true;
-        return;
-    }
-    for (size_t i = 0; i < length; i++)
-        item->name[i] = (char)(name[i] & 0xFFu);
-    item->tag = (enum campaign_tag)campaign_get_u8(reader);
-    switch (item->tag) {
-    case CAMPAIGN_F64:
-        item->f64 = campaign_get_f64(reader);
-        break;
-    case CAMPAIGN_I64:
-        item->i64 = campaign_get_u64(reader);
-        break;
-    case CAMPAIGN_BOOL:
-        truth = campaign_get_u8(reader);
-        item->truth = truth == 1u;
-        reader->failed = reader->failed || truth > 1u;
-        break;
-    case CAMPAIGN_TEXT:
-        item->text_length = campaign_get_u16(reader);
-        item->text = campaign_get_octets(reader, item->text_length);
-        if (item->text == NULL || item->text_length > CAMPAIGN_LONGEST_TEXT
-            || !campaign_is_utf8(item->text, item->text_length))
-            reader->failed = true;
-        break;
-    case CAMPAIGN_F64_ARRAY:
-        get_array(reader, item);
-        break;
-    default:
-        reader->failed = true;
-    }
 }
 
 static bool items_are_whole(struct campaign_reader reader, struct campaign_item *item)
@@ -542,15 +328,15 @@ static void on_hello(struct campaign_device *device, const struct campaign_frame
     const campaign_octet *host = campaign_get_octets(&reader, length);
     const bool renewed = device->in_session && device->session == session;
     if (host == NULL || reader.at != reader.size || !campaign_is_utf8(host, length)) {
-        send_nak(device, frame->sequence, frame->kind, CAMPAIGN_MALFORMED, NULL, NULL);
+        campaign_send_nak(device, frame->sequence, frame->kind, CAMPAIGN_MALFORMED, NULL, NULL);
         return;
     }
     if (lowest > CAMPAIGN_VERSION || highest < CAMPAIGN_VERSION) {
-        send_capabilities(device, frame->sequence, 0);
+        campaign_send_capabilities(device, frame->sequence, 0);
         return;
     }
     if (!renewed && watched(device)) {
-        send_nak(device, frame->sequence, frame->kind, CAMPAIGN_BUSY, NULL,
+        campaign_send_nak(device, frame->sequence, frame->kind, CAMPAIGN_BUSY, NULL,
                  "another session is using this device");
         return;
     }
@@ -563,7 +349,7 @@ static void on_hello(struct campaign_device *device, const struct campaign_frame
     device->in_session = true;
     device->session = session;
     device->hello_sequence = frame->sequence;
-    send_capabilities(device, frame->sequence, CAMPAIGN_VERSION);
+    campaign_send_capabilities(device, frame->sequence, CAMPAIGN_VERSION);
 }
 
 static void on_safe(struct campaign_device *device, const struct campaign_frame *frame)
@@ -573,7 +359,7 @@ static void on_safe(struct campaign_device *device, const struct campaign_frame 
     begin_ending(device, CAMPAIGN_INTERRUPTED, CAMPAIGN_NO_FAULT, "switched off by SAFE");
     if (before != CAMPAIGN_IN_FAULT)
         device->state = CAMPAIGN_IN_SAFE;
-    send_ack(device, frame->sequence, frame->kind);
+    campaign_send_ack(device, frame->sequence, frame->kind);
     campaign_device_status(device);
 }
 
@@ -610,11 +396,11 @@ static void on_resend(struct campaign_device *device, const struct campaign_fram
     else if (first < device->first_record)
         lost = (last < device->first_record ? last + 1u : device->first_record) - first;
     if (lost > 0) {
-        struct campaign_writer writer = begin(device);
+        struct campaign_writer writer = campaign_begin(device);
         campaign_put_u32(&writer, trial);
         campaign_put_u32(&writer, first);
         campaign_put_u32(&writer, lost);
-        send_body(device, CAMPAIGN_LOST, &writer);
+        campaign_send_body(device, CAMPAIGN_LOST, &writer);
         if (lost == count)
             return;
         first += lost;
@@ -622,20 +408,20 @@ static void on_resend(struct campaign_device *device, const struct campaign_fram
     for (uint32_t sent = 0; first <= last && first < device->next_record
                             && sent < CAMPAIGN_RESEND_MOST; first++, sent++) {
         const struct campaign_record *record = &device->ring[first % device->ring_records];
-        send(device, record->kind, record->body, record->length);
+        campaign_send(device, record->kind, record->body, record->length);
     }
 }
 
 static void answer(struct campaign_device *device, const struct campaign_frame *frame)
 {
     if (device->last_answer != CAMPAIGN_ACCEPTED) {
-        send_nak(device, frame->sequence, frame->kind, device->last_answer, device->last_name,
+        campaign_send_nak(device, frame->sequence, frame->kind, device->last_answer, device->last_name,
                  device->last_text);
         return;
     }
-    send_ack(device, frame->sequence, frame->kind);
+    campaign_send_ack(device, frame->sequence, frame->kind);
     if (frame->kind == CAMPAIGN_ARM)
-        send_channels(device, frame->sequence);
+        campaign_send_channels(device, frame->sequence);
 }
 
 static void on_command(struct campaign_device *device, const struct campaign_frame *frame)
@@ -650,7 +436,7 @@ static void on_command(struct campaign_device *device, const struct campaign_fra
         return;
     }
     if (!device->in_session || frame->sequence != ((device->last_sequence + 1u) & 0xFFFFu)) {
-        send_nak(device, frame->sequence, frame->kind, CAMPAIGN_OUT_OF_ORDER, NULL, NULL);
+        campaign_send_nak(device, frame->sequence, frame->kind, CAMPAIGN_OUT_OF_ORDER, NULL, NULL);
         return;
     }
     {

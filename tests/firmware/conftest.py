@@ -14,6 +14,13 @@ from .console import Console
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+CONSOLE = (
+    "console.c",
+    "campaign_state.c",
+    "campaign_sending.c",
+    "campaign_parameters.c",
+    "campaign_wire.c",
+)
 SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -34,7 +41,7 @@ def compile_c(target: Path, *sources: str, flags: tuple[str, ...] = ("-O1",)) ->
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("firmware") / "console"
-    return compile_c(target, "console.c", "campaign_state.c", "campaign_wire.c")
+    return compile_c(target, *CONSOLE)
 
 
 @pytest.fixture
@@ -45,8 +52,6 @@ def console(program: Path) -> Iterator[Console]:
 
 @pytest.fixture
 def sanitized(tmp_path: Path) -> Iterator[Console]:
-    target = compile_c(
-        tmp_path / "console", "console.c", "campaign_state.c", "campaign_wire.c", flags=SANITIZE
-    )
+    target = compile_c(tmp_path / "console", *CONSOLE, flags=SANITIZE)
     with Console(target) as started:
         yield started

@@ -99,10 +99,10 @@ def soak(frames: int, seed: int) -> None:
     for _ in range(frames // 100):
         data, meant = stream(source, 100, 0.6)
         sent = set(meant)
-        for frame in decoder.feed(data):
+        # The delimiter of the last one may be lost: the frame is whole with the next zero.
+        for frame in decoder.feed(data + b"\0"):
             assert (frame.kind, frame.sequence, frame.body) in sent
             accepted += 1
-        decoder.feed(b"\0")
     assert frames * 0.3 < accepted < frames
     assert decoder.counts.good == accepted
     assert decoder.counts.bad > frames * 0.2
