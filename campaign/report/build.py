@@ -14,6 +14,7 @@ from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.report import page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
+from campaign.report.besides import besides
 from campaign.report.output import replaced_folder
 from campaign.report.palette import variables
 from campaign.trial import Outcome
@@ -72,9 +73,12 @@ def render(
     download = page.scoreboard_download(scoreboard, folder)
     picture = page.overview(scoreboard, folder)
     sections = page.lay_out(tests, scoreboard, published, folder)
+    happened = besides(run, folder)
     problems = (
+        *(f"not readable, and left out: {damage}" for damage in run.damaged),
         *(f"{s.test.name}: {problem}" for s in sections for problem in s.problems),
         *scoreboard.problems,
+        *happened.problems,
     )
     context = {
         "run": run,
@@ -86,6 +90,7 @@ def render(
         "scoreboard_download": download,
         "statuses": page.statuses(scoreboard),
         "sections": sections,
+        "besides": happened,
         "anchors": page.anchors(sections),
         "failed": _failed(run.trials),
         "failed_count": sum(t.ending.outcome is not Outcome.COMPLETED for t in run.trials),

@@ -1,0 +1,145 @@
+"""What happened besides the plan: decisions, steps by hand, attempts, faults, drift of the checks.
+
+The journal and the trials tell it; nothing is left for the reader of a plain simulated run.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from campaign.archive import RunReader
+from campaign.archive.journal import Decision, OperatorStep, RunResumed
+from campaign.archive.story import Lines, read_lines
+from campaign.report import page, tables
+from campaign.report.drift import drift_figure, drift_table, drifts_of
+from campaign.report.figures import draw
+from campaign.result import Column, Figure, Table, Value
+
+
+@dataclass(frozen=True)
+class Besides:
+    """The section's figures and tables; without any, there is no section."""
+
+    figures: tuple[page.ShownFigure, ...]
+    tables: tuple[page.ShownTable, ...]
+    problems: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.figures or self.tables)
+
+
+def besides(run: RunReader, folder: page.Folder) -> Besides:
+    """All there is to say, numbered after what `folder` already has."""
+    told = read_lines(run.journal.encode())
+    drifts, problems = drifts_of(run)
+    found = [_decisions(told), _steps(told), _attempts(told), _faults(run)]
+    found += [drift_table(drift) for drift in drifts]
+    shown = tuple(_shown(table, folder) for table in found if table.rows)
+    figures = tuple(_drawn(drift_figure(drift), folder) for drift in drifts)
+    return Besides(figures, shown, tuple(problems))
+
+
+def _drawn(figure: Figure, folder: page.Folder) -> page.ShownFigure:
+    name = f"besides-{figure.key}"
+    return folder.figure(draw(figure), figure.title, figure.caption, figure.alt, (), name)
+
+
+def _shown(table: Table, folder: page.Folder) -> page.ShownTable:
+    download = folder.table(tables.table_csv(table), f"besides-{table.key}")
+    place = folder.next_table()
+    return page.ShownTable(
+        place, f"table-{place}", table.title, table.note, (), tables.show(table), download
+    )
+
+
+def _decisions(told: Lines) -> Table:
+    rows: list[dict[str, Value]] = []
+    for entry in told.entries:
+        if isinstance(entry, RunResumed):
+            changes = "; ".join(entry.changes) or "nothing had changed"
+            rows.append({"at": entry.at, "trial": None, "what": "run resumed", "reason": changes})
+        elif isinstance(entry, Decision):
+            row = {"at": entry.at, "trial": entry.trial, "what": entry.decision}
+            rows.append({**row, "reason": entry.reason})
+    columns = (
+        Column("at", "When"),
+        Column("trial", "Trial"),
+        Column("what", "Decision"),
+        Column("reason", "Reason"),
+    )
+    return Table("decisions", "What the run decided", columns, tuple(rows))
+
+
+def _steps(told: Lines) -> Table:
+    rows: list[dict[str, Value]] = [
+        {"at": step.at, "trial": step.trial, "step": step.step, "answer": step.answer}
+        for step in told.all(OperatorStep)
+    ]
+    columns = (
+        Column("at", "When"),
+        Column("trial", "Before trial"),
+        Column("step", "Step"),
+        Column("answer", "Answer"),
+    )
+    return Table("operator-steps", "What was done by hand", columns, tuple(rows))
+
+
+def _attempts(told: Lines) -> Table:
+    often = Counter(entry.trial for entry in told.attempts)
+    rows: list[dict[str, Value]] = [
+        {
+            "trial": entry.trial,
+            "attempt": entry.attempt,
+            "at": entry.at,
+            "outcome": entry.outcome.value,
+            "reason": entry.reason,
+            "safe": entry.safe_state.value,
+        }
+        for entry in sorted(told.attempts, key=lambda entry: (entry.trial, entry.attempt))
+        if often[entry.trial] > 1
+    ]
+    columns = (
+        Column("trial", "Trial"),
+        Column("attempt", "Attempt"),
+        Column("at", "Ended"),
+        Column("outcome", "Outcome"),
+        Column("reason", "Reason"),
+        Column("safe", "Safe state"),
+    )
+    note = "The last attempt is the trial; the earlier ones are kept and not analysed."
+    return Table("attempts", "Trials executed more than once", columns, tuple(rows), note=note)
+
+
+def _faults(run: RunReader) -> Table:
+    """Trials with a fault, or with what the backend measured of its own work."""
+    rows: list[dict[str, Value]] = []
+    names: dict[str, None] = {}
+    for trial in run.trials:
+        ending = trial.ending
+        if ending.fault is None and not ending.telemetry:
+            continue
+        telling = _scalars(ending.telemetry)
+        names |= dict.fromkeys(telling)
+        fault = ending.fault.value if ending.fault else ""
+        rows.append({"trial": trial.trial.number, "fault": fault, "why": ending.reason, **telling})
+    columns = (
+        Column("trial", "Trial"),
+        Column("fault", "Fault"),
+        Column("why", "Reason"),
+        *(Column(name, name.replace("_", " ").replace(".", ", ")) for name in names),
+    )
+    note = "What the backend measured of its own work has its unit in the name."
+    return Table("faults", "Faults, and the work of the backend", columns, tuple(rows), note=note)
+
+
+def _scalars(telemetry: Mapping[str, object], prefix: str = "") -> dict[str, Value]:
+    """The numbers, words and truths of nested tables by dotted name; lists are left out."""
+    found: dict[str, Value] = {}
+    for name, value in telemetry.items():
+        if isinstance(value, Mapping):
+            found |= _scalars(value, f"{prefix}{name}.")
+        elif value is None or isinstance(value, str | int | float | bool):
+            found[prefix + name] = value
+    return found

@@ -1,0 +1,75 @@
+"""What happened besides the plan is told from the journal and the trials, and only then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+
+from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.journal import Decision, OperatorStep
+from campaign.report.besides import besides
+from campaign.report.drift import drift_table, drifts_of
+from campaign.report.page import Folder
+from campaign.trial import Channel, Ending, Fault, Outcome, Recording, Role
+
+
+class InMemory(ArchivedTrial):
+    """A trial whose current is a sine of amplitude 1 + number / 100."""
+
+    def recording(self) -> Recording:
+        time = np.arange(0, self.trial.task.duration, 1e-3)
+        current = (1 + self.trial.number / 100) * np.sin(2 * np.pi * 10 * time)
+        channel = Channel("motor_current", "A", "Motor current", "A", current)
+        return Recording(time, {"motor_current": channel})
+
+
+def of(run: RunReader, number: int, role: Role, ending: Ending) -> ArchivedTrial:
+    like = run.trials[0]
+    task = like.trial.task.model_copy(update={"window": (0.0, like.trial.task.duration)})
+    task = type(task).model_validate({**task.model_dump(), "base_acceleration": {"shape": "zero"}})
+    trial = like.trial.model_copy(update={"number": number, "role": role, "task": task})
+    return InMemory(trial, ending, "", "", like.path, "")
+
+
+def test_a_plain_run_has_nothing_to_say(made_up: ModuleType, tmp_path: object) -> None:
+    folder = Folder()
+    assert not besides(made_up.made_up_run(tmp_path), folder)
+    assert not folder.files
+
+
+def test_the_journal_and_the_faults(made_up: ModuleType, tmp_path: object) -> None:
+    run = made_up.made_up_run(tmp_path)
+    lines = [
+        Decision(at="2026-11-21T10:00:00Z", trial=3, decision="retry", reason="over-temperature"),
+        OperatorStep(at="2026-11-21T10:01:00Z", trial=4, step="Preload it", answer="done"),
+    ]
+    hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE, telemetry={"ring": {"fill_max": 7}})
+    journal = "".join(line.model_dump_json() + "\n" for line in lines)
+    run = replace(run, journal=journal, trials=(of(run, 9, Role.MEASUREMENT, hot),))
+    folder = Folder()
+    found = besides(run, folder)
+    titles = [table.title for table in found.tables]
+    assert titles == ["What the run decided", "What was done by hand", titles[2]]
+    assert "retry" in folder.files["tables/besides-decisions.csv"]
+    assert "Preload it" in folder.files["tables/besides-operator-steps.csv"]
+    assert "drive" in folder.files["tables/besides-faults.csv"]
+    assert "7" in folder.files["tables/besides-faults.csv"].splitlines()[1]
+
+
+def test_the_drift_of_the_checks(made_up: ModuleType, tmp_path: object) -> None:
+    run = made_up.made_up_run(tmp_path)
+    done = Ending(Outcome.COMPLETED)
+    roles = {1: Role.MEASUREMENT, 21: Role.CHECK, 42: Role.CHECK}
+    run = replace(run, trials=tuple(of(run, n, role, done) for n, role in roles.items()))
+    (drift,), problems = drifts_of(run)
+    assert not problems
+    rows = drift_table(drift).rows
+    assert [row["trial"] for row in rows] == [1, 21, 42]
+    assert math.isclose(float(rows[0]["rms"]), 1.01 / math.sqrt(2), rel_tol=1e-2)
+    changes = [float(row["change"]) for row in rows]
+    assert np.allclose(changes, [0, 1.21 / 1.01 - 1, 1.42 / 1.01 - 1], rtol=1e-6)
+    found = besides(run, Folder())
+    assert len(found.figures) == len(found.tables) == 1
