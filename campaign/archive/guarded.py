@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from campaign.archive.files import why
 from campaign.archive.hdf5 import CHECKSUM, SAMPLE
+from campaign.archive.heaps import heaps_are_sound
 from campaign.errors import ArchiveError
 
 Array = NDArray[np.float64]
@@ -66,6 +67,8 @@ def open_file(path: Path) -> Iterator[h5py.File]:
             raise ArchiveError(f"{path}: there is no such file")
         if not h5py.is_hdf5(path):
             raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
+        if not heaps_are_sound(path):
+            raise ArchiveError(f"{path}: cannot be read: its texts are damaged")
         with h5py.File(path, "r", locking=False) as file:
             yield file
 
