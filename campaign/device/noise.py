@@ -30,34 +30,36 @@ class ByteNoise:
         if not hits:
             return data
         out = bytearray(data)
-        for at, name in reversed(hits):  # from the end, so that the places before stay right
-            self._damage(out, at, name)
+        for at, name, mask in reversed(hits):  # from the end: the places before stay right
+            _damage(out, at, name, mask)
         return bytes(out)
 
     def _gap(self, name: FaultName) -> int:
         """How many bytes pass before the next one that is met."""
         return int(self._random[name].geometric(self._rates[name])) - 1
 
-    def _hits(self, name: FaultName, count: int) -> list[tuple[int, FaultName]]:
+    def _hits(self, name: FaultName, count: int) -> list[tuple[int, FaultName, int]]:
+        """Where, how, and with which change of bits."""
         hits, at = [], self._left[name]
         while at < count:
-            hits.append((at, name))
+            hits.append((at, name, int(self._random[name].integers(1, 256))))
             at += 1 + self._gap(name)
         self._left[name] = at - count
         return hits
 
-    def _damage(self, out: bytearray, at: int, name: FaultName) -> None:
-        if at >= len(out):  # its byte was dropped
-            return
-        if name is FaultName.DROP:
-            del out[at]
-        elif name is FaultName.DUPLICATE:
-            out.insert(at, out[at])
-        elif name is FaultName.CORRUPT:
-            out[at] ^= int(self._random[name].integers(1, 256))
-        elif len(out) > 1:
-            other = at + 1 if at + 1 < len(out) else at - 1
-            out[at], out[other] = out[other], out[at]
+
+def _damage(out: bytearray, at: int, name: FaultName, mask: int) -> None:
+    if at >= len(out):  # its byte was dropped
+        return
+    if name is FaultName.DROP:
+        del out[at]
+    elif name is FaultName.DUPLICATE:
+        out.insert(at, out[at])
+    elif name is FaultName.CORRUPT:
+        out[at] ^= mask
+    elif len(out) > 1:
+        other = at + 1 if at + 1 < len(out) else at - 1
+        out[at], out[other] = out[other], out[at]
 
 
 class BadLine:
