@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from campaign.backends.sim import SimBackend
+from campaign.cli.ask import NotStartedError
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
 from campaign.errors import ArchiveError, ExitCode, UsageError
+from campaign.execution.safety import AbortedError
 from campaign.trial import Ending, Outcome, SafeState
 from tests.system.user import SEA, write
 
@@ -98,3 +102,84 @@ def test_a_stop_while_the_bench_is_being_connected_is_an_orderly_one(
     assert code is ExitCode.INTERRUPTED
     assert asked_to_rest == [1]
     assert capsys.readouterr().out.endswith(".nxs\n")
+
+
+def fail_to_let_go(*arguments: object) -> None:
+    raise OSError("the port is gone")
+
+
+def test_a_backend_that_cannot_let_go_hides_neither_the_code_nor_the_archive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr(SimBackend, "__exit__", fail_to_let_go)
+    assert run(tmp_path, monkeypatch, ExitCode.NOT_SAFE) is ExitCode.NOT_SAFE
+    shown = capsys.readouterr()
+    assert shown.out.endswith(".nxs\n")
+    assert "could not let go of the bench: OSError: the port is gone" in shown.err
+
+
+def test_an_archive_that_cannot_be_begun_is_said_with_the_bench_at_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    asked_to_rest = []
+    monkeypatch.setattr(
+        SimBackend, "make_safe", lambda backend: asked_to_rest.append(1) or SafeState.CONFIRMED
+    )
+    monkeypatch.setattr(SimBackend, "__exit__", fail_to_let_go)
+    (tmp_path / "results").write_text("no folder")
+    request = Request(str(write(tmp_path, SEA)))
+    with pytest.raises(UsageError, match="is not a folder"):
+        run_protocol(request, tmp_path / "results", workers=1, report=False)
+    assert asked_to_rest == [1]
+    assert "the port is gone" in capsys.readouterr().err
+
+
+def test_a_run_that_is_stopped_at_once_says_what_is_kept_and_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def insist(*arguments: object) -> Ending:
+        return Ending(Outcome.COMPLETED)
+
+    def interrupted(*arguments: object, **more: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(SimBackend, "execute", insist)
+    monkeypatch.setattr("campaign.execution.progress.Ledger.end", interrupted)
+    monkeypatch.chdir(tmp_path)
+    request = Request(str(write(tmp_path, SEA)))
+    with pytest.raises(AbortedError) as aborted:
+        run_protocol(request, Path("results"), workers=1, report=False)
+    (folder,) = (tmp_path / "results").glob("*.partial")
+    said = str(aborted.value)
+    assert f"the finished trials are in results/{folder.name}" in said
+    assert f"`campaign report {folder.stem}`" in said
+    assert f"`campaign resume {folder.stem}`" in said
+
+
+def attended(monkeypatch: pytest.MonkeyPatch) -> None:
+    from campaign.backends import sim
+
+    kind = replace(sim.BACKEND, attended=True, parallel=False)
+    monkeypatch.setattr("campaign.cli.prepare.find_backend", lambda name: kind)
+
+
+def test_a_real_bench_does_not_move_before_somebody_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    attended(monkeypatch)
+    request = Request(str(write(tmp_path, SEA)))
+    results = tmp_path / "results"
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))  # no terminal, whatever it holds
+    with pytest.raises(UsageError, match="--yes"):
+        run_protocol(request, results, workers=None, report=False)
+    monkeypatch.setattr("campaign.cli.ask._somebody_is_there", lambda: True)
+    monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
+    with pytest.raises(NotStartedError, match="nothing has moved"):
+        run_protocol(request, results, workers=None, report=False)
+    assert not results.exists()
+    assert "sea: 2 trials" in capsys.readouterr().err
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
+    assert run_protocol(request, results, workers=None, report=False) is ExitCode.DONE
+    request = Request(str(write(tmp_path, SEA)))
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    assert run_protocol(request, results, workers=None, report=False, yes=True) is ExitCode.DONE
