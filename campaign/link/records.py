@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from campaign.link.errors import ViolationError
 from campaign.wire.messages import End, Record
 
 FIRST_PATIENCE = 0.1
@@ -18,6 +19,10 @@ TRIES = 12
 """Requests until a record counts as lost: more than four seconds."""
 MOST = 32
 """Records asked for in one request: an answer must not drown what is new."""
+
+
+FARTHEST = 1_000_000
+"""Records a device may be ahead; beyond any ring buffer, and few enough to keep in mind."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,12 @@ class RecordOrder:
         self.exists(number + 1, now)
 
     def exists(self, beyond: int, now: float) -> None:
-        """Every record before number `beyond` has been made and was sent once."""
+        """Every record before number `beyond` has been made and was sent once.
+
+        Raises ViolationError for a number that no device can have come to.
+        """
+        if beyond - self.next > FARTHEST:
+            raise ViolationError(f"the controller speaks of record {beyond - 1} after {self.next}")
         if self._end is not None:
             beyond = min(beyond, self._end + 1)
         for number in range(max(self._beyond, self.next), beyond):

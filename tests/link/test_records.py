@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from campaign.link.errors import ViolationError
 from campaign.link.records import LONGEST_PATIENCE, MOST, TRIES, Missing, RecordOrder
 from campaign.wire.messages import End, Fault, Outcome, Samples
 
@@ -74,6 +76,11 @@ def test_a_long_gap_is_asked_for_in_pieces() -> None:
     order = RecordOrder()
     order.add(samples(MOST + 1), 0.0)
     assert order.requests(0.0) == [(0, MOST), (MOST, 1)]
+
+
+def test_an_absurd_number_is_a_violation_and_costs_no_memory() -> None:
+    with pytest.raises(ViolationError, match="4294967294"):
+        RecordOrder().exists(2**32 - 1, 0.0)
 
 
 @given(st.lists(st.integers(0, 20), max_size=60), st.sets(st.integers(0, 20)))
