@@ -129,13 +129,16 @@ def plan(
     changes: SetOption = None,
     backend: BackendOption = "sim",
     results: ResultsOption = RESULTS,
+    port: PortOption = None,
+    source: FromOption = None,
     allow_large: LargeOption = False,
 ) -> None:
     """Show the trials, their time and limits, and what would be written; execute nothing."""
     from campaign.cli.plan import show_plan
-    from campaign.cli.prepare import Request
+    from campaign.cli.prepare import Request, short_settings
 
-    request = Request(protocol, tuple(only or ()), tuple(changes or ()), backend, allow_large)
+    settings = (*(changes or ()), *short_settings(port, source, results))
+    request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
     show_plan(request, results, as_json=as_json)
 
 
@@ -188,6 +191,7 @@ def resume(
     ] = False,
     workers: WorkersOption = None,
     report: ReportOption = False,
+    port: PortOption = None,
     yes: YesOption = False,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
@@ -195,7 +199,13 @@ def resume(
 
     raise typer.Exit(
         resume_run(
-            run, results, accept_changes=accept_changes, workers=workers, report=report, yes=yes
+            run,
+            results,
+            accept_changes=accept_changes,
+            workers=workers,
+            report=report,
+            port=port,
+            yes=yes,
         )
     )
 

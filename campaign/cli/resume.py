@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
@@ -51,13 +52,17 @@ def resume_run(
     accept_changes: bool,
     workers: int | None,
     report: bool,
+    port: str | None,
     yes: bool,
 ) -> ExitCode:
-    """Execute what is left of a run; the archive's path is the last line of standard output."""
+    """Execute what is left of a run; the archive's path is the last line of standard output.
+
+    A `port` that is given is where the bench is today: no change that somebody has to accept.
+    """
     path = find_run(results, name)
     run = open_run(path)
     check_resumable(run)
-    remade = remake(run)
+    remade = remake(run, port)
     _check_changes(run, remade.changes, accepted=accept_changes)
     finished = not_repeated(run)
     left = [trial for trial in remade.trials if trial.number not in finished]
@@ -82,14 +87,29 @@ def resume_run(
     return conduct(session, open_archive, report=report)
 
 
-def remake(run: RunReader) -> Remade:
+def remake(run: RunReader, port: str | None = None) -> Remade:
     """Plan again from the protocol's file; from the archive when that is gone."""
+    if port is not None:
+        run = _at_port(run, port)
     protocol = Path(run.header.protocol_path)
     if run.header.protocol_path and protocol.exists():
         return _from_protocol(run, protocol)
     where = f"the protocol {protocol} is gone" if run.header.protocol_path else "no protocol's file"
     print_warning(f"{where}: going on with the plan that is in the archive")
     return _from_archive(run)
+
+
+def _at_port(run: RunReader, port: str) -> RunReader:
+    """The run as if it had begun with its bench at `port`."""
+    if "port" not in run.header.backend_options:
+        raise UsageError(f"the backend {run.header.backend!r} has no port; leave --port out")
+    header = run.header.model_copy(
+        update={
+            "backend_options": run.header.backend_options | {"port": port},
+            "overrides": run.header.overrides | {"backend.port": json.dumps(port)},
+        }
+    )
+    return replace(run, header=header)
 
 
 def _from_protocol(run: RunReader, protocol: Path) -> Remade:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import signal
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from campaign.archive import open_run
 from campaign.archive.journal import Decision, RunResumed, parse_journal
+from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
-from campaign.cli.resume import resume_run
+from campaign.cli.resume import remake, resume_run
 from campaign.cli.run import Remarks, run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.trial import Ending, Fault, Outcome
@@ -59,7 +61,13 @@ class Lab:
 
     def resume(self, archive: Path, *, accept: bool = False) -> ExitCode:
         return resume_run(
-            str(archive), self.results, accept_changes=accept, workers=1, report=False, yes=False
+            str(archive),
+            self.results,
+            accept_changes=accept,
+            workers=1,
+            report=False,
+            port=None,
+            yes=False,
         )
 
 
@@ -188,6 +196,24 @@ def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
     story = parse_journal(archive, open_run(archive).journal.encode())
     decisions = [entry.decision for entry in story.entries if isinstance(entry, Decision)]
     assert decisions == [policy]
+
+
+def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: Lab):
+    run = open_run(interrupted(lab))
+    with pytest.raises(UsageError, match="'sim' has no port"):
+        remake(run, "socket://127.0.0.1:9")
+    options = SerialOptions(port="/dev/one").model_dump(mode="json")
+    at_one = run.header.model_copy(
+        update={
+            "backend": "serial",
+            "backend_options": options,
+            "overrides": {"backend.port": '"/dev/one"'},
+        }
+    )
+    for port in ("/dev/one", "/dev/two"):
+        remade = remake(replace(run, header=at_one), port)
+        assert remade.changes == ()
+        assert remade.options.port == port
 
 
 def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
