@@ -6,12 +6,14 @@ by their sizes; where damage made the size of the free space zero, it walks on t
 
 from __future__ import annotations
 
-import mmap
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import BinaryIO
 
 _HEAD = b"GCOL\x01\x00\x00\x00"
 _HEADER = 16  # bytes, of a collection as well as of an object in it
+_BLOCK = 1 << 20
 
 
 def heaps_are_sound(path: Path) -> bool:
@@ -22,32 +24,41 @@ def heaps_are_sound(path: Path) -> bool:
 
 @lru_cache(maxsize=64)
 def _sound(path: Path, size: int, _changed: int) -> bool:
-    if size == 0:
-        return True
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+    with path.open("rb") as file:
+        return all(_collection_ends(file, start, size) for start in list(_collections(file)))
+
+
+def _collections(file: BinaryIO) -> Iterator[int]:
+    """Where in the file a collection begins, found block by block so that memory stays flat."""
+    before, tail = 0, b""
+    while block := file.read(_BLOCK):
+        content = tail + block
         start = content.find(_HEAD)
         while start >= 0:
-            if not _collection_ends(content, start):
-                return False
-            start = content.find(_HEAD, start + 8)
-    return True
+            yield before + start
+            start = content.find(_HEAD, start + len(_HEAD))
+        tail = content[1 - len(_HEAD) :]  # a head may lie across two blocks
+        before += len(content) - len(tail)
 
 
-def _number(content: mmap.mmap, start: int, length: int) -> int:
-    return int.from_bytes(content[start : start + length], "little")
-
-
-def _collection_ends(content: mmap.mmap, start: int) -> bool:
-    end = start + _number(content, start + 8, 8)
-    if end > len(content):
+def _collection_ends(file: BinaryIO, start: int, size: int) -> bool:
+    end = start + _numbers(file, start)[1]
+    if end > size:
         return True  # HDF5 refuses it
     place = start + _HEADER
     while place + _HEADER <= end:
-        size = _number(content, place + 8, 8)
-        if _number(content, place, 2):
-            place += _HEADER + (size + 7) // 8 * 8
-        elif size < _HEADER:
+        index, length = _numbers(file, place)
+        if index & 0xFFFF:
+            place += _HEADER + (length + 7) // 8 * 8
+        elif length < _HEADER:
             return False
         else:
-            place += size
+            place += length
     return True
+
+
+def _numbers(file: BinaryIO, place: int) -> tuple[int, int]:
+    """The two 64-bit numbers of a header; of an object the first begins with its index."""
+    file.seek(place)
+    head = file.read(_HEADER).ljust(_HEADER, b"\0")
+    return int.from_bytes(head[:8], "little"), int.from_bytes(head[8:], "little")
