@@ -36,6 +36,7 @@ from campaign.trial import (
     canonical_json,
 )
 
+_BLOCK = 4096  # samples between two looks at whether to stop
 _NOT_ASKED = {"window"}  # what a task says to an analysis alone
 _COMPARED = 2000  # archived trials among which the nearest is looked for, to explain a refusal
 _TOLD = 3  # differing fields that a refusal names
@@ -131,7 +132,15 @@ class ReplayBackend:
                     for c in channels
                 )
             )
-            recorder.append(recording.time, np.stack([channel.samples for channel in channels]))
+            samples = np.stack([channel.samples for channel in channels])
+            for first in range(0, len(recording.time), _BLOCK):
+                if stopped():
+                    for event in recording.events:
+                        if event.time < recording.time[first]:
+                            recorder.event(event)
+                    return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+                block = slice(first, first + _BLOCK)
+                recorder.append(recording.time[block], samples[:, block])
         for event in recording.events:
             recorder.event(event)
         return replace(archived.ending, safe_state=SafeState.CONFIRMED)
