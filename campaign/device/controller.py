@@ -19,7 +19,7 @@ from campaign.physics.compensation import compensation_methods
 from campaign.trial import Ending, Fault, Outcome
 from campaign.wire import codes
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
-from campaign.wire.device import Ack, Capabilities, Nak, Status
+from campaign.wire.device import Ack, Capabilities, Lost, Nak, Status
 from campaign.wire.fields import clipped
 from campaign.wire.frames import Frame
 from campaign.wire.host import Arm, Clear, Heartbeat, Hello, Release, Resend, Set, Start, Stop
@@ -214,8 +214,10 @@ class Controller:
                 if message.trial == ring.trial:
                     ring.free(message.next)
             self._send(client, self.status())
-        elif isinstance(message, Resend) and message.trial == ring.trial:
-            for record in ring.again(message.first, message.count):
+        elif isinstance(message, Resend):
+            held = message.trial == ring.trial
+            lost = (Lost(message.trial, message.first, message.count),)
+            for record in ring.again(message.first, message.count) if held else lost:
                 self._send(client, record)
 
     # Commands

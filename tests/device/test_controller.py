@@ -223,6 +223,9 @@ def test_records_are_had_again_until_they_are_released() -> None:
     rig.send(Resend(9, 3, 4), sequence=0)
     assert rig.said[0][1] == Lost(9, 3, 2)
     assert rig.records() == sent[5:7]
+    rig.said.clear()
+    rig.send(Resend(8, 3, 4), sequence=0)
+    assert [said[1] for said in rig.said] == [Lost(8, 3, 4)]  # of another trial nothing is held
     assert rig.send(Release(8)).code is NakCode.WRONG_TRIAL
     assert isinstance(rig.send(Release(9)), Ack)
     assert rig.controller.state is State.IDLE
