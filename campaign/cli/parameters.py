@@ -1,0 +1,93 @@
+"""Arguments and options that several commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ProtocolArgument = Annotated[
+    str,
+    typer.Argument(metavar="PROTOCOL", help="A TOML file, or the name of a shipped protocol."),
+]
+RunArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="RUN",
+        help="A path, a run's name, or a unique beginning of it.",
+        show_default=False,
+    ),
+]
+NewestRunArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[RUN]",
+        help="A path, a run's name, or a unique beginning of it; the newest when absent.",
+        show_default=False,
+    ),
+]
+ResultsOption = Annotated[
+    Path, typer.Option("--results", metavar="DIR", help="Where the archives are.")
+]
+OnlyOption = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="TEST", help="Only this test; may be given again."),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help="Change a value of the protocol, a bench or the backend; may be given again.",
+    ),
+]
+BackendOption = Annotated[
+    str, typer.Option("--backend", metavar="NAME", help="What executes the trials.")
+]
+LargeOption = Annotated[
+    bool, typer.Option("--allow-large", help="Accept a plan of more than 100 000 trials.")
+]
+TemplatesOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--templates",
+        metavar="DIR",
+        help="Templates that win over the packaged ones; they are code, so trust them.",
+        show_default=False,
+    ),
+]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        metavar="N",
+        min=1,
+        max=256,
+        help="Trials executed at once, where the backend can; one per processor if absent.",
+        show_default=False,
+    ),
+]
+ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="For scripts: ask nobody, also not before a bench moves.")
+]
+PortOption = Annotated[
+    str | None,
+    typer.Option(
+        "--port",
+        metavar="PORT",
+        help="Where the controller is; short for --set backend.port=PORT.",
+        show_default=False,
+    ),
+]
+FromOption = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="RUN",
+        help="The run to replay; short for --set backend.run=RUN.",
+        show_default=False,
+    ),
+]
+RESULTS = Path("results")
