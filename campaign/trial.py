@@ -176,6 +176,24 @@ class SafeState(StrEnum):
 
 
 @dataclass(frozen=True)
+class PanicStop:
+    """Somebody switched the bench off from outside; it stays off until a person clears that.
+
+    Attributes:
+        count: of the stop, told by the bench; who clears it says which one was seen.
+        by: who it was, as far as that was told.
+        age: time since then (s); None when the bench does not know.
+    """
+
+    count: int
+    by: str
+    age: float | None = None
+
+    def __str__(self) -> str:
+        return f"panic stop by {self.by}"
+
+
+@dataclass(frozen=True)
 class Ending:
     """How a trial ended and why.
 
@@ -278,6 +296,9 @@ class Recorder(Protocol):
     def append(self, time: Array, block: Array) -> None:
         """Add samples: `time` (n,) in s, `block` (channels, n) in the announced order and units."""
 
+    def lost(self, time: Array) -> None:
+        """Add samples that could not be had: NaN in every channel at `time` (n,), and an event."""
+
     def event(self, event: Event) -> None:
         """Note something that happened."""
 
@@ -298,6 +319,11 @@ class MemoryRecorder:
         self._times.append(time)
         self._blocks.append(block)
 
+    def lost(self, time: Array) -> None:
+        first = sum(map(len, self._times))
+        self.event(lost_samples(first, time))
+        self.append(time, np.full((len(self._channels), len(time)), np.nan))
+
     def event(self, event: Event) -> None:
         self._events.append(event)
 
@@ -314,6 +340,12 @@ class MemoryRecorder:
             for info, row in zip(self._channels, samples, strict=True)
         }
         return Recording(time, channels, tuple(self._events), ending)
+
+
+def lost_samples(first: int, time: Array) -> Event:
+    """The event that marks lost samples: number `first` of the trial, from 0, and following."""
+    last = first + len(time) - 1
+    return Event(float(time[0]), f"samples {first} to {last} were lost and are NaN")
 
 
 def canonical_json(tree: Any) -> str:

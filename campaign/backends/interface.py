@@ -1,13 +1,28 @@
-"""What a backend is: it executes one trial at a time and can bring the bench to rest."""
+"""What a backend is: it executes trials, each into its own recorder, and makes its bench safe."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from enum import StrEnum
+from typing import Protocol, runtime_checkable
 
 from campaign.options import Options
-from campaign.trial import Ending, Recorder, SafeState, Trial
+from campaign.trial import Ending, PanicStop, Recorder, SafeState, Trial
+
+
+class Source(StrEnum):
+    """Where a backend's samples come from."""
+
+    SIMULATION = "simulation"
+    HARDWARE = "hardware"
+    RECORDING = "recording"  # measured before, here or elsewhere
+
+
+class StopFlag(Protocol):
+    """Whether one trial is to end early. Every trial has its own; any thread may ask."""
+
+    def __call__(self) -> bool: ...
 
 
 class Backend(Protocol):
@@ -23,34 +38,67 @@ class Backend(Protocol):
         Asked of every trial of a plan, in order, before anything is connected.
         """
 
-    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
-        """Execute `trial`, appending samples to `recorder`; end early when `stopped()` is true.
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        """Names of the channels that `trial` will have; None while only a connection could tell.
+
+        Asked before anything is connected, and again, when that answer was None, once it is.
+        """
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Execute `trial`, handing samples to `recorder` as they come; end early when `stop()`.
 
         A bench that fails, diverges or meets a limit is an Ending, not an exception; samples that
-        are missing are NaN, each gap is an event, and the trial ends as a fault. A backend that
-        lost its bench may be asked again: it then tries to find it again.
+        are lost are named to `recorder.lost`, and the trial then ends as a fault. A backend that
+        lost its bench may be asked again: it then tries to find it again. Where several trials at
+        a time are possible, it is called from several threads.
         Raises BackendError when the backend itself cannot go on.
         """
 
     def make_safe(self) -> SafeState:
-        """Bring the bench to rest with its drive off, and say whether that was seen."""
+        """Bring the bench to rest with its drive off, and say whether that was seen.
+
+        May be called at any time from any thread, also while `execute` does not return: it must
+        then get through all the same.
+        """
+
+
+@runtime_checkable
+class StoppedOutside(Protocol):
+    """What a backend does besides when others can switch its bench off: see `PanicStop`."""
+
+    def panic_stop(self) -> PanicStop | None:
+        """The stop that keeps the bench off now, or None. Asked at any time between trials.
+
+        Raises BackendError when the bench cannot be asked.
+        """
+
+    def clear_stop(self, count: int) -> None:
+        """Let the bench move again after the stop with this count, which a person has seen.
+
+        Raises BackendError when there is none, or a later one.
+        """
 
 
 @dataclass(frozen=True)
 class BackendKind:
-    """A backend as `--backend NAME` finds it.
+    """A backend as `--backend NAME` finds it, with what it declares of itself.
 
     Attributes:
         options: what it accepts (`--set backend.NAME=...`).
         open: makes one from its options.
-        parallel: whether several trials may be executed at once (`--workers`).
-        attended: whether something real moves: `campaign run` then asks before the first motion,
-            operator steps are confirmed by a person, and pauses are really waited for.
+        source: where its samples come from.
+        live: whether it moves something, in the time of the wall clock: `campaign run` then asks
+            before the first motion, a person confirms operator steps, pauses are waited for, and
+            a bench that falls silent in mid-trial is made safe.
+        stopped_outside: whether others can switch its bench off: it is a `StoppedOutside`, too.
+        several: whether several trials may be executed at a time (`--workers`).
     """
 
     name: str
     summary: str
     options: type[Options]
     open: Callable[[Options], Backend]
-    parallel: bool = False
-    attended: bool = False
+    source: Source
+    live: bool = False
+    stopped_outside: bool = False
+    several: bool = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
-from campaign.backends.interface import BackendKind
+from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ArchiveError
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -110,7 +110,12 @@ class ReplayBackend:
         """Why the archive has no recording for `trial`: the fields in which the nearest differs."""
         return None if self._answer(trial) else self._why_not(trial)
 
-    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        """What the archive has for `trial`; None where it has nothing."""
+        archived = self._answer(trial)
+        return frozenset(archived.recording().channels) if archived is not None else None
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Copy channels, samples, events and ending of the archived trial; the same one again.
 
         Nothing moves, so the state is safe, however the archived trial left its bench.
@@ -118,7 +123,7 @@ class ReplayBackend:
         archived = self._answer(trial)
         if archived is None:
             return Ending(Outcome.FAULT, self._why_not(trial), fault=Fault.REFUSED)
-        if stopped():
+        if stop():
             return Ending(Outcome.INTERRUPTED, "stopped by the operator")
         try:
             recording = archived.recording()
@@ -134,7 +139,7 @@ class ReplayBackend:
             )
             samples = np.stack([channel.samples for channel in channels])
             for first in range(0, len(recording.time), _BLOCK):
-                if stopped():
+                if stop():
                     for event in recording.events:
                         if event.time < recording.time[first]:
                             recorder.event(event)
@@ -245,5 +250,6 @@ BACKEND = BackendKind(
     summary="the recordings of an archived run",
     options=ReplayOptions,
     open=_open,
-    parallel=True,
+    source=Source.RECORDING,
+    several=True,
 )

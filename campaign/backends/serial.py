@@ -6,13 +6,12 @@ import contextlib
 import random
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
-from campaign.backends.interface import BackendKind
+from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.backends.motion import BaseMotion, EmulatedMotion
 from campaign.errors import BackendError, UsageError
 from campaign.link.collect import Collector
@@ -90,8 +89,12 @@ class SerialBackend:
         """Why no controller could execute `trial`, or None; needs no port."""
         return self._refusal(trial)
 
-    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
-        """Configure, arm, start and record `trial`; STOP when `stopped()`."""
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        """Not known before a controller has said so."""
+        return None
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Configure, arm, start and record `trial`; STOP when `stop()`."""
         with self._busy:
             try:
                 session = self._session or self._reconnect(self._options.silence)
@@ -99,7 +102,7 @@ class SerialBackend:
                 reason = f"the controller cannot be reached: {error}"
                 return _fault(Fault.LOST_CONNECTION, reason, SafeState.NOT_CONFIRMED)
             try:
-                return self._execute(session, trial, recorder, stopped)
+                return self._execute(session, trial, recorder, stop)
             except LinkFaultError as error:
                 return self._broken_off(session, error)
             finally:
@@ -124,7 +127,7 @@ class SerialBackend:
     # One trial
 
     def _execute(
-        self, session: Session, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]
+        self, session: Session, trial: Trial, recorder: Recorder, stop: StopFlag
     ) -> Ending:
         task = trial.task
         try:
@@ -146,7 +149,7 @@ class SerialBackend:
             self._motion.trigger()
         try:
             session.start(number)
-            ending = collector.run(lambda: stopped() or self._urgent.is_set())
+            ending = collector.run(lambda: stop() or self._urgent.is_set())
             ending = self._released(session, number, ending)
         except LinkFaultError as error:
             ending = self._broken_off(session, error)
@@ -266,5 +269,6 @@ BACKEND = BackendKind(
     summary="a servo controller on a serial port or TCP",
     options=SerialOptions,
     open=_open,
-    attended=True,
+    source=Source.HARDWARE,
+    live=True,
 )

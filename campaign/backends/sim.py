@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from pydantic import Field
 
-from campaign.backends.interface import BackendKind
+from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.options import Options
 from campaign.physics.bench import Bench, LimitsOptions
 from campaign.trial import (
@@ -79,8 +77,12 @@ class SimBackend:
             return str(error)
         return None
 
-    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
-        """Simulate `trial`; end it at a limit, at a divergence, or when `stopped()`."""
+    def channels(self, trial: Trial) -> frozenset[str]:
+        """All that the simulation knows."""
+        return frozenset(info.name for info in CHANNELS)
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""
         from campaign.physics.base_motion import base_rate
         from campaign.physics.simulate import simulate
 
@@ -117,7 +119,7 @@ class SimBackend:
                     Event(float(time[reached]), "the rate that ends the trial was reached")
                 )
                 return Ending(Outcome.COMPLETED)
-            if stopped():
+            if stop():
                 return Ending(Outcome.INTERRUPTED, "stopped by the operator")
         return Ending(Outcome.COMPLETED)
 
@@ -189,5 +191,6 @@ BACKEND = BackendKind(
     summary="the bench simulated from its description",
     options=SimOptions,
     open=_open,
-    parallel=True,
+    source=Source.SIMULATION,
+    several=True,
 )

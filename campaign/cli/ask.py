@@ -33,14 +33,14 @@ class NotStartedError(CampaignError):
 def allow_motion(
     kind: BackendKind, trials: Sequence[Trial], tests: Sequence[PlannedTest], *, yes: bool
 ) -> None:
-    """Show in short what `trials` will do to an attended bench, and ask whether they may.
+    """Show in short what `trials` will do to a live bench, and ask whether they may.
 
     Args:
         tests: with the limits they come close to; may be empty.
 
     Raises UsageError when there is nobody to ask, and NotStartedError when they may not.
     """
-    if not kind.attended or not trials:
+    if not kind.live or not trials:
         return
     if not yes and not _somebody_is_there():
         raise UsageError(
@@ -73,7 +73,7 @@ def motion_summary(
 
 def attendance_of(kind: BackendKind, stop: StopSwitch, display: Shown, *, yes: bool) -> Attendance:
     """Who is asked during a run on this backend, and whether its pauses are waited for."""
-    if not kind.attended:
+    if not kind.live:
         return UNATTENDED
     return Attendance(
         AssumingOperator() if yes else ConsoleOperator(stop, display.hidden), wait_unless(stop)

@@ -118,7 +118,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
 
 def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
     """How many trials at once: what was asked for, else what backend and machine allow."""
-    if not kind.parallel:
+    if not kind.several:
         if wanted is not None and wanted > 1:
             raise UsageError(
                 f"the backend {kind.name!r} executes one trial at a time; "

@@ -124,6 +124,9 @@ class Producer:
             self._changed.notify_all()
         self._wake()
 
+    def lost(self, time: Array) -> None:
+        raise AssertionError("a simulation loses nothing")
+
     def event(self, event: Event) -> None:
         with self._changed:
             self._events.append((self._made, event))

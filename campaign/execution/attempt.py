@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, CampaignError
+from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.writer import PlanWriter
 from campaign.trial import Ending, Outcome, SafeState, Trial
@@ -32,9 +33,9 @@ def execute_once(
 ) -> Executed:
     """One attempt at `trial`, archived however it ends. Raises only what the archive raises."""
     started = utc_now()
-    recorder = writer.begin(trial)
+    file = writer.begin(trial)
     try:
-        executed = Executed(backend.execute(trial, recorder, halted))
+        executed = Executed(backend.execute(trial, SupervisingRecorder(file), halted))
     except BackendError as error:
         ending = Ending(Outcome.FAULT, str(error), SafeState.NOT_CONFIRMED)
         executed = Executed(ending, gave_up=True)
@@ -44,7 +45,7 @@ def execute_once(
         reason = f"internal error: {describe(error)}"
         ending = Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED)
         executed = Executed(ending, bug=error, gave_up=True)
-    recorder.finish(executed.ending, started, utc_now())
+    file.finish(executed.ending, started, utc_now())
     return executed
 
 

@@ -6,11 +6,20 @@ from pathlib import Path
 from typing import Protocol
 
 from campaign.archive.header import RunStatus
-from campaign.trial import Ending, Recorder, SafeState, Trial
+from campaign.trial import Array, ChannelInfo, Ending, Event, SafeState, Trial
 
 
-class TrialWriter(Recorder, Protocol):
-    """Takes the samples of one trial and keeps them once it has ended."""
+class TrialWriter(Protocol):
+    """Takes the samples of one trial and keeps them once it has ended.
+
+    As a `Recorder`, but for lost samples: those come as NaN, with their event.
+    """
+
+    def start(self, channels: tuple[ChannelInfo, ...]) -> None: ...
+
+    def append(self, time: Array, block: Array) -> None: ...
+
+    def event(self, event: Event) -> None: ...
 
     def finish(self, ending: Ending, started: str, ended: str) -> None:
         """Keep the trial, whole. Raises ArchiveError when it cannot be written."""

@@ -198,14 +198,12 @@ class Collector:
         if count < 0 or first > self._most:
             raise ViolationError(f"sample {first} cannot follow sample {self._samples - 1}")
         self._missing += count
-        last = first - 1
-        self._note(f"samples {self._samples} to {last} were lost and are NaN", first=self._samples)
-        self._blocks.append(np.full((len(self._channels), count), np.nan))
-        self._samples = first
+        self._flush()
+        self._recorder.lost(np.arange(self._samples, first) / self._rate)
+        self._samples = self._first = first
 
-    def _note(self, text: str, first: int | None = None) -> None:
-        at = self._samples if first is None else first
-        self._recorder.event(TrialEvent(at / self._rate, text))
+    def _note(self, text: str) -> None:
+        self._recorder.event(TrialEvent(self._samples / self._rate, text))
 
     def _flush(self) -> None:
         if self._blocks:

@@ -52,6 +52,9 @@ class StrictRecorder:
             self._memory.append(time.copy(), block.copy())
         self._on_block(self.blocks)
 
+    def lost(self, time: Array) -> None:
+        self.append(time, np.full((len(self.channels), len(time)), np.nan))
+
     def event(self, event: Event) -> None:
         if not (math.isfinite(event.time) and event.text.strip()):
             self.shapes.append(f"an event without a time or a text: {event}")

@@ -172,5 +172,5 @@ def test_a_damaged_recording_is_a_fault_that_names_the_channel(tmp_path, trial):
     assert "gyro_rate" in ending.reason
 
 
-def test_it_is_not_attended_and_may_run_in_parallel():
-    assert (BACKEND.attended, BACKEND.parallel) == (False, True)
+def test_it_is_not_live_and_may_run_several_trials_at_a_time():
+    assert (BACKEND.live, BACKEND.several) == (False, True)

@@ -50,6 +50,9 @@ class FakeBackend:
     def refuses(self, trial: Trial) -> str | None:
         return None
 
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        return frozenset({RATE.name})
+
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         self.log.append(trial.name)
         recorder.start((RATE,))

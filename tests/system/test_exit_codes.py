@@ -159,7 +159,7 @@ def test_a_run_that_is_stopped_at_once_says_what_is_kept_and_how_to_go_on(
 def attended(monkeypatch: pytest.MonkeyPatch) -> None:
     from campaign.backends import sim
 
-    kind = replace(sim.BACKEND, attended=True, parallel=False)
+    kind = replace(sim.BACKEND, live=True, several=False)
     monkeypatch.setattr("campaign.cli.prepare.find_backend", lambda name: kind)
 
 

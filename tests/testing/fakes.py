@@ -86,6 +86,9 @@ class Fake:
     def refuses(self, trial: Trial) -> str | None:
         return self._quirks.refuses(trial)
 
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        return frozenset(info.name for info in self._quirks.channels)
+
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         quirks = self._quirks
         if quirks.raises is not None:
