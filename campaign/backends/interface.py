@@ -66,10 +66,14 @@ class Backend(Protocol):
 class StoppedOutside(Protocol):
     """What a backend does besides when others can switch its bench off: see `PanicStop`."""
 
+    def introduce(self, run: str) -> None:
+        """Told the name of the run before entering, for whoever asks who holds the bench."""
+
     def panic_stop(self) -> PanicStop | None:
         """The stop that keeps the bench off now, or None. Asked at any time between trials.
 
-        Raises BackendError when the bench cannot be asked.
+        None, too, while the bench cannot be asked: such a stop must then keep the next trial from
+        moving, which ends as interrupted.
         """
 
     def clear_stop(self, count: int) -> None:

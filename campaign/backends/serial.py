@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import random
 import threading
 import time
 from dataclasses import replace
@@ -16,7 +15,15 @@ from campaign.backends.motion import BaseMotion, EmulatedMotion
 from campaign.errors import BackendError, UsageError
 from campaign.link.collect import Collector
 from campaign.link.connection import Connection
-from campaign.link.errors import LinkFaultError, RefusedError, ResetError, SilenceError
+from campaign.link.errors import (
+    HeldError,
+    LinkFaultError,
+    RefusedError,
+    ResetError,
+    SilenceError,
+    StoppedError,
+)
+from campaign.link.identity import identity, new_session
 from campaign.link.refusal import Refusal
 from campaign.link.session import Session
 from campaign.options import Options
@@ -25,6 +32,7 @@ from campaign.trial import (
     Ending,
     Fault,
     Outcome,
+    PanicStop,
     Recorder,
     SafeState,
     Trial,
@@ -35,6 +43,8 @@ from campaign.wire.messages import Channel, Release, State, Value, WireError
 
 RETRY = 0.2
 """s between two attempts to reach a controller that has gone."""
+ANSWER = 1.0
+"""s that a controller found again may take to answer while it is being made safe."""
 REST = 2.0
 """s in which a controller that has ended a trial is seen at rest."""
 
@@ -61,7 +71,8 @@ class SerialBackend:
         self._options = options
         self._motion: BaseMotion | None = EmulatedMotion() if options.motion != "none" else None
         self._refusal = Refusal(base_motion=self._motion is not None)
-        self._name = random.SystemRandom().randrange(1, 2**32)
+        self._number = new_session()
+        self._host = identity("campaign")
         self._trials = 0
         self._connection: Connection | None = None
         self._session: Session | None = None
@@ -75,6 +86,8 @@ class SerialBackend:
             )
         try:
             self._connect()
+        except HeldError as error:
+            raise BackendError(f"{self._options.port}: {error}") from None
         except LinkFaultError as error:
             raise BackendError(
                 f"nobody speaks the protocol on {self._options.port}: {error}; is it the right "
@@ -84,6 +97,28 @@ class SerialBackend:
 
     def __exit__(self, *exception: object) -> None:
         self._disconnect()
+
+    def introduce(self, run: str) -> None:
+        """The controller tells others that this run holds it."""
+        self._host = identity(f"run {run}")
+
+    def panic_stop(self) -> PanicStop | None:
+        """The stop from outside that keeps the bench off; None, too, while nobody can be asked."""
+        with self._busy:
+            if self._session is None:
+                return None  # the next trial looks for the controller, and is told when it arms
+            try:
+                return self._session.panic_stop()
+            except LinkFaultError:
+                return None
+
+    def clear_stop(self, count: int) -> None:
+        """Let the bench move again after the stop that a person has seen."""
+        with self._busy:
+            try:
+                (self._session or self._reconnect(self._options.silence)).clear_stop(count)
+            except LinkFaultError as error:
+                raise BackendError(f"the stop was not cleared: {error}") from None
 
     def refuses(self, trial: Trial) -> str | None:
         """Why no controller could execute `trial`, or None; needs no port."""
@@ -150,6 +185,8 @@ class SerialBackend:
         try:
             session.start(number)
             ending = collector.run(lambda: stop() or self._urgent.is_set())
+            if ending.outcome is Outcome.INTERRUPTED:
+                ending = replace(ending, reason=str(session.panic_stop() or ending.reason))
             ending = self._released(session, number, ending)
         except LinkFaultError as error:
             ending = self._broken_off(session, error)
@@ -184,26 +221,32 @@ class SerialBackend:
 
     def _broken_off(self, session: Session, error: LinkFaultError) -> Ending:
         """How a trial ended that the session could not bring to its end."""
-        safe = False
+        safe, stop = False, None
         try:
             if isinstance(error, SilenceError):
-                self._disconnect()
-            elif isinstance(error, RefusedError | ResetError):
+                self._disconnect(last_words=False)
+            elif isinstance(error, RefusedError | ResetError | StoppedError):
                 safe = session.rested(time.monotonic() + REST)
                 if isinstance(error, ResetError):
                     session.hello()
+                else:
+                    stop = session.panic_stop()  # it may be why a command came at a wrong time
             else:
                 safe = session.safe(time.monotonic() + REST)
         except (LinkFaultError, BackendError):
             safe = False
             self._disconnect()
+        if stop is not None or isinstance(error, StoppedError):
+            return Ending(Outcome.INTERRUPTED, str(stop or error), _state(safe))
         return _fault(error.fault, str(error), _state(safe))
 
     # The line
 
     def _connect(self) -> Session:
-        connection = Connection(self._options.port, self._options.baud)
-        session = Session(connection, self._options.silence, self._urgent.is_set, self._name)
+        connection = Connection(self._options.port, self._options.baud, self._number)
+        session = Session(
+            connection, self._options.silence, self._number, self._host, self._urgent.is_set
+        )
         try:
             session.hello()
         except BaseException:
@@ -222,28 +265,42 @@ class SerialBackend:
                 if time.monotonic() > deadline or self._urgent.wait(RETRY):
                     raise
 
-    def _disconnect(self) -> None:
+    def _disconnect(self, *, last_words: bool = True) -> None:
+        """Let go of the line. Without `last_words` only the heartbeats end, and it stops by that:
+
+        to a controller that is silent because it has started anew, a SAFE would be a stranger's.
+        """
         connection, self._connection, self._session = self._connection, None, None
         if connection is not None:
-            connection.close()
+            connection.close(last_words=last_words)
 
     def _seen_safe(self, deadline: float) -> bool:
         try:
-            session = self._session
-            if session is None:
-                # No `hello`: SAFE is obeyed without, even while another host has the line.
-                self._connection = Connection(self._options.port, self._options.baud)
-                session = Session(self._connection, self._options.silence, name=self._name)
-                seen = session.safe(deadline)
-                self._disconnect()  # the next trial says hello
-                return seen
-            return session.safe(deadline)
+            if self._session is not None:
+                return self._session.safe(deadline)
+            return self._seen_safe_anew(deadline)
+        except HeldError:
+            return False  # another host's bench now: not ours to stop, nor to call safe
         except ResetError:
             self._disconnect()
         except (LinkFaultError, UsageError):
             self._disconnect()
             time.sleep(RETRY)
         return False
+
+    def _seen_safe_anew(self, deadline: float) -> bool:
+        """SAFE over a new connection, with HELLO before it: of a session that the controller does
+        not know, it would be a stop from outside, and a person would have to clear it. Who does not
+        answer HELLO may still hear SAFE.
+        """
+        connection = Connection(self._options.port, self._options.baud, self._number)
+        try:
+            session = Session(connection, ANSWER, self._number, self._host)
+            with contextlib.suppress(SilenceError):
+                session.hello()
+            return session.safe(deadline)
+        finally:
+            connection.close()  # the next trial says HELLO, and can be given up
 
 
 def _info(channel: Channel) -> ChannelInfo:
@@ -271,4 +328,5 @@ BACKEND = BackendKind(
     open=_open,
     source=Source.HARDWARE,
     live=True,
+    stopped_outside=True,
 )

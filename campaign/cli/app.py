@@ -11,6 +11,7 @@ import campaign
 from campaign.cli.parameters import (
     RESULTS,
     BackendOption,
+    ClearStopOption,
     FromOption,
     LargeOption,
     NewestRunArgument,
@@ -96,6 +97,7 @@ def run(
         typer.Option("--tag", metavar="WORD", help="To find the run by; may be given again."),
     ] = None,
     yes: YesOption = False,
+    clear_stop: ClearStopOption = None,
     allow_large: LargeOption = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
@@ -106,7 +108,15 @@ def run(
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
     remarks = Remarks(operator, note, tuple(tags or ()))
     raise typer.Exit(
-        run_protocol(request, results, workers=workers, report=report, yes=yes, remarks=remarks)
+        run_protocol(
+            request,
+            results,
+            workers=workers,
+            report=report,
+            yes=yes,
+            clear_stop=clear_stop,
+            remarks=remarks,
+        )
     )
 
 
@@ -125,6 +135,7 @@ def resume(
     report: ReportOption = False,
     port: PortOption = None,
     yes: YesOption = False,
+    clear_stop: ClearStopOption = None,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
     from campaign.cli.resume import resume_run
@@ -138,6 +149,7 @@ def resume(
             report=report,
             port=port,
             yes=yes,
+            clear_stop=clear_stop,
         )
     )
 
@@ -370,6 +382,21 @@ def device(
             show_default=False,
         ),
     ] = None,
+    latch: Annotated[
+        str | None,
+        typer.Option(
+            "--latch",
+            metavar="FILE",
+            help="Where it remembers that it was stopped; a new file if absent; none: nowhere.",
+            show_default=False,
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            "--log", metavar="FILE", help="Note drive, stops and hosts there.", show_default=False
+        ),
+    ] = None,
 ) -> None:
     """Be a servo controller with a simulated bench, to rehearse against; Ctrl-C ends it."""
     from campaign.cli.device import run_device
@@ -383,6 +410,8 @@ def device(
             heartbeat_timeout=heartbeat_timeout,
             faults=faults or (),
             fault_seed=fault_seed,
+            latch=latch,
+            log=log,
         )
     )
 
@@ -401,10 +430,31 @@ def stop(
         typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
     ] = 10.0,
 ) -> None:
-    """Panic stop: switch the drive off, whoever has the port; works while another process hangs."""
+    """Panic stop: drive off, and off it stays; works whoever has the port, and while that hangs."""
     from campaign.cli.stop import stop_bench
 
     raise typer.Exit(stop_bench(port, baud, patience))
+
+
+@app.command()
+def status(
+    port: Annotated[
+        str,
+        typer.Option("--port", metavar="PORT", help="Where the controller is."),
+    ],
+    baud: Annotated[
+        int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
+    ] = 2_000_000,
+    patience: Annotated[
+        float,
+        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
+    ] = 3.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show how a controller is, who holds it, and whether somebody has stopped it."""
+    from campaign.cli.status import show_status
+
+    raise typer.Exit(show_status(port, baud, patience, as_json=as_json))
 
 
 @app.command()

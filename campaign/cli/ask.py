@@ -14,7 +14,6 @@ from campaign.cli.output import print_note
 from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
-from campaign.execution.stop import StopSwitch
 from campaign.protocol import PlannedTest
 from campaign.trial import Trial
 
@@ -42,7 +41,7 @@ def allow_motion(
     """
     if not kind.live or not trials:
         return
-    if not yes and not _somebody_is_there():
+    if not yes and not somebody_is_there():
         raise UsageError(
             f"the backend {kind.name!r} moves a real bench, and there is no terminal to ask "
             "whether it may; --yes says so"
@@ -71,19 +70,17 @@ def motion_summary(
     return [*lines, *(f"  you will be asked to: {step}" for step in steps)]
 
 
-def attendance_of(kind: BackendKind, stop: StopSwitch, display: Shown, *, yes: bool) -> Attendance:
+def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance:
     """Who is asked during a run on this backend, and whether its pauses are waited for."""
     if not kind.live:
         return UNATTENDED
-    return Attendance(
-        AssumingOperator() if yes else ConsoleOperator(stop, display.hidden), wait_unless(stop)
-    )
+    return Attendance(AssumingOperator() if yes else ConsoleOperator(display.hidden), wait_unless)
 
 
 class AssumingOperator:
     """Stands in for a person where a script said `--yes`; the record says so."""
 
-    def confirm(self, trial: Trial, step: str) -> str | None:
+    def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
         """Shows the step, and takes it for done."""
         print_note(f"before {trial.name}: {step}: {ASSUMED}")
         return ASSUMED
@@ -92,19 +89,16 @@ class AssumingOperator:
 class ConsoleOperator:
     """A person at the terminal."""
 
-    def __init__(
-        self, stop: StopSwitch, hidden: Callable[[], AbstractContextManager[None]]
-    ) -> None:
-        self._stop = stop
+    def __init__(self, hidden: Callable[[], AbstractContextManager[None]]) -> None:
         self._hidden = hidden
 
-    def confirm(self, trial: Trial, step: str) -> str | None:
+    def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
         """Ask until there is an answer, the run is stopped, or nobody is there any more."""
         with self._hidden():
             print_note(f"before {trial.name} ({trial.label}):\n  {step}", "bold")
             while True:
                 print_note("Enter when it is done, or stop to end the run: ")
-                line = read_line(self._stop)
+                line = read_line(stop)
                 if line is None or line.strip().lower() == "stop":
                     return None
                 answer = line.strip() or "done"
@@ -124,5 +118,6 @@ def read_line(stop: Callable[[], bool]) -> str | None:
     return None
 
 
-def _somebody_is_there() -> bool:
+def somebody_is_there() -> bool:
+    """Whether there is a terminal to ask."""
     return sys.stdin is not None and sys.stdin.isatty()

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
 from types import FrameType
 
 from campaign.cli.output import print_line, print_note
 from campaign.device.bench_file import load_bench
 from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
-from campaign.device.faults import parse_faults
+from campaign.device.faults import FaultSpec, parse_faults
 from campaign.device.line import PtyStream, TcpLine
+from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
 from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
@@ -29,29 +33,65 @@ def run_device(
     heartbeat_timeout: float | None,
     faults: Sequence[str],
     fault_seed: int,
+    latch: str | None = None,
+    log: Path | None = None,
 ) -> ExitCode:
     """Serve until somebody ends the program; the first line of output is the port to use."""
     if tcp is not None and pty:
         raise UsageError("a controller has one line: --pty or --tcp, not both")
     pace = _speed(speed)
     wanted = parse_faults(faults)
-    setup = Setup(load_bench(bench), pace)
+    with _latch_file(latch) as file, closing(_log(log)) as noting:
+        setup = Setup(load_bench(bench), pace, log=noting, latch_file=file)
+        return _serve(setup, tcp, pty, heartbeat_timeout, wanted, fault_seed)
+
+
+def _serve(
+    setup: Setup,
+    tcp: str | None,
+    pty: bool,
+    heartbeat_timeout: float | None,
+    faults: Sequence[FaultSpec],
+    fault_seed: int,
+) -> ExitCode:
     if heartbeat_timeout is None:
-        heartbeat_timeout = PATIENCE if math.isinf(pace) else HEARTBEAT_TIMEOUT
+        heartbeat_timeout = PATIENCE if math.isinf(setup.speed) else HEARTBEAT_TIMEOUT
     line = PtyStream() if pty else TcpLine(tcp or ANY_PORT)
     # Compiling takes long, and a controller that is silent for long looks dead.
     warm_up(setup.bench)
-    server = Server(line, setup, timeout=heartbeat_timeout, faults=wanted, fault_seed=fault_seed)
+    server = Server(line, setup, timeout=heartbeat_timeout, faults=faults, fault_seed=fault_seed)
     try:
         for name in ("SIGTERM", "SIGHUP"):
             if hasattr(signal, name):  # Windows has no SIGHUP
                 signal.signal(getattr(signal, name), _interrupt)
         print_line(line.name)
         print_note(f"rehearsing {setup.bench.name!r}; Ctrl-C ends it")
+        print_note(f"its latch is in {setup.latch_file or 'no memory that lasts'}")
         server.serve()
     except KeyboardInterrupt:
         pass  # how a rehearsal ends
     return ExitCode.DONE
+
+
+@contextmanager
+def _latch_file(named: str | None) -> Iterator[Path | None]:
+    """Where the latch is kept: as named, or in a file that is as old as this controller."""
+    if named == "none":
+        yield None
+    elif named is not None:
+        if not Path(named).parent.is_dir():
+            raise UsageError(f"--latch {named}: there is no such folder")
+        yield Path(named)
+    else:
+        with tempfile.TemporaryDirectory(prefix="campaign-device-") as folder:
+            yield Path(folder) / "latch.json"
+
+
+def _log(file: Path | None) -> DeviceLog:
+    try:
+        return DeviceLog(file)
+    except OSError as error:
+        raise UsageError(f"--log {file}: cannot be written: {error.strerror}") from None
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -72,6 +72,16 @@ ReportOption = Annotated[bool, typer.Option("--report", help="Build the report a
 YesOption = Annotated[
     bool, typer.Option("--yes", help="For scripts: ask nobody, also not before a bench moves.")
 ]
+ClearStopOption = Annotated[
+    int | None,
+    typer.Option(
+        "--clear-stop",
+        metavar="COUNT",
+        min=0,
+        help="Somebody stopped the bench: clear that stop, by the count that a person has seen.",
+        show_default=False,
+    ),
+]
 PortOption = Annotated[
     str | None,
     typer.Option(

@@ -38,8 +38,9 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     tree = run.header.backend_options if simulated else {}
     options = kind.options.model_validate(tree, context={"si": True})
     trial = archived.trial.model_copy(update={"number": 1})  # it is the only one of its run
-    session = Session(kind, open_backend(kind, options, [trial]), [trial], Policy(), workers=1)
     header = _header(run, archived, results, options.model_dump(mode="json"))
+    backend = open_backend(kind, options, [trial])
+    session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name)
     outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial]))
     if outcome.status is RunStatus.INTERRUPTED:
         print_note("interrupted: nothing was compared")

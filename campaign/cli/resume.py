@@ -54,6 +54,7 @@ def resume_run(
     report: bool,
     port: str | None,
     yes: bool,
+    clear_stop: int | None,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.
 
@@ -82,7 +83,15 @@ def resume_run(
         )
 
     session = Session(
-        remade.kind, backend, remade.trials, remade.policy, workers, yes, finished=finished
+        remade.kind,
+        backend,
+        remade.trials,
+        remade.policy,
+        workers,
+        run.name,
+        yes,
+        clear_stop,
+        finished,
     )
     return conduct(session, open_archive, report=report)
 

@@ -36,6 +36,7 @@ def run_protocol(
     workers: int | None,
     report: bool,
     yes: bool = False,
+    clear_stop: int | None = None,
     remarks: Remarks | None = None,
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output."""
@@ -46,23 +47,26 @@ def run_protocol(
     backend = prepared.open_backend()
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
+    name = new_run_name(results, prepared.path.stem, began)
 
     def open_archive() -> RunWriter:
-        header = run_header(prepared, request, results, began, remarks or Remarks())
+        header = run_header(prepared, request, name, began, remarks or Remarks())
         return RunWriter.create(results, header, plan.trials)
 
-    session = Session(prepared.kind, backend, plan.trials, plan.policy, workers, yes)
+    session = Session(
+        prepared.kind, backend, plan.trials, plan.policy, workers, name, yes, clear_stop
+    )
     return conduct(session, open_archive, report=report)
 
 
 def run_header(
-    prepared: Prepared, request: Request, results: Path, began: datetime, remarks: Remarks
+    prepared: Prepared, request: Request, name: str, began: datetime, remarks: Remarks
 ) -> RunHeader:
     """Everything the archive keeps about the run before its first trial."""
     plan = prepared.plan
     policy = plan.policy.model_dump(mode="json")
     return RunHeader(
-        name=new_run_name(results, prepared.path.stem, began),
+        name=name,
         created=began.isoformat(timespec="milliseconds"),
         title=plan.title,
         description=plan.description,

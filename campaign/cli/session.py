@@ -11,8 +11,9 @@ from pathlib import Path
 
 from campaign.archive import RunStatus, RunWriter
 from campaign.archive.header import SEALED
-from campaign.backends.interface import Backend, BackendKind
+from campaign.backends.interface import Backend, BackendKind, StoppedOutside
 from campaign.cli.ask import attendance_of
+from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
@@ -38,7 +39,9 @@ class Session:
     Attributes:
         trials: the whole plan.
         finished: those that are not executed (again), by number.
+        run: the name that the run has or will have.
         yes: whether nobody is asked anything.
+        clear_stop: the count of a stop of the bench from outside that a person has seen.
     """
 
     kind: BackendKind
@@ -46,7 +49,9 @@ class Session:
     trials: Sequence[Trial]
     policy: Policy
     workers: int
+    run: str
     yes: bool = False
+    clear_stop: int | None = None
     finished: Mapping[int, Outcome] = field(default_factory=dict)
 
 
@@ -70,6 +75,8 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
 def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[RunOutcome, ExitCode]:
     """Connect, execute, seal and let go; also the exit code that follows from all of it."""
     outcome: RunOutcome | None = None
+    if isinstance(session.backend, StoppedOutside):
+        session.backend.introduce(session.run)
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
@@ -77,6 +84,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             connected(session.backend, print_warning) as backend,
         ):
             with safe_when_broken_off(backend):
+                clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
@@ -111,7 +119,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             display=display,
             stop=stop,
             policy=session.policy,
-            attendance=attendance_of(session.kind, stop, display, yes=session.yes),
+            attendance=attendance_of(session.kind, display, yes=session.yes),
             finished=session.finished,
         )
 

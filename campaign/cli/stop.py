@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import random
 import time
+from dataclasses import dataclass
 
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ExitCode, UsageError
+from campaign.link.identity import identity, new_session
 from campaign.link.port import Port, open_port
 from campaign.link.safe import SafeWatch, safe_frame
 
@@ -13,40 +16,89 @@ INTERVAL = 0.02
 """s between two SAFE."""
 REOPEN = 0.1
 """s until a line that was lost is tried again."""
+LATCHING = 1.0
+"""s after which a controller that is safe, and says nothing of a latch, is taken to have none."""
 CONFIRMED = "safe state confirmed"
+NOT_LATCHED = "safe now, not latched"
 NOT_CONFIRMED = "SAFE STATE NOT CONFIRMED"
 
 
+@dataclass
+class Attempt:
+    """One panic stop, however many times the line has to be opened for it.
+
+    Attributes:
+        safe_at: since when (steady clock, s) it has been seen safe; None while it has not.
+    """
+
+    deadline: float
+    safe_at: float | None = None
+
+    def __post_init__(self) -> None:
+        self._sequence = random.SystemRandom().randrange(2**16)
+        self._frame = safe_frame(new_session(), identity("campaign stop"), self._sequence)
+        self.watch = SafeWatch(self._sequence)
+
+    def insist(self, line: Port) -> None:
+        """SAFE again and again until the end. Raises OSError when the line is lost."""
+        while not self.is_over():
+            line.write(self._frame)
+            again = time.monotonic() + INTERVAL
+            while not self.is_over() and time.monotonic() < again:
+                self.watch.feed(line.read())
+
+    def is_over(self) -> bool:
+        """Whether there is nothing more to be reached."""
+        now = time.monotonic()
+        safe = self.watch.confirmed.is_set() and self.watch.acknowledged
+        if safe and self.safe_at is None:
+            self.safe_at = now
+        if safe and (self.latched or now - (self.safe_at or now) > LATCHING):
+            return True
+        return now >= self.deadline
+
+    @property
+    def latched(self) -> bool:
+        """Whether the controller has said that it stays off."""
+        return self.watch.latch is not None and self.watch.latch.latched
+
+
 def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
-    """Send SAFE until the controller says that it is at rest with its drive off.
+    """Send SAFE until the controller says that it is at rest with its drive off, and stays so.
 
     Needs no session and no other process: another one may hang, or read the same port beside us.
     `patience` in s. A port that cannot be opened is said at once, as what it is: not confirmed.
     """
-    deadline = time.monotonic() + patience
-    watch, trouble = SafeWatch(), ""
+    attempt, trouble = Attempt(time.monotonic() + patience), ""
     try:
         line = open_port(port, baud, exclusive=False)
     except UsageError as error:
         return _not_confirmed(str(error))
-    while not watch.confirmed.is_set() and time.monotonic() < deadline:
+    while True:
         try:
-            _insist(line, watch, deadline)
+            attempt.insist(line)
         except OSError as error:
             trouble = error.strerror or str(error)
-        if watch.confirmed.is_set():
-            break
         line.close()
+        if attempt.is_over():
+            break
         time.sleep(REOPEN)
         try:
             line = open_port(port, baud, exclusive=False)
         except UsageError as error:
             trouble = str(error)
-    line.close()
-    if watch.confirmed.is_set():
-        print_line(CONFIRMED)
+    if attempt.safe_at is None:
+        return _not_confirmed(f"{_why(attempt.watch, patience)}{f'; {trouble}' if trouble else ''}")
+    if not attempt.latched:
+        print_line(NOT_LATCHED)
+        print_note(
+            "The controller's firmware is of an earlier version: whoever runs it can switch it on "
+            "again at any time. End that program, or cut the drive's power.",
+            "bold red",
+        )
         return ExitCode.DONE
-    return _not_confirmed(f"{_why(watch, patience)}{f'; {trouble}' if trouble else ''}")
+    print_line(CONFIRMED)
+    return ExitCode.DONE
 
 
 def _not_confirmed(why: str) -> ExitCode:
@@ -54,15 +106,6 @@ def _not_confirmed(why: str) -> ExitCode:
     print_note(why, "bold red")
     print_note("Switch the drive off by hand: use the emergency stop.", "bold red")
     return ExitCode.NOT_SAFE
-
-
-def _insist(line: Port, watch: SafeWatch, deadline: float) -> None:
-    """SAFE again and again until confirmed. Raises OSError when the line is lost."""
-    while not watch.confirmed.is_set() and time.monotonic() < deadline:
-        line.write(safe_frame())
-        again = time.monotonic() + INTERVAL
-        while not watch.confirmed.is_set() and time.monotonic() < again:
-            watch.feed(line.read())
 
 
 def _why(watch: SafeWatch, patience: float) -> str:

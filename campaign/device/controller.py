@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from campaign.device.configuration import Refused, make_trial
 from campaign.device.faults import FaultName
+from campaign.device.latch import LatchMemory
 from campaign.device.machine import Machine, Setup
 from campaign.device.motion import Strike
 from campaign.device.session import LONGEST_ARRAY, Configuration, Session
@@ -19,10 +20,24 @@ from campaign.physics.compensation import compensation_methods
 from campaign.trial import Ending, Fault, Outcome
 from campaign.wire import codes
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
-from campaign.wire.device import Ack, Capabilities, Lost, Nak, Status
+from campaign.wire.device import Ack, Capabilities, Holder, Lost, Nak, Status
 from campaign.wire.fields import clipped
 from campaign.wire.frames import Frame
-from campaign.wire.host import Arm, Clear, Heartbeat, Hello, Release, Resend, Set, Start, Stop
+from campaign.wire.host import (
+    Arm,
+    Bye,
+    Clear,
+    Heartbeat,
+    Hello,
+    Query,
+    Release,
+    Resend,
+    Safe,
+    Set,
+    Start,
+    Stop,
+    Unlatch,
+)
 from campaign.wire.messages import Item, Message, Record, channels_messages, decode
 from campaign.wire.statemachine import (
     WATCHED,
@@ -31,6 +46,7 @@ from campaign.wire.statemachine import (
     after_end,
     after_hello,
     after_silence,
+    latches,
 )
 
 HEARTBEAT_TIMEOUT = 0.1
@@ -90,10 +106,10 @@ class Controller:
             self._safe(client, frame)
         elif frame.kind == Kind.HELLO:
             self._hello(client, frame)
-        elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND):
+        elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND, Kind.QUERY, Kind.BYE):
             self._unnumbered(client, frame)
         elif client != self._session.client:
-            self._refuse(client, frame, Refused(NakCode.BUSY, "", "another session has the line"))
+            self._refuse(client, frame, Refused(NakCode.BUSY, "", self._held_by()))
         else:
             self._command(client, frame)
 
@@ -136,6 +152,17 @@ class Controller:
             temperature=self.machine.winding.celsius,
         )
 
+    def _is_held(self) -> bool:
+        return self._session.client is not None and self._now() < self._silent_at()
+
+    def _held_by(self) -> str:
+        return f"it is held by {self._session.host or 'a host that did not say its name'}"
+
+    def _holder(self) -> Holder:
+        heard = self._session.heard_at
+        age = self._now() - heard if math.isfinite(heard) else None
+        return Holder(self._is_held(), age, clipped(self._session.host))
+
     def _capabilities(self, sequence: int, version: int) -> Capabilities:
         clock = ("message-clock",) if math.isinf(self._setup.speed) else ()
         return Capabilities(
@@ -177,29 +204,41 @@ class Controller:
     # Messages that are not numbered
 
     def _safe(self, client: int, frame: Frame) -> None:
-        ending = Ending(Outcome.INTERRUPTED, "switched off by SAFE")
-        self.machine.switch_off(ending)
+        message = decode(frame.kind, frame.body)
+        if not isinstance(message, Safe):
+            raise TypeError("every SAFE is one")
+        from_outside = latches(message.session, self._session.number)
+        by = message.host or "somebody who did not say who"
+        why = f"panic stop by {by}" if from_outside else "switched off by SAFE"
+        self.machine.switch_off(Ending(Outcome.INTERRUPTED, clipped(why)))  # before anything else
+        news = from_outside and self._latch.set(message.session, clipped(by))
+        if news:
+            self._setup.log("latched", count=self._latch.stop.count, by=by)
         state = after(self.state, Kind.SAFE)
         if isinstance(state, State):
             self._enter(state)
         self._send(client, Ack(frame.sequence, Kind.SAFE, self.state, self._boot))
         self._send(client, self.status())
+        if from_outside:
+            self._send(None if news else client, self._latch.message())
 
     def _hello(self, client: int, frame: Frame) -> None:
         message = self._decoded(client, frame)
         if not isinstance(message, Hello):
             return
         same = self._session.numbering.same_session(message.session)
-        state = after_hello(self.state, same)
-        if isinstance(state, NakCode):
-            self._refuse(client, frame, Refused(state, "", "another session is using it"))
-            return
         if not message.lowest <= VERSION <= message.highest:
             self._send(client, self._capabilities(frame.sequence, 0))
             return
-        self._session.begin(client, message.session, frame.sequence)
+        state = after_hello(self.state, same, self._is_held())
+        if isinstance(state, NakCode):
+            self._refuse(client, frame, Refused(state, "", self._held_by()))
+            return
+        self._session.begin(client, message.session, frame.sequence, message.host, self._now())
+        self._setup.log("hello", host=message.host)
         self._enter(state)
         self._send(client, self._capabilities(frame.sequence, VERSION))
+        self._send(client, self._latch.message())
 
     def _unnumbered(self, client: int, frame: Frame) -> None:
         try:
@@ -208,12 +247,18 @@ class Controller:
             return  # it would come again if it mattered
         ring = self.machine.ring
         if isinstance(message, Heartbeat):
-            if client == self._session.client:
+            if message.session == self._session.number:
                 self._session.heard_at = self._now()
                 self._session.heartbeat = message.counter
                 if message.trial == ring.trial:
                     ring.free(message.next)
             self._send(client, self.status())
+        elif isinstance(message, Bye):
+            if message.session == self._session.number:
+                self._session.heard_at = -math.inf
+        elif isinstance(message, Query):
+            for answer in (self.status(), self._latch.message(), self._holder()):
+                self._send(client, answer)
         elif isinstance(message, Resend):
             held = message.trial == ring.trial
             lost = (Lost(message.trial, message.first, message.count),)
@@ -268,8 +313,12 @@ class Controller:
             case Set():
                 self._configuration.add(frame.body, message.items)
             case Arm():
+                self._check_latch()
                 return self._arm(message, frame)
+            case Unlatch():
+                return self._unlatch(message)
             case Start():
+                self._check_latch()
                 self._check_heard()
                 self.machine.start(message.trial)
             case Stop():
@@ -299,6 +348,23 @@ class Controller:
             raise Refused(NakCode.CAUSE_PERSISTS, "", "the motor is still too hot")
         self.machine.drop()
         self.machine.ring.begin(0)
+
+    def _check_latch(self) -> None:
+        if self._latch.latched:
+            text = f"stopped by {self._latch.stop.by or 'nobody that it remembers'}"
+            raise Refused(NakCode.LATCHED, "", text)
+
+    def _unlatch(self, message: Unlatch) -> tuple[Message, ...]:
+        try:
+            cleared = self._latch.clear(message.count)
+        except OSError as error:
+            text = f"it could not be remembered: {error.strerror}"
+            raise Refused(NakCode.NOT_READY, "", text) from None
+        if not cleared:
+            text = f"its latest stop is number {self._latch.stop.count}"
+            raise Refused(NakCode.OTHER_STOP, "", text)
+        self._setup.log("cleared", count=message.count, by=message.host)
+        return (self._latch.message(),)
 
     def _check_heard(self) -> None:
         if self._now() >= self._silent_at():
@@ -349,6 +415,8 @@ class Controller:
         while self._boot == before:
             self._boot = secrets.randbits(32)
         self._on_since = self._now()
+        self._latch = LatchMemory(self._setup.latch_file, self._boot)
+        self._setup.log("switched on", boot=self._boot, latched=self._latch.latched)
         self._session = Session()
         self._configuration = Configuration()
         self._fault = codes.Fault.NONE

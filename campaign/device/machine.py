@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from time import monotonic
 
 from campaign.backends.sim import CHANNELS, COMMANDS, SimBackend, SimOptions
 from campaign.device.clock import Now, Pace
 from campaign.device.faults import FaultName, FaultSpec
+from campaign.device.log import DeviceLog
 from campaign.device.motion import Motion, Strike
 from campaign.device.producer import Producer
 from campaign.device.ring import Ring
@@ -34,6 +36,8 @@ class Setup:
         wake: called from a thread when samples are there that were waited for.
         busy: whether the line has enough to do for now; asked where the speed is infinite.
         now: a steady clock.
+        log: is told whenever the drive goes on or off.
+        latch_file: where the latch is remembered; None: nowhere, as without lasting memory.
     """
 
     bench: Bench
@@ -42,6 +46,8 @@ class Setup:
     wake: Callable[[], None] = lambda: None
     busy: Callable[[], bool] = lambda: False
     now: Now = field(default=monotonic)
+    log: DeviceLog = field(default_factory=lambda: DeviceLog(None))
+    latch_file: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -116,6 +122,7 @@ class Machine:
         self._armed, self.outcome = None, None
         self.trials += 1
         self.ring.begin(number)
+        self._setup.log("drive on", trial=number)
         self._motion = Motion(
             armed.trial.task.sample_rate,
             armed.channels,
@@ -134,6 +141,7 @@ class Machine:
             self.drop()
         if self._motion is None or self._ending is not None:
             return
+        self._setup.log("drive off", why=ending.reason or str(ending.outcome))
         self._motion.stop()
         if told:
             self._motion.event(self._motion.time, ending.reason)
@@ -142,6 +150,8 @@ class Machine:
 
     def drop(self) -> None:
         """Forget the trial, whatever has become of it."""
+        if self.drive_on:
+            self._setup.log("drive off", why="dropped")
         for producer in (self._armed, self._motion):
             if isinstance(producer, Armed):
                 producer.producer.cancel()

@@ -23,6 +23,8 @@ class Session:
 
     Attributes:
         client: the connection that holds the line; None before the first HELLO.
+        number: of the session, as HELLO said.
+        host: who it is, as HELLO said.
         numbering: of its commands.
         answers: to the last numbered command, for when it comes again.
         heard_at: when (of the steady clock) the last heartbeat came.
@@ -30,16 +32,18 @@ class Session:
     """
 
     client: int | None = None
+    number: int | None = None
+    host: str = ""
     numbering: Numbering = field(default_factory=Numbering)
     answers: tuple[Message, ...] = ()
     heard_at: float = -math.inf
     heartbeat: int = 0
 
-    def begin(self, client: int, number: int, sequence: int) -> None:
+    def begin(self, client: int, number: int, sequence: int, host: str, now: float) -> None:
         """A HELLO was accepted: `client` holds the line, and commands are numbered from it on."""
         if not self.numbering.same_session(number):
-            self.heard_at, self.heartbeat = -math.inf, 0
-        self.client = client
+            self.heard_at, self.heartbeat = now, 0  # heartbeats take a moment to follow
+        self.client, self.number, self.host = client, number, host
         self.numbering.begin(number, sequence)
 
 

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from campaign.execution.stop import StopSwitch
 from campaign.execution.writer import PlanWriter
 from campaign.trial import Trial
 
+Stop = Callable[[], bool]
+"""Whether the run is to stop."""
 GLANCE = 0.1
 """s between two looks at the stop switch during a pause."""
 
@@ -18,34 +19,31 @@ GLANCE = 0.1
 class Operator(Protocol):
     """A person, or what stands in for one."""
 
-    def confirm(self, trial: Trial, step: str) -> str | None:
+    def confirm(self, trial: Trial, step: str, stop: Stop) -> str | None:
         """Show what has to be done to the bench before `trial`, and wait until it is.
 
-        Returns the answer for the record, or None when the run is to stop instead.
+        Returns the answer for the record, or None when the run is to stop instead, also because
+        `stop()`: it is asked again and again, for whoever has switched the bench off meanwhile.
         """
 
 
 class SimulatedOperator:
     """Does everything at once; for benches that nobody can touch."""
 
-    def confirm(self, trial: Trial, step: str) -> str | None:
+    def confirm(self, trial: Trial, step: str, stop: Stop) -> str | None:
         """Nobody is asked."""
         return "simulated"
 
 
-def no_wait(seconds: float) -> None:
+def no_wait(seconds: float, stop: Stop) -> None:
     """The pause of a bench that does not get warm."""
 
 
-def wait_unless(stop: StopSwitch) -> Callable[[float], None]:
+def wait_unless(seconds: float, stop: Stop) -> None:
     """A pause on the wall clock (s) that ends at once when the run is stopped."""
-
-    def wait(seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while not stop() and (left := end - time.monotonic()) > 0:
-            time.sleep(min(left, GLANCE))
-
-    return wait
+    end = time.monotonic() + seconds
+    while not stop() and (left := end - time.monotonic()) > 0:
+        time.sleep(min(left, GLANCE))
 
 
 @dataclass(frozen=True)
@@ -53,11 +51,11 @@ class Attendance:
     """What differs between a bench with a person beside it and one without.
 
     Attributes:
-        wait: lets the given time (s) pass, or less when the run is stopped.
+        wait: lets the given time (s) pass, or less when the run is to stop.
     """
 
     operator: Operator
-    wait: Callable[[float], None]
+    wait: Callable[[float, Stop], None]
 
 
 UNATTENDED = Attendance(SimulatedOperator(), no_wait)
@@ -77,10 +75,10 @@ class SetUp:
         """
         return bool(trial.setup) and trial.setup != self._confirmed
 
-    def confirm(self, trial: Trial) -> bool:
+    def confirm(self, trial: Trial, stop: Stop) -> bool:
         """Ask for every step, in order; False when the run is to stop instead."""
         for step in trial.setup:
-            answer = self._operator.confirm(trial, step)
+            answer = self._operator.confirm(trial, step, stop)
             self._writer.operator_step(trial.number, step, "stop" if answer is None else answer)
             if answer is None:
                 return False

@@ -22,7 +22,7 @@ from campaign.execution.sequence import TrialSequence
 from campaign.execution.stop import StopSwitch
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
-from campaign.trial import Outcome, Trial
+from campaign.trial import Outcome, PanicStop, Trial
 
 _NOTHING: Mapping[int, Outcome] = MappingProxyType({})
 
@@ -65,7 +65,9 @@ def run_plan(
     with unsafe_first(ended):
         with safe_afterwards(backend, ended):
             sequence.execute(workers)
-        status, reason = _verdict(ledger, ended, stop)
+        sequence.outside.look()  # it may have come after the last trial
+        outside = sequence.outside.stop
+        status, reason = _verdict(ledger, ended, stop, outside)
         ledger.close()
         ended.kept = writer.seal(status, reason, ended.safe_state, ended=utc_now())
         if ended.bug:
@@ -73,9 +75,12 @@ def run_plan(
     return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, ended.kept)
 
 
-def _verdict(ledger: Ledger, ended: Ended, stop: StopSwitch) -> tuple[RunStatus, str]:
+def _verdict(
+    ledger: Ledger, ended: Ended, stop: StopSwitch, outside: PanicStop | None
+) -> tuple[RunStatus, str]:
     """How the run stands, and every reason there is for it."""
-    interrupted = stop() and (ledger.left or Outcome.INTERRUPTED in ledger.outcomes)
+    cut = stop() and (ledger.left or Outcome.INTERRUPTED in ledger.outcomes)
+    interrupted = cut or outside is not None
     if interrupted:
         status = RunStatus.INTERRUPTED
     elif ended.fault:
@@ -84,5 +89,6 @@ def _verdict(ledger: Ledger, ended: Ended, stop: StopSwitch) -> tuple[RunStatus,
         status = RunStatus.FAILED_TRIALS
     else:
         status = RunStatus.COMPLETE
-    reasons = (f"stopped by {stop.reason}" if interrupted else "", ended.fault, ended.unsafe)
+    by_stop = str(outside) if outside is not None else f"stopped by {stop.reason}"
+    reasons = (by_stop if interrupted else "", ended.fault, ended.unsafe)
     return status, "; ".join(dict.fromkeys(filter(None, reasons)))

@@ -14,16 +14,21 @@ from campaign.backends.interface import Backend
 from campaign.execution.attempt import Executed, execute_once
 from campaign.execution.attendance import Attendance, SetUp
 from campaign.execution.decisions import Responses, Rests
+from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
 from campaign.execution.stop import StopSwitch
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
-from campaign.trial import Ending, Outcome, SafeState, Trial
+from campaign.trial import Ending, Outcome, PanicStop, SafeState, Trial
 
 
 class TrialSequence:
-    """Executes trials until there are none left or the run has to end."""
+    """Executes trials until there are none left or the run has to end.
+
+    Attributes:
+        outside: knows of a panic stop.
+    """
 
     def __init__(
         self,
@@ -43,6 +48,7 @@ class TrialSequence:
         self._ledger = ledger
         self._ended = ended
         self._stop = stop
+        self.outside = OutsideWatch(backend, stop, self._stopped_outside)
         self._attendance = attendance
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
@@ -81,17 +87,26 @@ class TrialSequence:
 
     def _next(self) -> Trial | None:
         """The trial to begin now; None when there is none, or not before others have ended."""
-        if not self._queue or self._halted():
+        if not self._queue or self._is_over():
             return None
         trial = self._queue[0]
         if self._rests.due is not None or self._set_up.is_due(trial):
             if self._running:
                 return None  # neither a rest nor a person's hands go with a trial that moves
             self._rest()
-            due = not self._halted() and self._set_up.is_due(trial)
-            if due and not self._set_up.confirm(trial):
+            due = not self._is_over() and self._set_up.is_due(trial)
+            if due and not self._set_up.confirm(trial, self.outside):
                 self._stop.request("the operator")
-        return None if self._halted() else self._queue.popleft()
+        return None if self._is_over() else self._queue.popleft()
+
+    def _is_over(self) -> bool:
+        """As `_halted`, between trials, when the bench can be asked as well."""
+        return self._halted() if self._running else self.outside() or self._halted()
+
+    def _stopped_outside(self, stop: PanicStop) -> None:
+        reason = f"by {stop.by}, stop number {stop.count}"
+        self._writer.decision("panic stop", reason)
+        self._ledger.remark(f"PANIC STOP by {stop.by}: the bench stays off until that is cleared")
 
     def _rest(self) -> None:
         rest = self._rests.due
@@ -99,7 +114,7 @@ class TrialSequence:
             return
         self._writer.decision("rest", f"{rest.pause:g} s after {rest.every:g} s of bench time")
         self._ledger.remark(f"the bench rests for {rest.pause:g} s")
-        self._attendance.wait(rest.pause)
+        self._attendance.wait(rest.pause, self.outside)
         self._rests.taken()
 
     def _settle(self, trial: Trial, executed: Executed) -> None:
@@ -110,6 +125,7 @@ class TrialSequence:
             self._ended.bug = self._ended.bug or executed.bug
             self._fail(ending.reason)
         elif ending.outcome is Outcome.INTERRUPTED and not self._halted():
+            self.outside.look()
             self._stop.request(ending.reason or "the bench")  # somebody stands there
         elif ending.safe_state is not SafeState.CONFIRMED and not self._halted():
             self._make_safe(trial)
@@ -140,6 +156,6 @@ class TrialSequence:
         self._ledger.repeat(trial, ending)
         pause = f" in {choice.pause:g} s" if choice.pause else ""
         self._ledger.remark(f"{trial.name} is executed again{pause}")
-        self._attendance.wait(choice.pause)
+        self._attendance.wait(choice.pause, self.outside)
         self._queue.appendleft(trial)  # when the run is stopped, it is left for who resumes it
         return False

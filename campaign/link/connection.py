@@ -36,8 +36,8 @@ class Connection:
         beats: when (steady clock, s) the latest heartbeats were sent, by counter.
     """
 
-    def __init__(self, port: str, baud: int) -> None:
-        """Open `port`. Raises UsageError when that cannot be done, saying why."""
+    def __init__(self, port: str, baud: int, session: int) -> None:
+        """Open `port` for the host of `session`. Raises UsageError saying why it cannot be."""
         self._incoming: queue.SimpleQueue[tuple[Kind, bytes]] = queue.SimpleQueue()
         self.beats: dict[int, float] = {}
         self._lost = ""
@@ -45,7 +45,7 @@ class Connection:
         # A session of its own: Ctrl-C in a terminal is for the host, which then stops in order.
         # -P: nothing in the user's folder can stand in for a module of ours.
         self._relay = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud)],
+            [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud), str(session)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,
@@ -86,6 +86,10 @@ class Connection:
         """Say in every heartbeat from now on which record is wanted next. Raises LineLostError."""
         self._send(Kind.WANTED, WANTED.pack(trial, record, at_once))
 
+    def holds(self, *, held: bool) -> None:
+        """Whether the controller is ours: only then the relay says SAFE when it leaves."""
+        self._send(Kind.HOLDS, bytes((held,)))
+
     def receive(self, timeout: float) -> bytes:
         """What has come from the port; empty after `timeout` (s). Raises LineLostError."""
         if self._lost:
@@ -106,8 +110,11 @@ class Connection:
                 self._lost = payload.decode(errors="replace") or "the line is lost"
                 raise LineLostError(self._lost)
 
-    def close(self) -> None:
-        """Let the relay go: it sends SAFE, waits briefly for the answer, and leaves."""
+    def close(self, *, last_words: bool = True) -> None:
+        """Let the relay go; with `last_words` it sends SAFE to a controller that it holds."""
+        if not last_words:
+            with contextlib.suppress(LineLostError):
+                self.holds(held=False)
         with contextlib.suppress(OSError):
             self._out.close()
         try:

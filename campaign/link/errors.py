@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from campaign.trial import Fault
+from campaign.trial import Fault, PanicStop
 from campaign.wire.messages import Nak
 
 
@@ -40,6 +40,24 @@ class RefusedError(LinkFaultError):
     def __init__(self, text: str, nak: Nak | None = None) -> None:
         super().__init__(text)
         self.nak = nak
+
+
+class StoppedError(LinkFaultError):
+    """Somebody stopped the controller from outside, and it does not arm before that is cleared.
+
+    Attributes:
+        stop: as the controller tells of it.
+    """
+
+    def __init__(self, stop: PanicStop) -> None:
+        super().__init__(str(stop))
+        self.stop = stop
+
+
+class HeldError(LinkFaultError):
+    """Another host holds the controller; the text says who."""
+
+    fault = Fault.REFUSED
 
 
 class ViolationError(LinkFaultError):

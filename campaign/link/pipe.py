@@ -10,7 +10,7 @@ _HEAD = struct.Struct("<BI")
 
 
 class Kind(IntEnum):
-    """Parent to relay: WRITE, WANTED. Relay to parent: all others."""
+    """Parent to relay: WRITE, WANTED, HOLDS. Relay to parent: all others."""
 
     WRITE = 1  # bytes for the port
     WANTED = 2  # what the heartbeats from now on say; see WANTED
@@ -19,6 +19,7 @@ class Kind(IntEnum):
     BYTES = 5  # bytes from the port
     LOST = 6  # the line is lost: why
     BEAT = 7  # a heartbeat is being sent; see BEAT
+    HOLDS = 8  # one byte: whether the controller is the host's, so that last words are due
 
 
 WANTED = struct.Struct("<II?")

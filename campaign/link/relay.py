@@ -1,8 +1,9 @@
-"""The process that owns the port: `python -m campaign.link.relay PORT BAUD`, started by the host.
+"""The process that owns the port: `python -m campaign.link.relay PORT BAUD SESSION`.
 
-It is a process of its own so that no analysis, disk or crash of the host can starve the heartbeats,
-and so that somebody is left to send SAFE when the host is killed. It imports neither numpy nor
-pydantic, forwards bytes both ways, and speaks the protocol itself only for heartbeats and SAFE.
+The host starts it. It is a process of its own so that no analysis, disk or crash of the host can
+starve the heartbeats, and so that somebody is left to send SAFE when the host is killed. It imports
+neither numpy nor pydantic, forwards bytes both ways, and speaks the protocol itself only for
+heartbeats and its last words.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import BinaryIO
 from campaign.errors import UsageError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
 from campaign.link.port import Port, open_port
-from campaign.link.safe import SafeWatch, heartbeat_frame, safe_frame
+from campaign.link.safe import SafeWatch, bye_frame, heartbeat_frame, safe_frame
 
 HEARTBEAT_INTERVAL = 0.025
 """s; a controller stops by itself after 100 ms without one."""
@@ -29,8 +30,11 @@ SAFE_INTERVAL = 0.02
 class Relay:
     """Bytes both ways between an open port and the parent, with heartbeats beside them."""
 
-    def __init__(self, port: Port, parent: BinaryIO) -> None:
+    def __init__(self, port: Port, parent: BinaryIO, session: int) -> None:
+        """`session`: the host's, which the heartbeats and the last words carry."""
         self._port = port
+        self._session = session
+        self._holds = False  # whether the controller has accepted the session
         self._parent: BinaryIO | None = parent
         self._writing, self._telling = threading.RLock(), threading.RLock()
         self._wanted = (0, 0)  # trial, record
@@ -59,15 +63,28 @@ class Relay:
                 self._wanted = trial, record
                 if at_once:
                     self._heartbeat()
+            elif kind is Kind.HOLDS:
+                self._holds = bool(payload[0])
 
     def make_safe(self) -> bool:
-        """Nobody is left to command: send SAFE until it is confirmed; False when it never was."""
+        """Nobody is left to command: send SAFE until it is confirmed; False when it never was.
+
+        Nothing is sent to a controller that has not accepted the session, or no longer answers it:
+        a SAFE would be a stranger's there, and stop another host's run.
+        """
         self._quiet.set()
+        if not self._holds:
+            return True
+        seen = self._seen_safe()
+        self._write(bye_frame(self._session))
+        return seen
+
+    def _seen_safe(self) -> bool:
         watch = SafeWatch()
         self._watch = watch
         end = time.monotonic() + LAST_WORDS
         while not self._lost.is_set() and time.monotonic() < end:
-            self._write(safe_frame())
+            self._write(safe_frame(self._session))
             if watch.confirmed.wait(SAFE_INTERVAL):
                 return True
         return False
@@ -100,7 +117,7 @@ class Relay:
         with self._writing:
             self._counter = (self._counter + 1) % 2**32
             self._beats.append((self._counter, time.monotonic()))
-            self._write(heartbeat_frame(self._counter, *self._wanted))
+            self._write(heartbeat_frame(self._counter, *self._wanted, self._session))
 
     def _write(self, data: bytes) -> None:
         try:
@@ -124,7 +141,7 @@ class Relay:
             self._parent = None  # it has gone; what is left to do needs no listener
 
 
-def main(name: str, baud: int) -> int:
+def main(name: str, baud: int, session: int) -> int:
     """Serve one parent until it goes; 0 when the bench was then seen safe, else 5 (2: no port)."""
     # Ctrl-C and a closing terminal are the parent's business: it stops in order, with our help.
     for stop in ("SIGINT", "SIGHUP"):
@@ -137,7 +154,7 @@ def main(name: str, baud: int) -> int:
         send(parent, Kind.REFUSED, str(error).encode())
         return 2
     send(parent, Kind.OPENED)
-    relay = Relay(port, parent)
+    relay = Relay(port, parent, session)
     relay.start()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0 if relay.make_safe() else 5))
     relay.serve(commands)
@@ -148,4 +165,4 @@ if __name__ == "__main__":
     import os
 
     # Not sys.exit: a thread that waits for a port or a pipe must not keep the process.
-    os._exit(main(sys.argv[1], int(sys.argv[2])))
+    os._exit(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))

@@ -1,22 +1,47 @@
-"""Frames that need no session, and watching for the answer that the bench is safe."""
+"""Frames that need no session, and watching for the answer that the bench is safe, and stays so.
+
+The relay imports this: nothing heavy may be imported here.
+"""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 
 from campaign.wire.codes import Kind, State, WireError
-from campaign.wire.frames import FrameDecoder, encode_frame
-from campaign.wire.messages import Heartbeat, Safe, Status, decode, encode
+from campaign.wire.frames import Frame, FrameDecoder, encode_frame
+from campaign.wire.messages import (
+    Ack,
+    Bye,
+    Heartbeat,
+    Latch,
+    Message,
+    Query,
+    Safe,
+    Status,
+    decode,
+    encode,
+)
 
 
-def heartbeat_frame(counter: int, trial: int, wanted: int) -> bytes:
-    """The host lives, and has every record of `trial` before number `wanted`."""
-    return encode_frame(*_parted(Heartbeat(counter, trial, wanted)))
+def heartbeat_frame(counter: int, trial: int, wanted: int, session: int) -> bytes:
+    """The host of `session` lives, and has every record of `trial` before number `wanted`."""
+    return _frame(Heartbeat(counter, trial, wanted, session))
 
 
-def safe_frame() -> bytes:
+def safe_frame(session: int = 0, host: str = "", sequence: int = 0) -> bytes:
     """Drive off, now. It is obeyed whoever sends it, whatever its sequence number."""
-    return encode_frame(*_parted(Safe()))
+    return _frame(Safe(session, host), sequence)
+
+
+def bye_frame(session: int) -> bytes:
+    """The host of `session` leaves."""
+    return _frame(Bye(session))
+
+
+def query_frame() -> bytes:
+    """How are you, and who holds you?"""
+    return _frame(Query())
 
 
 def is_safe(status: Status) -> bool:
@@ -29,29 +54,44 @@ class SafeWatch:
 
     Attributes:
         confirmed: set when it has.
+        acknowledged: set when it has answered a SAFE with the sequence number that is waited for.
+        latch: the newest one told, None before the first.
         last: the newest status, None before the first.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sequence: int = 0, told: Callable[[Message], None] | None = None) -> None:
+        """`told` is handed every message."""
         self.confirmed = threading.Event()
+        self.acknowledged = False
+        self.latch: Latch | None = None
         self.last: Status | None = None
+        self._sequence = sequence
+        self._told = told
         self._decoder = FrameDecoder()
 
     def feed(self, data: bytes) -> None:
         """Take bytes from the port, damaged or not."""
         for frame in self._decoder.feed(data):
-            if frame.kind != Kind.STATUS:
-                continue
-            try:
-                status = decode(frame.kind, frame.body)
-            except WireError:
-                continue
-            if isinstance(status, Status):
-                self.last = status
-                if is_safe(status):
-                    self.confirmed.set()
+            self._take(frame)
+
+    def _take(self, frame: Frame) -> None:
+        try:
+            message = decode(frame.kind, frame.body)
+        except WireError:
+            return
+        if self._told is not None:
+            self._told(message)
+        if isinstance(message, Latch):
+            self.latch = message
+        elif isinstance(message, Ack):
+            ours = message.kind is Kind.SAFE and message.sequence == self._sequence
+            self.acknowledged = self.acknowledged or ours
+        elif isinstance(message, Status):
+            self.last = message
+            if is_safe(message):
+                self.confirmed.set()
 
 
-def _parted(message: Heartbeat | Safe) -> tuple[Kind, int, bytes]:
+def _frame(message: Message, sequence: int = 0) -> bytes:
     kind, body = encode(message)
-    return kind, 0, body
+    return encode_frame(kind, sequence, body)

@@ -9,8 +9,16 @@ from dataclasses import dataclass, field
 
 from campaign.errors import BackendError
 from campaign.link.connection import Connection, LineLostError
-from campaign.link.errors import RefusedError, ResetError, SilenceError
-from campaign.link.safe import is_safe, safe_frame
+from campaign.link.errors import (
+    HeldError,
+    RefusedError,
+    ResetError,
+    SilenceError,
+    StoppedError,
+)
+from campaign.link.panic import panic_stop_of, printable
+from campaign.link.safe import is_safe, query_frame, safe_frame
+from campaign.trial import PanicStop
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
 from campaign.wire.frames import FrameDecoder, encode_frame
 from campaign.wire.messages import (
@@ -23,6 +31,7 @@ from campaign.wire.messages import (
     End,
     Event,
     Hello,
+    Latch,
     Lost,
     Message,
     Nak,
@@ -30,6 +39,7 @@ from campaign.wire.messages import (
     Samples,
     Start,
     Status,
+    Unlatch,
     Value,
     configuration_crc,
     decode,
@@ -43,7 +53,10 @@ LONGEST_WAIT = 0.5
 POLL = 0.02
 """s that a look at the line waits at most."""
 SAFE_INTERVAL = 0.03
-HOST = "campaign"
+ASKING = 0.5
+"""s for an answer to a question about the latch."""
+LETTING_GO = 0.5
+"""s that a controller may think it is held by a host that has just left."""
 GIVEN_UP = "given up: the bench is being made safe"
 
 
@@ -68,6 +81,7 @@ class Session:
     Attributes:
         capabilities: of the controller, after `hello`.
         status: the newest one, None before the first.
+        latch: the newest one told, None before the first.
         records: called with every record and LOST that arrives, in the order of the line.
         traffic: since it was last replaced.
     """
@@ -76,12 +90,14 @@ class Session:
         self,
         connection: Connection,
         silence: float,
+        number: int,
+        host: str,
         given_up: Callable[[], bool] = lambda: False,
-        name: int = 1,
     ) -> None:
         """`silence` (s) without a word is a lost connection; `given_up` ends every waiting.
 
-        `name` is a random number of the host's, the same one after a lost connection.
+        `number` is a random one of the host's, the same after a lost connection; `host` says who
+        it is.
         """
         self._connection = connection
         self._silence = silence
@@ -91,9 +107,10 @@ class Session:
         self._answers: dict[int, Ack | Nak | Capabilities] = {}
         self._channels: dict[int, dict[int, Channels]] = {}
         self._heard = time.monotonic()
-        self._name = name
+        self._number, self._host = number, host
         self.capabilities: Capabilities | None = None
         self.status: Status | None = None
+        self.latch: Latch | None = None
         self.records: Callable[[Samples | Event | End | Lost], None] = lambda record: None
         self.traffic = Traffic()
 
@@ -103,10 +120,16 @@ class Session:
         return self._decoder.counts.bad
 
     def hello(self) -> Capabilities:
-        """Begin the session. Raises BackendError when the two cannot talk, else SilenceError."""
+        """Begin the session.
+
+        Raises BackendError when the two cannot talk, HeldError when another host has the
+        controller, else SilenceError.
+        """
         try:
-            answer = self._command(Hello(VERSION, VERSION, self._name, HOST))
+            answer = self._greet()
         except RefusedError as error:
+            if error.nak is not None and error.nak.code is NakCode.BUSY:
+                raise HeldError(f"the controller is in use: {printable(error.nak.text)}") from None
             raise BackendError(f"the controller will not talk: {error}") from None
         except SilenceError:
             if self._decoder.counts.wrong_version:
@@ -125,10 +148,46 @@ class Session:
             )
         self.capabilities = answer
         self._channels.clear()
+        self._hold(held=True)
         return answer
+
+    def _greet(self) -> Ack | Capabilities:
+        """HELLO; again for a moment where a host before us may just have left."""
+        patience = time.monotonic() + LETTING_GO
+        while True:
+            try:
+                return self._command(Hello(VERSION, VERSION, self._number, self._host))
+            except RefusedError as error:
+                busy = error.nak is not None and error.nak.code is NakCode.BUSY
+                if not busy or time.monotonic() > patience:
+                    raise
+                self.look(POLL)
+
+    def panic_stop(self) -> PanicStop | None:
+        """The stop from outside that the controller is latched by; asked anew.
+
+        None when there is none, or when there is no answer: the next ARM is then refused for it.
+        """
+        self._drain()
+        self.latch = None
+        deadline = time.monotonic() + ASKING
+        while time.monotonic() < deadline and not self._given_up():
+            self._write(query_frame())
+            again = time.monotonic() + FIRST_WAIT
+            while time.monotonic() < again:
+                self.look(POLL)
+                latch: Latch | None = self.latch
+                if latch is not None:
+                    return panic_stop_of(latch)
+        return None
+
+    def clear_stop(self, count: int) -> None:
+        """Let the controller arm again after the stop number `count`. LinkFaultError."""
+        self._command(Unlatch(count, self._host))
 
     def configure(self, parameters: Mapping[str, Value]) -> tuple[float, tuple[Channel, ...]]:
         """Clear, set, arm: what will be recorded, and at which rate (Hz). LinkFaultError."""
+        self._check_stopped()
         self._become_idle()
         self._channels.clear()
         bodies = []
@@ -139,6 +198,12 @@ class Session:
         first = next(iter(self._channels[self._sequence].values()))
         parts = sorted(self._channels[self._sequence].values(), key=lambda part: part.first)
         return first.sample_rate, tuple(channel for part in parts for channel in part.channels)
+
+    def _check_stopped(self) -> None:
+        """What has been told already is not asked for."""
+        stop = panic_stop_of(self.latch) if self.latch is not None else None
+        if stop is not None:
+            raise StoppedError(stop)
 
     def _become_idle(self) -> None:
         """Whatever an earlier trial or host has left behind is over."""
@@ -194,7 +259,7 @@ class Session:
         self._drain()
         self.status = None  # only what it says from now on counts
         while time.monotonic() < deadline:
-            self._write(safe_frame())
+            self._write(safe_frame(self._number, self._host))
             again = time.monotonic() + SAFE_INTERVAL
             while time.monotonic() < again:
                 self.look(max(0.0, again - time.monotonic()))
@@ -249,6 +314,8 @@ class Session:
             sent = self._connection.beats.pop(message.heartbeat, None)
             if sent is not None:
                 self.traffic.round_trips.append(now - sent)
+        elif isinstance(message, Latch):
+            self.latch = message
         elif isinstance(message, Channels):
             self._channels.setdefault(message.sequence, {})[message.first] = message
         elif isinstance(message, Ack | Nak | Capabilities):
@@ -259,6 +326,7 @@ class Session:
     def _check_boot(self, boot: int) -> None:
         if self.capabilities is not None and boot != self.capabilities.boot:
             self.capabilities = None  # said once; what comes next needs a new `hello`
+            self._hold(held=False)  # it does not know us any more
             raise ResetError("the controller started anew")
 
     def _command(self, message: Message) -> Ack | Capabilities:
@@ -288,7 +356,9 @@ class Session:
         answer = self._answers.get(self._sequence)
         if isinstance(answer, Nak):
             name = f"{answer.name}: " if answer.name else ""
-            why = answer.text or answer.code.text
+            why = printable(answer.text) or answer.code.text
+            if answer.code is NakCode.LATCHED:
+                raise StoppedError(self._stop_behind(why))
             raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer)
         if answer is None or isinstance(answer, Capabilities) != (kind is Kind.HELLO):
             return None
@@ -298,6 +368,16 @@ class Session:
             if not parts or listed < next(iter(parts)).total:
                 return None
         return answer
+
+    def _stop_behind(self, why: str) -> PanicStop:
+        """The stop for which a command was refused, told in full where that can be had."""
+        return self.panic_stop() or PanicStop(0, f"somebody; the controller says: {why}")
+
+    def _hold(self, *, held: bool) -> None:
+        try:
+            self._connection.holds(held=held)
+        except LineLostError as error:
+            raise SilenceError(f"the connection was lost: {error}") from None
 
     def _drain(self) -> None:
         while self.look(0.0):

@@ -10,8 +10,10 @@ from enum import IntEnum
 
 from campaign.errors import BackendError
 
-VERSION = 1
-"""The version of the protocol that this package speaks."""
+VERSION = 2
+"""The version of the protocol that this package speaks, as HELLO negotiates it."""
+FRAME_VERSION = 1
+"""The version of frames. It never changes: whoever stops a device need not match its version."""
 
 
 class WireError(BackendError):
@@ -40,6 +42,9 @@ class Kind(Code):
     STOP = 0x08
     SAFE = 0x09
     CLEAR = 0x0A
+    QUERY = 0x0B
+    UNLATCH = 0x0C
+    BYE = 0x0D
     CAPABILITIES = 0x81
     ACK = 0x82
     NAK = 0x83
@@ -49,12 +54,17 @@ class Kind(Code):
     EVENT = 0x87
     END = 0x88
     LOST = 0x89
+    LATCH = 0x8A
+    HOLDER = 0x8B
 
 
 COMMANDS = frozenset(
-    {Kind.HELLO, Kind.SET, Kind.ARM, Kind.START, Kind.RELEASE, Kind.STOP, Kind.SAFE, Kind.CLEAR}
-)
-"""What a device acknowledges, by the frame's sequence number. HEARTBEAT and RESEND are not."""
+    {
+        Kind.HELLO, Kind.SET, Kind.ARM, Kind.START, Kind.RELEASE, Kind.STOP, Kind.SAFE, Kind.CLEAR,
+        Kind.UNLATCH,
+    }
+)  # fmt: skip
+"""What a device acknowledges, by the frame's sequence number; the others it does not."""
 
 
 class State(Code):
@@ -89,6 +99,8 @@ class NakCode(Code):
     WRONG_TRIAL = 15  # not the trial whose records are held
     CAUSE_PERSISTS = 16  # the fault is still there
     NO_HEARTBEAT = 17  # no heartbeat has been heard lately
+    LATCHED = 18  # somebody stopped the device; UNLATCH lets it go on
+    OTHER_STOP = 19  # not the stop that the latch is from
 
 
 class Outcome(Code):
@@ -115,6 +127,14 @@ class Fault(Code):
     DRIVE = 8
     REFUSED = 9
     OTHER = 255
+
+
+class LatchCause(Code):
+    """Why a device is latched."""
+
+    NONE = 0  # it is not
+    STOPPED = 1  # by a SAFE that was not its session's
+    NO_MEMORY = 2  # it has started, and cannot know whether it was
 
 
 class Format(Code):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from campaign.wire.codes import Fault, Format, Kind, NakCode, Outcome, State
+from campaign.wire.codes import Fault, Format, Kind, LatchCause, NakCode, Outcome, State
 from campaign.wire.parameters import Item
 
 
@@ -186,3 +186,35 @@ class Lost:
     trial: int
     first: int
     count: int
+
+
+@dataclass(frozen=True)
+class Latch:
+    """Whether somebody has stopped the device: then nothing arms until UNLATCH clears it.
+
+    Attributes:
+        count: of the latest stop; UNLATCH has to name it.
+        age: time since that stop (s); None when the device does not know.
+        by: who stopped it, as far as the SAFE said.
+    """
+
+    latched: bool
+    count: int
+    cause: LatchCause
+    age: float | None
+    by: str = ""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who holds the device.
+
+    Attributes:
+        held: whether its heartbeats are heard, so that nobody else gets the device.
+        age: time since the last one (s); None when there was none.
+        host: as its HELLO said; of the last session when it is held no more.
+    """
+
+    held: bool
+    age: float | None
+    host: str = ""

@@ -11,7 +11,7 @@ import zlib
 from dataclasses import dataclass
 
 from campaign.wire import cobs
-from campaign.wire.codes import VERSION, WireError
+from campaign.wire.codes import FRAME_VERSION, WireError
 
 MAX_BODY = 1024
 """Largest body (bytes)."""
@@ -29,7 +29,7 @@ class Frame:
     kind: int
     sequence: int
     body: bytes
-    version: int = VERSION
+    version: int = FRAME_VERSION
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Counts:
         return self.bad_cobs + self.too_short + self.too_long + self.bad_crc + self.wrong_version
 
 
-def encode_frame(kind: int, sequence: int, body: bytes, version: int = VERSION) -> bytes:
+def encode_frame(kind: int, sequence: int, body: bytes, version: int = FRAME_VERSION) -> bytes:
     """The bytes to send, delimiters included; WireError when the body is too long."""
     if len(body) > MAX_BODY:
         raise WireError(f"a message of {len(body)} bytes; a frame carries {MAX_BODY}")
@@ -78,7 +78,7 @@ def decode_frame(encoded: bytes, counts: Counts) -> Frame | None:
         counts.bad_crc += 1
         return None
     version, kind, sequence = HEADER.unpack_from(content)
-    if version != VERSION:
+    if version != FRAME_VERSION:
         counts.wrong_version += 1
         return None
     counts.good += 1

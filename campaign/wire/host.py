@@ -55,11 +55,13 @@ class Heartbeat:
     Attributes:
         counter: one more each time; STATUS returns it.
         trial, next: of this trial every record before `next` has arrived; the device frees them.
+        session: whose it is; another's than the device's keeps nothing alive and frees nothing.
     """
 
     counter: int
     trial: int
     next: int
+    session: int
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,47 @@ class Stop:
 
 @dataclass(frozen=True)
 class Safe:
-    """Drive off now: accepted in every state and from anybody; answered by ACK and STATUS."""
+    """Drive off now: accepted in every state and from anybody; answered by ACK and STATUS.
+
+    Unless it is of the session that holds the device, it latches it; then LATCH follows.
+
+    Attributes:
+        session: whose it is; 0, or no body at all, for nobody's.
+        host: who sends it, for whoever asks later.
+    """
+
+    session: int = 0
+    host: str = ""
 
 
 @dataclass(frozen=True)
 class Clear:
-    """Leave SAFE or FAULT, or give up a configuration: the device is idle and remembers nothing."""
+    """Leave SAFE or FAULT, or give up a configuration: the device is idle and remembers nothing.
+
+    All but the latch: see Unlatch.
+    """
+
+
+@dataclass(frozen=True)
+class Query:
+    """How is the device? Changes nothing; answered by STATUS, LATCH and HOLDER, to anybody."""
+
+
+@dataclass(frozen=True)
+class Unlatch:
+    """A person has seen that the device was stopped and lets it move again.
+
+    Attributes:
+        count: of the stop that the person has seen.
+        host: who it is, for the device's log.
+    """
+
+    count: int
+    host: str = ""
+
+
+@dataclass(frozen=True)
+class Bye:
+    """The host of `session` leaves: from now on it counts as not heard. Not acknowledged."""
+
+    session: int

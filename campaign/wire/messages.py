@@ -20,6 +20,7 @@ from campaign.wire.codes import (
     Fault,
     Format,
     Kind,
+    LatchCause,
     NakCode,
     Outcome,
     State,
@@ -32,6 +33,8 @@ from campaign.wire.device import (
     Channels,
     End,
     Event,
+    Holder,
+    Latch,
     Lost,
     Nak,
     Samples,
@@ -41,15 +44,18 @@ from campaign.wire.fields import Reader, Writer, clipped
 from campaign.wire.frames import MAX_BODY
 from campaign.wire.host import (
     Arm,
+    Bye,
     Clear,
     Heartbeat,
     Hello,
+    Query,
     Release,
     Resend,
     Safe,
     Set,
     Start,
     Stop,
+    Unlatch,
 )
 from campaign.wire.parameters import (
     ArraySlice,
@@ -64,18 +70,20 @@ from campaign.wire.parameters import (
 )
 
 __all__ = [
-    "COMMANDS", "MAX_BODY", "VERSION", "Ack", "Arm", "ArraySlice", "Capabilities", "Channel",
-    "Channels", "Clear", "End", "Event", "Fault", "Format", "Heartbeat", "Hello", "Item", "Kind",
-    "Lost", "Message", "Nak", "NakCode", "Outcome", "Record", "Release", "Resend", "Safe",
-    "Samples", "Set", "Start", "State", "Status", "Stop", "Value", "WireError", "assembled",
+    "COMMANDS", "MAX_BODY", "VERSION", "Ack", "Arm", "ArraySlice", "Bye", "Capabilities", "Channel",
+    "Channels", "Clear", "End", "Event", "Fault", "Format", "Heartbeat", "Hello", "Holder", "Item",
+    "Kind", "Latch", "LatchCause", "Lost", "Message", "Nak", "NakCode", "Outcome", "Query",
+    "Record", "Release", "Resend", "Safe", "Samples", "Set", "Start", "State", "Status", "Stop",
+    "Unlatch", "Value", "WireError", "assembled",
     "channels_messages", "clipped", "configuration_crc", "decode", "encode", "items",
     "parameter_messages", "sample_dtype", "sample_size", "sample_struct", "samples_per_record",
 ]  # fmt: skip
 
 Record = Samples | Event | End
 Message = (
-    Hello | Set | Arm | Start | Heartbeat | Resend | Release | Stop | Safe | Clear
-    | Capabilities | Ack | Nak | Channels | Status | Samples | Event | End | Lost
+    Hello | Set | Arm | Start | Heartbeat | Resend | Release | Stop | Safe | Clear | Query
+    | Unlatch | Bye
+    | Capabilities | Ack | Nak | Channels | Status | Samples | Event | End | Lost | Latch | Holder
 )  # fmt: skip
 
 
@@ -152,7 +160,7 @@ ITEMS = Layout(_write_items, _read_items)
 CHANNELS = Layout(_write_channels, _read_channels)
 REST = Layout(lambda w, value: w.data(value), lambda r: r.data(r.left))
 STATE, FAULT, OUTCOME = _code(State), _code(Fault), _code(Outcome)
-KIND, NAK = _code(Kind), _code(NakCode)
+KIND, NAK, CAUSE = _code(Kind), _code(NakCode), _code(LatchCause)
 
 LAYOUTS: Mapping[Kind, tuple[type[Any], tuple[tuple[str, Layout], ...]]] = {
     Kind.HELLO: (
@@ -162,12 +170,18 @@ LAYOUTS: Mapping[Kind, tuple[type[Any], tuple[tuple[str, Layout], ...]]] = {
     Kind.SET: (Set, (("items", ITEMS),)),
     Kind.ARM: (Arm, (("crc", U32),)),
     Kind.START: (Start, (("trial", U32),)),
-    Kind.HEARTBEAT: (Heartbeat, (("counter", U32), ("trial", U32), ("next", U32))),
+    Kind.HEARTBEAT: (
+        Heartbeat,
+        (("counter", U32), ("trial", U32), ("next", U32), ("session", U32)),
+    ),
     Kind.RESEND: (Resend, (("trial", U32), ("first", U32), ("count", U32))),
     Kind.RELEASE: (Release, (("trial", U32),)),
     Kind.STOP: (Stop, ()),
-    Kind.SAFE: (Safe, ()),
+    Kind.SAFE: (Safe, (("session", U32), ("host", SHORT))),  # or less: see `_safe`
     Kind.CLEAR: (Clear, ()),
+    Kind.QUERY: (Query, ()),
+    Kind.UNLATCH: (Unlatch, (("count", U32), ("host", SHORT))),
+    Kind.BYE: (Bye, (("session", U32),)),
     Kind.CAPABILITIES: (
         Capabilities,
         (
@@ -247,6 +261,11 @@ LAYOUTS: Mapping[Kind, tuple[type[Any], tuple[tuple[str, Layout], ...]]] = {
         ),
     ),
     Kind.LOST: (Lost, (("trial", U32), ("first", U32), ("count", U32))),
+    Kind.LATCH: (
+        Latch,
+        (("latched", FLAG), ("count", U32), ("cause", CAUSE), ("age", OPTIONAL), ("by", SHORT)),
+    ),
+    Kind.HOLDER: (Holder, (("held", FLAG), ("age", OPTIONAL), ("host", SHORT))),
 }
 KINDS: Mapping[type[Any], Kind] = {made: kind for kind, (made, _) in LAYOUTS.items()}
 
@@ -258,7 +277,7 @@ def encode(message: Message) -> tuple[Kind, bytes]:
     writer = Writer()
     for name, layout in LAYOUTS[kind][1]:
         layout.write(writer, getattr(message, name))
-    body = writer.done()
+    body = b"" if message == Safe() else writer.done()  # nobody's: as it was in version 1
     if len(body) > MAX_BODY:
         raise WireError(f"a {kind.name} of {len(body)} bytes; a frame carries {MAX_BODY}")
     return kind, body
@@ -269,13 +288,28 @@ def decode(kind: int, body: bytes) -> Message:
     if kind not in LAYOUTS:
         raise WireError(f"no message has the type 0x{kind:02x}")
     if kind == Kind.SAFE:
-        return Safe()  # obeyed whatever its body: nobody says it by mistake
+        return _safe(body)
     made, layouts = LAYOUTS[Kind(kind)]
     reader = Reader(body)
     message: Message = made(**{name: layout.read(reader) for name, layout in layouts})
     reader.end()
     _check(message)
     return message
+
+
+def _safe(body: bytes) -> Safe:
+    """A SAFE is obeyed whatever its body: nobody says it by mistake.
+
+    Four bytes are a session that does not say who it is; what is no session's is nobody's.
+    """
+    try:
+        reader = Reader(body)
+        session = reader.integer("I") if body else 0
+        host = reader.text() if reader.left else ""
+        reader.end()
+    except WireError:
+        return Safe()
+    return Safe(session, host)
 
 
 def _check(message: Message) -> None:
@@ -289,6 +323,8 @@ def _check(message: Message) -> None:
         beyond = message.first + len(message.channels) > message.total
         if beyond or not message.channels or message.sample_rate <= 0:
             raise WireError("channels beyond their total, none at all, or no sample rate")
+    elif isinstance(message, Hello | Bye) and not message.session:
+        raise WireError("sessions are counted from 1: 0 means nobody's")
     elif isinstance(message, Start) and not message.trial:
         raise WireError("trials are counted from 1: 0 means none")
     elif isinstance(message, Resend | Lost) and not 1 <= message.count <= 2**32 - message.first:

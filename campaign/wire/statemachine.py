@@ -14,6 +14,8 @@ from types import MappingProxyType
 
 from campaign.wire.codes import Kind, NakCode, Outcome, State
 
+_MAY_MOVE = (State.ARMED, State.RUNNING)
+
 TRANSITIONS: Mapping[tuple[State, Kind], State] = MappingProxyType(
     {
         (State.IDLE, Kind.SET): State.CONFIGURED,
@@ -35,11 +37,14 @@ TRANSITIONS: Mapping[tuple[State, Kind], State] = MappingProxyType(
         **{(state, Kind.SAFE): State.SAFE for state in State},
         # A fault is not hidden by switching off what is off already.
         (State.FAULT, Kind.SAFE): State.FAULT,
+        # The latch is beside the states: UNLATCH changes none. It cannot be set where the drive is
+        # on or may come on.
+        **{(state, Kind.UNLATCH): state for state in State if state not in _MAY_MOVE},
     }
 )
 """State and command to the state afterwards; every other pair is refused as WRONG_STATE."""
 
-WATCHED = frozenset({State.ARMED, State.RUNNING})
+WATCHED = frozenset(_MAY_MOVE)
 """Where the host must be heard: `after_silence`, and ARM and START need a fresh heartbeat."""
 
 
@@ -52,11 +57,15 @@ def after(state: State, kind: Kind) -> State | NakCode:
     return TRANSITIONS.get((state, kind), NakCode.WRONG_STATE)
 
 
-def after_hello(state: State, same_session: bool) -> State | NakCode:
-    """The state after HELLO: a reconnection changes nothing, a new host ends a configuration."""
+def after_hello(state: State, same_session: bool, held: bool) -> State | NakCode:
+    """The state after HELLO: a reconnection changes nothing, a new host ends a configuration.
+
+    `held`: the session that there is was heard within the time of CAPABILITIES. Nobody takes a
+    device from it, not even between two trials.
+    """
     if same_session:
         return state
-    if state in WATCHED:
+    if held or state in WATCHED:
         return NakCode.BUSY
     return State.IDLE if state is State.CONFIGURED else state
 
@@ -71,6 +80,11 @@ def after_end(state: State, outcome: Outcome) -> State:
 def after_silence(state: State) -> State:
     """The state when no heartbeat was heard for the time of CAPABILITIES."""
     return State.FAULT if state in WATCHED else state
+
+
+def latches(session: int, holder: int | None) -> bool:
+    """Whether a SAFE of `session` is a stop from outside: of anybody but who holds the device."""
+    return session == 0 or session != holder
 
 
 class Turn(Enum):

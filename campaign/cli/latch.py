@@ -1,0 +1,72 @@
+"""A bench that was stopped from outside: who did it is shown, and a person lets it go on."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from campaign.backends.interface import Backend, StoppedOutside
+from campaign.cli.ask import read_line, somebody_is_there
+from campaign.cli.output import print_note
+from campaign.errors import BackendError, CampaignError, ExitCode
+from campaign.execution.display import clock
+from campaign.trial import PanicStop
+
+
+class StillStoppedError(CampaignError):
+    """The bench was stopped and nobody has cleared that: nothing has moved."""
+
+    exit_code = ExitCode.LIMIT_OR_FAULT
+
+
+def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> None:
+    """See that `backend` may move: where it was stopped, a person has to have seen that.
+
+    Args:
+        backend: connected.
+        seen: the count of the stop that a person has seen (`--clear-stop`), or None: then whoever
+            sits at the terminal is asked. `--yes` is no answer to that.
+        stop: whether the program is to end.
+
+    Raises StillStoppedError when it stays off, with what to do.
+    """
+    if not isinstance(backend, StoppedOutside):
+        return
+    found = backend.panic_stop()
+    if found is None:
+        if seen is not None:
+            print_note(f"--clear-stop {seen}: the bench is not stopped")
+        return
+    print_note(f"PANIC STOP: {told(found)}", "bold red")
+    if seen is None:
+        _ask(found, stop)
+        seen = found.count
+    if seen != found.count:
+        raise StillStoppedError(
+            f"--clear-stop {seen}: the bench was stopped since, {told(found)}; nothing was moved"
+        )
+    try:
+        backend.clear_stop(seen)
+    except BackendError as error:  # another stop has come meanwhile, say
+        raise StillStoppedError(f"{error}; nothing was moved") from None
+    print_note(f"stop {seen} is cleared; the bench may move")
+
+
+def told(stop: PanicStop) -> str:
+    """When, by whom, and the count that clears it."""
+    when = "at a time that is not known" if stop.age is None else f"{clock(stop.age)} ago"
+    return f"stopped by {stop.by}, {when} (stop {stop.count})"
+
+
+def _ask(found: PanicStop, stop: Callable[[], bool]) -> None:
+    if not somebody_is_there():
+        raise StillStoppedError(
+            f"the bench was {told(found)}, and there is no terminal to ask whether it may move; "
+            f"who has seen why it was stopped adds --clear-stop {found.count}; nothing was moved"
+        )
+    print_note("It stays off until that is cleared. Look at the bench first.")
+    print_note("Type clear when it may move again: ")
+    sys.stderr.flush()
+    line = read_line(stop)
+    if line is None or line.strip().lower() != "clear":
+        raise StillStoppedError("the stop was not cleared; nothing was moved")

@@ -1,0 +1,131 @@
+"""The latch: once somebody else than its host has stopped the controller, nothing arms any more.
+
+It is in lasting memory, here a file, before anybody is told of it. A controller that cannot
+remember does not know whether it was stopped, so it starts latched.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from campaign.wire.device import Latch
+from campaign.wire.messages import LatchCause
+
+MOST = 2**32
+
+
+@dataclass(frozen=True)
+class Stop:
+    """What is remembered.
+
+    Attributes:
+        count: stops so far; whoever clears one names it.
+        by: who sent the SAFE.
+        at: when, on the wall clock (s since 1970): the only clock that outlives a reset; None when
+            it is not known.
+    """
+
+    latched: bool = False
+    count: int = 0
+    cause: LatchCause = LatchCause.NONE
+    by: str = ""
+    at: float | None = None
+
+
+class LatchMemory:
+    """The latch of one controller, in a file or, for want of one, in nothing that lasts."""
+
+    def __init__(
+        self, file: Path | None, boot: int, wall_clock: Callable[[], float] = time.time
+    ) -> None:
+        """As after a reset. `boot`, which differs every time, numbers a latch out of ignorance."""
+        self._file = file
+        self._wall_clock = wall_clock
+        self._session = 0  # who stopped it last, for the same stop sent again
+        self.stop = _read(file) or Stop(True, boot, LatchCause.NO_MEMORY)
+
+    @property
+    def latched(self) -> bool:
+        """Whether nothing may arm."""
+        return self.stop.latched
+
+    def message(self) -> Latch:
+        """As it is told to a host."""
+        stop = self.stop
+        age = None if stop.at is None else max(0.0, self._wall_clock() - stop.at)
+        return Latch(stop.latched, stop.count, stop.cause, age, stop.by)
+
+    def set(self, session: int, by: str) -> bool:
+        """Somebody has stopped the controller; whether that is news.
+
+        One session's SAFE, sent until it is confirmed, is one stop. What does not say whose it is
+        counts each time: it might be another one, which nobody has seen.
+        """
+        again = self.latched and session != 0 and session == self._session
+        self._session = session
+        if again:
+            return False
+        count = (self.stop.count + 1) % MOST
+        self.stop = Stop(True, count, LatchCause.STOPPED, by, self._wall_clock())
+        with contextlib.suppress(OSError):  # a full disk must not hinder a stop; it holds until
+            self._keep(self.stop)  # the controller is switched off
+        return True
+
+    def clear(self, count: int) -> bool:
+        """A person has seen stop number `count`; False when that is not what it is latched by.
+
+        Raises OSError when that cannot be remembered: it then stays latched.
+        """
+        if not self.latched or count != self.stop.count:
+            return False
+        self._keep(replace(self.stop, latched=False, cause=LatchCause.NONE))
+        self._session = 0
+        return True
+
+    def _keep(self, stop: Stop) -> None:
+        if self._file is not None:
+            _write(self._file, stop)
+        self.stop = stop
+
+
+def _read(file: Path | None) -> Stop | None:
+    """What the file says: a new one is unlatched; None for one that cannot be understood."""
+    if file is None:
+        return None
+    try:
+        text = file.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return Stop()
+    except (OSError, UnicodeDecodeError):
+        return None
+    try:
+        tree = json.loads(text)
+        at = None if tree["at"] is None else float(tree["at"])
+        cause, count = LatchCause(tree["cause"]), tree["count"]
+        if not (isinstance(tree["latched"], bool) and type(count) is int and 0 <= count < MOST):
+            return None
+        return Stop(tree["latched"], count, cause, str(tree["by"]), at)
+    except (ValueError, TypeError, KeyError):
+        return None
+
+
+def _write(file: Path, stop: Stop) -> None:
+    """Replace the file as a whole, and have it on the disk. Raises OSError."""
+    new = file.with_name(f"{file.name}.new")
+    with new.open("w", encoding="utf-8") as out:
+        json.dump(asdict(stop), out)
+        out.flush()
+        os.fsync(out.fileno())
+    new.replace(file)
+    if os.name == "posix":
+        folder = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)

@@ -1,0 +1,24 @@
+"""What a controller's latch means: somebody stopped the bench from outside."""
+
+from __future__ import annotations
+
+from campaign.trial import PanicStop
+from campaign.wire.codes import LatchCause
+from campaign.wire.messages import Latch
+
+NOBODY = "somebody who did not say who"
+FORGETFUL = "nobody: the controller has started anew and remembers no stops"
+
+
+def panic_stop_of(latch: Latch) -> PanicStop | None:
+    """The stop that a latch tells of; None when it is not latched."""
+    if not latch.latched:
+        return None
+    forgetful = latch.cause is LatchCause.NO_MEMORY
+    by = printable(latch.by) or (FORGETFUL if forgetful else NOBODY)
+    return PanicStop(latch.count, by, latch.age)
+
+
+def printable(text: str) -> str:
+    """What came over a line, fit for a terminal."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
