@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,18 +14,32 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.device.bench_file import load_bench
 from campaign.device.controller import Controller
 from campaign.device.faults import parse_faults
+from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
 from campaign.signals import Sine
 from campaign.trial import MemoryRecorder, Task, Trial
 from campaign.wire.codes import Fault, NakCode, Outcome, State
 from campaign.wire.configuration import configuration_of
-from campaign.wire.device import Ack, Capabilities, Channels, End, Event, Lost, Nak, Samples, Status
+from campaign.wire.device import (
+    Ack,
+    Capabilities,
+    Channels,
+    End,
+    Event,
+    Holder,
+    Latch,
+    Lost,
+    Nak,
+    Samples,
+    Status,
+)
 from campaign.wire.frames import Frame
 from campaign.wire.host import (
     Arm,
     Clear,
     Heartbeat,
     Hello,
+    Query,
     Release,
     Resend,
     Safe,
@@ -34,6 +50,8 @@ from campaign.wire.messages import Message, configuration_crc, encode, parameter
 
 BENCH = load_bench("platform")
 HOST, STRANGER = 1, 2
+OURS, THEIRS = 42, 43
+"""Sessions."""
 RATE = 1000.0
 
 
@@ -54,10 +72,23 @@ def trial(duration: float = 1.0, amplitude: float = 0.2) -> Trial:
 class Rig:
     """A controller whose clock stands until it is told to go on."""
 
-    def __init__(self, *faults: str, speed: float = 1.0) -> None:
+    folder = Path()  # conftest.py makes one for each test
+    numbers = itertools.count()
+
+    def __init__(
+        self, *faults: str, speed: float = 1.0, latch: Path | None = None, log: Path | None = None
+    ) -> None:
+        """Without a file for its latch it gets one that is lost with the rig."""
         self.time = 100.0
         self.said: list[tuple[int | None, Message]] = []
-        setup = Setup(BENCH, speed, faults=parse_faults(faults), now=lambda: self.time)
+        setup = Setup(
+            BENCH,
+            speed,
+            faults=parse_faults(faults),
+            now=lambda: self.time,
+            log=DeviceLog(log),
+            latch_file=latch or Rig.folder / f"latch-{next(Rig.numbers)}",
+        )
         self.controller = Controller(setup, lambda to, what: self.said.append((to, what)), 0.1)
         self.sequence = 500
 
@@ -74,13 +105,22 @@ class Rig:
 
     def beat(self) -> Status:
         """Heartbeats are not numbered."""
-        self.send(Heartbeat(1, 0, 0), sequence=0)
+        self.send(Heartbeat(1, 0, 0, OURS), sequence=0)
         status = self.said[-1][1]
         assert isinstance(status, Status)
         return status
 
+    def latch(self) -> Latch:
+        """As it tells anybody who asks."""
+        self.send(Query(), client=STRANGER, sequence=0)
+        return next(m for to, m in self.said[::-1] if to == STRANGER and isinstance(m, Latch))
+
+    def holder(self) -> Holder:
+        self.send(Query(), client=STRANGER, sequence=0)
+        return next(m for to, m in self.said[::-1] if to == STRANGER and isinstance(m, Holder))
+
     def configure(self, what: Trial) -> Any:
-        self.send(Hello(1, 1, 42))
+        self.send(Hello(2, 2, OURS, "ada"))
         self.beat()
         bodies = []
         for message in parameter_messages(configuration_of(what)):
@@ -148,7 +188,7 @@ def test_at_unlimited_speed_nothing_runs_further_ahead_than_the_window() -> None
     rig = Rig(speed=math.inf)
     rig.start(trial(duration=20.0))
     assert rig.controller.machine.ring.used == 1024
-    rig.send(Heartbeat(2, 9, 24), sequence=0)
+    rig.send(Heartbeat(2, 9, 24, OURS), sequence=0)
     rig.controller.tick()
     assert rig.controller.machine.ring.first == 24
     assert rig.controller.machine.ring.next == 1048
@@ -185,7 +225,7 @@ def test_safe_is_obeyed_from_anybody() -> None:
     rig.send(Safe(), client=STRANGER, sequence=7)
     assert rig.controller.state is State.SAFE
     assert not rig.controller.status().drive_on
-    assert [type(m) for to, m in rig.said[-2:] if to == STRANGER] == [Ack, Status]
+    assert [type(m) for to, m in rig.said if to == STRANGER] == [Ack, Status]
     rig.go_on(0.1)
     assert rig.end().safe
     assert isinstance(rig.send(Clear()), Ack)
@@ -196,7 +236,7 @@ def test_a_stranger_commands_nothing_else() -> None:
     rig = Rig()
     rig.start()
     assert rig.send(Stop(), client=STRANGER).code is NakCode.BUSY
-    assert rig.send(Hello(1, 1, 43), client=STRANGER).code is NakCode.BUSY
+    assert rig.send(Hello(2, 2, THEIRS), client=STRANGER).code is NakCode.BUSY
     rig.go_on(0.04)
     assert rig.controller.state is State.RUNNING
 
@@ -218,7 +258,7 @@ def test_records_are_had_again_until_they_are_released() -> None:
     rig.said.clear()
     rig.send(Resend(9, 3, 4), sequence=0)
     assert rig.records() == sent[3:7]
-    rig.send(Heartbeat(3, 9, 5), sequence=0)
+    rig.send(Heartbeat(3, 9, 5, OURS), sequence=0)
     rig.said.clear()
     rig.send(Resend(9, 3, 4), sequence=0)
     assert rig.said[0][1] == Lost(9, 3, 2)

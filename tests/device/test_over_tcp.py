@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import shutil
 import socket
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -43,7 +46,9 @@ def serving(
 ) -> Iterator[Callable[[], Host]]:
     line = TcpLine("127.0.0.1:0")
     wanted = parse_faults(faults)
-    server = Server(line, Setup(BENCH, speed), timeout=timeout, faults=wanted, fault_seed=3)
+    folder = tempfile.mkdtemp()
+    setup = Setup(BENCH, speed, latch_file=Path(folder) / "latch")
+    server = Server(line, setup, timeout=timeout, faults=wanted, fault_seed=3)
     thread = threading.Thread(target=server.serve)
     thread.start()
     port = int(line.name.rpartition(":")[2])
@@ -61,6 +66,7 @@ def serving(
         server.stop()
         thread.join(20.0)
         assert not thread.is_alive()
+        shutil.rmtree(folder)
 
 
 class Host:
@@ -94,12 +100,12 @@ class Host:
 
     def beat(self, trial: int = 0, wanted: int = 0) -> Status:
         self.beats += 1
-        self.send(Heartbeat(self.beats, trial, wanted))
+        self.send(Heartbeat(self.beats, trial, wanted, 77))
         status: Status = self.until(lambda m: isinstance(m, Status) and m.heartbeat == self.beats)
         return status
 
     def start(self) -> None:
-        self.command(Hello(1, 1, 77))
+        self.command(Hello(2, 2, 77))
         bodies = []
         for message in parameter_messages(configuration_of(TRIAL)):
             bodies.append(encode(message)[1])

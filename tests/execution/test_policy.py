@@ -42,7 +42,9 @@ class Lab:
             display=self.progress.append,
             stop=self.stop,
             policy=self.policy,
-            attendance=Attendance(SimulatedOperator(), self.pauses.append),
+            attendance=Attendance(
+                SimulatedOperator(), lambda seconds, stop: self.pauses.append(seconds)
+            ),
             finished=finished or {},
         )
 
@@ -136,7 +138,7 @@ class _StoppedPause(list):
 def test_a_pause_ends_at_once_when_the_run_is_stopped_already():
     stop = StopSwitch()
     stop.request("Ctrl-C")
-    wait_unless(stop)(1e9)  # does not come back otherwise
+    wait_unless(1e9, stop)  # does not come back otherwise
 
 
 def set_up(*setups: tuple[str, ...]) -> list[Trial]:
@@ -169,7 +171,7 @@ def test_a_resume_shows_the_steps_again_and_repeats_nothing_that_is_done():
 
 def test_a_person_who_says_stop_interrupts_the_run_before_anything_moves():
     class Unwilling:
-        def confirm(self, trial: Trial, step: str) -> str | None:
+        def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
             return None
 
     lab = Lab(set_up((), ("preload",)), {})
@@ -180,7 +182,7 @@ def test_a_person_who_says_stop_interrupts_the_run_before_anything_moves():
         workers=1,
         display=lambda progress: None,
         stop=lab.stop,
-        attendance=Attendance(Unwilling(), lambda seconds: None),
+        attendance=Attendance(Unwilling(), lambda seconds, stop: None),
     )
     assert lab.executed == ["trial-00001"]
     assert lab.archive.steps == [(2, "preload", "stop")]

@@ -16,7 +16,7 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.link.port import open_port
-from campaign.link.safe import SafeWatch, heartbeat_frame, is_safe
+from campaign.link.safe import SafeWatch, is_safe, query_frame
 from campaign.trial import Outcome
 from campaign.wire.messages import State, Status
 from tests.link.controllers import controller
@@ -45,11 +45,11 @@ SOON = ("--set", "backend.safe_time=2 s", "--set", "backend.silence=1 s")
 
 
 def status_of(port: str) -> Status:
-    """What the controller answers to a stranger's heartbeat, which keeps nothing alive."""
+    """What the controller answers to a stranger's question."""
     line, watch = open_port(port, 2_000_000, exclusive=False), SafeWatch()
     try:
         while watch.last is None:
-            line.write(heartbeat_frame(0, 0, 0))
+            line.write(query_frame())
             watch.feed(line.read())
         return watch.last
     finally:
