@@ -22,6 +22,10 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app(prog_name="campaign")
+    except SystemExit as leaving:
+        if _by_interrupt(leaving):
+            _leave("campaign: interrupted", ExitCode.INTERRUPTED)
+        raise
     except ProtocolError as error:  # as it is: editors jump to file:line:column
         _explain_in_debug()
         _leave(str(error), error.exit_code)
@@ -37,6 +41,11 @@ def main() -> None:
             f"This is a bug. Set {DEBUG}=1 and run the command again for its traceback.",
             INTERNAL_ERROR,
         )
+
+
+def _by_interrupt(leaving: SystemExit) -> bool:
+    """Whether typer has made this of a KeyboardInterrupt, without a word."""
+    return isinstance(getattr(leaving.__context__, "__cause__", None), KeyboardInterrupt)
 
 
 def _explain_in_debug() -> None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from campaign.archive import RunStatus, RunWriter
@@ -25,6 +26,7 @@ from campaign.execution.safety import (
     AbortedError,
     NotSafeError,
     connected,
+    safe_at_once,
     safe_when_broken_off,
 )
 from campaign.execution.stop import StopSwitch
@@ -83,11 +85,17 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             StopSwitch().on_signals() as stop,
             connected(session.backend, print_warning) as backend,
         ):
+            stop.make_safe = partial(safe_at_once, backend)
             with safe_when_broken_off(backend):
                 clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
+            stop.kept(
+                f"stopped at once; the finished trials are in {writer.folder}; "
+                f"{how_to_go_on(writer.folder)}"
+            )
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
+                stop.kept(f"left at once; the run is in {outcome.archive}")
     except BackendError as error:
         if outcome is None:
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from campaign.errors import BackendError, CampaignError, ExitCode
 from campaign.execution.naming import how_to_go_on
 from campaign.trial import SafeState
 
+AT_ONCE = 20.0
+"""s that it may take to see the bench safe when somebody insists on leaving."""
 NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
 
 
@@ -108,6 +111,16 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
         backend.__exit__(None, None, None)
     except Exception as error:
         raise BackendError(_let_go(error)) from error
+
+
+def safe_at_once(backend: Backend) -> ExitCode:
+    """Bring the bench to rest, whatever other threads do meanwhile, before the program is left."""
+    ended = Ended()
+    working = threading.Thread(target=make_safe, args=(backend, ended), daemon=True)
+    working.start()
+    working.join(AT_ONCE)
+    safe = not working.is_alive() and not ended.unsafe
+    return ExitCode.INTERRUPTED if safe else ExitCode.NOT_SAFE
 
 
 def make_safe(backend: Backend, ended: Ended) -> None:

@@ -1,19 +1,36 @@
-"""Stopping a run from outside: once asks, twice insists."""
+"""Stopping a run from outside: once asks, twice insists.
+
+Nothing is raised where the program happens to stand: an exception out of a signal handler can be
+lost, for instance in a weak reference's callback, or break what it interrupts. The handler notes
+the request; a thread of its own leaves when somebody insists; and another process sees to it that
+this succeeds while the program hangs in a call that lets no thread run.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from types import FrameType
+from typing import NoReturn
+
+from campaign.errors import ExitCode
+from campaign.execution.guardian import MAKING_SAFE, NOTE, Asked
+from campaign.execution.safety import NOT_SAFE
 
 _NOTICE = (
     "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
     "seconds; Ctrl-C again leaves it unclosed\n"
 )
-_HANG_UP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # Windows has none
+_NOTHING = "stopped at once; nothing was begun"
+_SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
+_OWN = 128
+"""Added to a signal's number by our own handler: the guardian hands on the plain ones."""
 
 
 class StopSwitch:
@@ -21,12 +38,19 @@ class StopSwitch:
 
     The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (the terminal is gone) only sets it: running trials
     see it and end, the bench is made safe and the archive is closed. A second SIGINT or SIGTERM
-    raises KeyboardInterrupt where the program stands; a second SIGHUP does not, because shell and
-    kernel both send one when a terminal closes, and nobody insists.
+    makes the bench safe and ends the program; a second SIGHUP does not, because shell and kernel
+    both send one when a terminal closes, and nobody insists.
+
+    Attributes:
+        make_safe: called in a thread of its own when somebody insists; the exit code.
     """
 
     def __init__(self) -> None:
         self._reason = ""
+        self._note = _NOTHING
+        self._noticed = False
+        self._pipe: int | None = None  # to the guardian
+        self.make_safe: Callable[[], ExitCode] = lambda: ExitCode.INTERRUPTED
 
     def __call__(self) -> bool:
         return bool(self._reason)
@@ -40,33 +64,114 @@ class StopSwitch:
         """Ask the run to stop; a second request changes nothing."""
         self._reason = self._reason or reason
 
+    def kept(self, note: str) -> None:
+        """What is said last when the program is left at once: what of the run is kept, and where.
+
+        The text is at the guardian's before this returns.
+        """
+        self._note = note
+        text = note.encode()[:2000]
+        self._tell(bytes((NOTE,)) + len(text).to_bytes(2) + text)
+
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
         """Listen to SIGINT, SIGTERM and SIGHUP inside the block. Main thread only.
 
         A SIGHUP that was ignored before stays ignored: that is what nohup is for.
         """
-        before = {number: signal.signal(number, self._handle) for number in _stopping_signals()}
-        try:
-            yield self
-        finally:
-            for number, handler in before.items():
-                if handler is not None:  # None: not set from Python, and not ours to put back
-                    signal.signal(number, handler)
+        with ExitStack() as stack:
+            come, back = os.pipe()
+            watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
+            watcher.start()
+            stack.callback(watcher.join)
+            stack.callback(os.close, back)  # the watcher ends by it
+            if os.name == "posix":
+                stack.enter_context(self._guarded(back))
 
-    def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self():
-            if number == _HANG_UP:
-                return
-            raise KeyboardInterrupt
+            def handle(number: int, frame: FrameType | None) -> None:
+                self._ask(number)
+                with suppress(OSError):
+                    os.write(back, bytes((_OWN + number,)))
+
+            before = {number: signal.signal(number, handle) for number in _stopping_signals()}
+            try:
+                yield self
+            finally:
+                for number, handler in before.items():
+                    if handler is not None:  # None: not set from Python, and not ours to put back
+                        signal.signal(number, handler)
+
+    @contextmanager
+    def _guarded(self, back: int) -> Iterator[None]:
+        """With a guardian that is told of every signal at once."""
+        theirs, ours = os.pipe()
+        os.set_blocking(ours, False)
+        # -I, -S: nothing in the user's folder can stand in for a module of the library.
+        guardian = subprocess.Popen(  # noqa: S603 - our own program, no shell
+            [sys.executable, "-I", "-S", str(Path(__file__).with_name("guardian.py")), _own_id()],
+            stdin=theirs,
+            stdout=back,
+            start_new_session=True,
+        )
+        os.close(theirs)
+        self._pipe = ours
+        before = signal.set_wakeup_fd(ours, warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(before)
+            self._pipe = None
+            os.close(ours)
+            guardian.wait()
+
+    def _tell(self, data: bytes) -> None:
+        if self._pipe is not None:
+            with suppress(OSError):  # without a guardian the program looks after itself
+                os.write(self._pipe, data)
+
+    def _ask(self, number: int) -> None:
         self.request("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
-        # Not through sys.stderr: its buffer may be what the signal has interrupted.
-        with suppress(OSError):  # nobody may be there to read it
-            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _NOTICE.encode())
+        if not self._noticed:
+            self._noticed = True
+            _say(_NOTICE)
+
+    def _watch(self, come: int) -> None:
+        """Count what our handler and what the guardian has heard: the larger number is true."""
+        heard = {True: Asked(), False: Asked()}
+        with suppress(OSError):
+            while data := os.read(come, 4096):
+                for byte in data:
+                    number = byte % _OWN
+                    if number in _stopping_signals():  # others may have handlers, too
+                        heard[byte >= _OWN].add(number)
+                        self._ask(number)
+                if max(asked.times for asked in heard.values()) > 1:
+                    self._leave()
+        os.close(come)
+
+    def _leave(self) -> NoReturn:
+        """Somebody insists: bench to rest, a last line, and out."""
+        self._tell(bytes((MAKING_SAFE,)))
+        code = self.make_safe()
+        unsafe = f"{NOT_SAFE}\n" if code is ExitCode.NOT_SAFE else ""
+        cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
+        _say(f"{cursor}\n{unsafe}{self._note}\n")
+        os._exit(code)
+
+
+def _own_id() -> str:
+    return str(os.getpid())
+
+
+def _say(text: str) -> None:
+    # Not through sys.stderr: its buffer may be what a signal has interrupted.
+    with suppress(OSError):  # nobody may be there to read it
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, text.encode())
 
 
 def _stopping_signals() -> list[signal.Signals]:
     numbers = [signal.SIGINT, signal.SIGTERM]
-    if _HANG_UP is not None and signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
-        numbers.append(_HANG_UP)
+    hang_up: signal.Signals | None = getattr(signal, "SIGHUP", None)  # Windows has none
+    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+        numbers.append(hang_up)
     return numbers
