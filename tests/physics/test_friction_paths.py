@@ -187,6 +187,13 @@ def test_a_common_draw_is_one_draw_and_its_trials_are_not_its_days() -> None:
     assert as_it_is(on, 1) == trial
 
 
+def test_a_trials_draw_is_not_that_of_the_day_of_its_number() -> None:
+    table = {"bristle_damping": 0.1}
+    day = of_its_day(scattering(table, day=7))
+    trial = as_it_is(scattering({}, trial_to_trial=table), 7)
+    assert factor(day, "load.bristle_damping") != factor(trial, "load.bristle_damping")
+
+
 def test_a_model_without_the_parameter_is_passed_over_when_another_has_it() -> None:
     def edit(tree: Tree) -> None:
         tree["friction"]["motor"] = stribeck(0.04, 0.03, side="motor")
@@ -370,6 +377,16 @@ def test_a_preload_raises_a_torque_that_a_made_up_model_declares(greased: Any) -
         greased(preload={**preload, "shares": {"mesh": {"film_damping": 1.0}}})
     with pytest.raises(ValidationError, match=r"shares\.static_torque\n +no friction interface"):
         greased(preload=preload, load={"preloaded": False})
+
+
+def test_interfaces_without_a_static_torque_gain_as_they_hold(greased: Any) -> None:
+    """By friction of the slowest sliding: 8 and 24 N m share 17 N m as 1 to 3."""
+    film = {"model": "grease", "yield_torque": 24.0}
+    preload = {"torque": 50.0, "nominal": 33.0, "shares": {"yield_torque": 1.0}}
+    friction = {"mesh": {"model": "grease", "yield_torque": 8.0}, "seal": film}
+    now = as_it_is(greased(preload=preload, friction=friction), 1).friction
+    assert now["mesh"].yield_torque == pytest.approx(8.0 + 17.0 / 4, rel=1e-6)
+    assert now["seal"].yield_torque == pytest.approx(24.0 + 17.0 * 3 / 4, rel=1e-6)
 
 
 def test_a_bench_with_less_friction_keeps_what_is_said_of_the_rest() -> None:
