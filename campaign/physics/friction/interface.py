@@ -82,7 +82,11 @@ class FrictionModel:
     def torques(self) -> tuple[str, ...]:
         """Those of `may_change` that are torques: what a preload can raise."""
         fields = self.options.model_fields
-        return tuple(name for name in self.may_change() if _quantity_of(fields[name]) == TORQUE)
+        return tuple(
+            name
+            for name in self.may_change()
+            if name in fields and _quantity_of(fields[name]) == TORQUE
+        )
 
 
 def _quantity_of(field: FieldInfo) -> Quantity | None:
