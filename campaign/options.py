@@ -94,7 +94,7 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
     for name, field in options.model_fields.items():
         types = tuple(_leaf_types(field.annotation))
         quantities = [m for m in (*field.metadata, *types) if isinstance(m, Quantity)]
-        tables = [t for t in types if isinstance(t, type) and issubclass(t, BaseModel)]
+        tables = _tables(types)
         default = field.get_default(call_default_factory=True, validated_data={})
         nested = isinstance(default, BaseModel) or default is PydanticUndefined
         yield OptionInfo(
@@ -137,15 +137,23 @@ _PLAIN: dict[Any, str] = {
 
 def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> str:
     words = [str(w) for t in types if get_origin(t) is Literal for w in get_args(t)]
-    tables = [t for t in types if isinstance(t, type) and issubclass(t, BaseModel)]
+    tables = _tables(types)
     plain = [_PLAIN[t] for t in types if isinstance(t, type) and t in _PLAIN]
     if quantified:  # numbers come with their unit, as text
         plain = []
     if tables:
         plain.append("table" if len(tables) == 1 else f"table: {_alternatives(tables)}")
     accepted = " | ".join(dict.fromkeys((*words, *plain)))
+    if get_origin(annotation) is dict and not tables:
+        return f"table of {accepted}"
     many = get_origin(annotation) in (tuple, list)
     return f"list of {accepted or 'values'}" if many else accepted
+
+
+def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
+    """The kinds of table among them, each once."""
+    found = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
+    return list(dict.fromkeys(found))
 
 
 def _alternatives(tables: list[type[BaseModel]]) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from campaign.cli import main as command_line
+from campaign.cli.kinds import show_kind
 from campaign.cli.output import bytes_text, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.errors import (
@@ -103,3 +104,12 @@ def test_without_a_terminal_a_table_is_tab_separated_and_one_line_per_row(capsys
 )
 def test_sizes_are_decimal(count: int, text: str):
     assert bytes_text(count) == text
+
+
+def test_the_kind_of_a_bench_tells_its_tables_of_paths(capsys):
+    show_kind("bench")
+    rows = [line.split("\t") for line in capsys.readouterr().out.splitlines()]
+    told = {row[0]: row[1:3] for row in rows if len(row) == 4}
+    assert told["gear.preload.shares"] == ["table of number", "{ static_torque = 1.0 }"]
+    assert told["variation.day_to_day"] == ["table", "none"]
+    assert told["variation.trial_to_trial.paths"] == ["list of text", "none"]

@@ -8,6 +8,7 @@ import pytest
 from pydantic import Field
 
 from campaign.options import Options, describe
+from campaign.physics.bench import Bench
 from campaign.units import ANGLE, TIME, Angle, Frequency, Time
 
 
@@ -65,3 +66,12 @@ def test_a_meaning_is_one_line(info):
 
 def test_a_flag_says_so(info):
     assert (info["quick"].accepts, info["quick"].default) == ("true or false", False)
+
+
+def test_a_table_of_paths_is_listed_with_what_its_values_take():
+    found = {info.name: info for info in describe(Bench)}
+    shares = found["gear.preload.shares"]
+    assert (shares.accepts, shares.default) == ("table of number", {"static_torque": 1.0})
+    for table in ("variation.day_to_day", "variation.trial_to_trial"):
+        assert (found[table].accepts, found[f"{table}.relative"].accepts) == ("table", "number")
+        assert found[f"{table}.paths"].accepts == "list of text"

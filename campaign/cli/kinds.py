@@ -68,6 +68,8 @@ def _default(info: OptionInfo) -> str:
         return "none"
     if isinstance(info.default, tuple | list):
         return ", ".join(str(item) for item in info.default)
+    if isinstance(info.default, dict):
+        return f"{{ {', '.join(f'{key} = {value}' for key, value in info.default.items())} }}"
     return f'"{info.default}"' if isinstance(info.default, str) else f"{info.default}"
 
 

@@ -19,8 +19,10 @@ from campaign.experiments.common import conditions, failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.presliding import breakaway_torque
 from campaign.options import Options
-from campaign.physics.bench import Bench, VariationOptions
+from campaign.physics.bench import Bench
+from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
+from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
 from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
 from campaign.signals import Polyline
 from campaign.trial import Task, Tree, TrialRequest
@@ -104,11 +106,18 @@ def _way(direction: str, number: int) -> float:
 
 def _alone(bench: Bench, component: str, scatter: float | None) -> Bench:
     """The bench with the friction of one component only, and its scatter from trial to trial."""
-    update: dict[str, object] = {"friction": {component: bench.friction[component]}}
-    if scatter is not None:
-        variation = bench.variation or VariationOptions()
-        update["variation"] = variation.model_copy(update={"trial": scatter})
-    return bench.model_copy(update=update)
+    friction = bench.friction[component]
+    alone = bench.with_friction({component: friction})
+    if scatter is None:
+        return alone
+    sliding = {"coulomb_torque", "static_torque"}
+    own = tuple(name for name in torques(friction) if name in sliding) or torques(friction)
+    if not own:
+        raise ValueError(f"the model of friction '{component}' declares no torque that may scatter")
+    together = {TORQUES: Scatter(paths=own, relative=scatter)}
+    variation = alone.variation or VariationOptions()
+    variation = variation.model_copy(update={"trial_to_trial": together})
+    return alone.model_copy(update={"variation": variation})
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,9 @@ def in_models(
 def with_model(bench: Bench, name: str) -> Tree:
     """The normalised bench with every friction interface described by the model `name`.
 
-    Parameters that both models have are kept, others are dropped. Raises ValueError, with a message
-    for the user, for an unknown model and for one that needs more than the bench says.
+    Parameters that both models have are kept; others are dropped, and with them what scatter and
+    preload say of them. Raises ValueError, with a message for the user, for an unknown model and
+    for one that needs more than the bench says.
     """
     known = friction_models()
     if name not in known:
@@ -55,21 +56,20 @@ def with_model(bench: Bench, name: str) -> Tree:
             f"no friction model is called '{name}'; there are {', '.join(known)}{hint}"
         )
     options = known[name].options
-    tree: Tree = bench.model_dump(mode="json")
-    friction: Any = tree["friction"]
-    for interface, fields in friction.items():
+    tree: Any = bench.model_dump(mode="json", include={"friction"})
+    friction: dict[str, Any] = {}
+    for interface, fields in tree["friction"].items():
         kept = {k: v for k, v in fields.items() if k in options.model_fields} | {"model": name}
         try:
-            friction[interface] = options.model_validate(kept, context={"si": True}).model_dump(
-                mode="json"
-            )
+            friction[interface] = options.model_validate(kept, context={"si": True})
         except ValidationError as error:
             where = ", ".join(".".join(map(str, e["loc"])) for e in error.errors())
             raise ValueError(
                 f"friction.{interface} of the bench '{bench.name}' cannot be described by the "
                 f"model '{name}': see {where}"
             ) from None
-    return tree
+    described: Tree = bench.with_friction(friction).model_dump(mode="json")
+    return described
 
 
 @dataclass(frozen=True)

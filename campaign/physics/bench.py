@@ -5,14 +5,25 @@ Symbols are the thesis' (Figure 5.3, Table 5.1, appendix); every number is SI af
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from campaign.options import Options
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
-from campaign.physics.preload import PreloadOptions, with_preload
+from campaign.physics.friction_paths import Keys, as_written, invalid
+from campaign.physics.preload import FORMER as FORMER_PRELOAD
+from campaign.physics.preload import PreloadOptions, loading, with_preload, wrong_shares
+from campaign.physics.scatter import FORMER as FORMER_VARIATION
+from campaign.physics.scatter import VariationOptions, acting, wrong_scatter
 from campaign.units import (
     Angle,
     AngularAcceleration,
@@ -216,27 +227,6 @@ class SensorsOptions(Options):
     """Motor current."""
 
 
-class VariationOptions(Options):
-    """How the friction of a simulated bench scatters: relative standard deviations."""
-
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    """Of all draws."""
-    day: int = Field(default=0, ge=0, lt=2**31)
-    """Which day it is: each has its own friction; on day 0 it is exactly as described."""
-    coulomb_torque: float = Field(default=0.0, ge=0, le=0.3)
-    """Of Tc, from day to day."""
-    static_torque: float = Field(default=0.0, ge=0, le=0.3)
-    """Of Ts, from day to day."""
-    stribeck_velocity: float = Field(default=0.0, ge=0, le=0.3)
-    """Of vs, from day to day."""
-    viscous_friction: float = Field(default=0.0, ge=0, le=0.3)
-    """Of sigma2, from day to day."""
-    bristle_stiffness: float = Field(default=0.0, ge=0, le=0.3)
-    """Of sigma0, from day to day."""
-    trial: float = Field(default=0.0, ge=0, le=0.3)
-    """Of Tc and Ts, by one common factor, from trial to trial."""
-
-
 class LimitsOptions(Options):
     """What must never be exceeded: checked before anything moves.
 
@@ -327,7 +317,63 @@ class Bench(Options):
         with_preload(self.friction, self.gear.ratio, self.gear.preload)
         return self
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _paths_lead_somewhere(
+        cls, tree: Any, handler: ModelWrapValidatorHandler[Bench], info: ValidationInfo
+    ) -> Bench:
+        """Scatter and preload name what a model declares; anything else would silently not be.
+
+        In the archive of a program that did not look, it was not: it is left out.
+        """
+        bench = handler(tree)
+        wrong = list(_wrong_paths(bench, tree))
+        if not wrong:
+            return bench
+        archived = isinstance(info.context, Mapping) and info.context.get("si")
+        if archived and _in_former_spelling(tree):
+            return bench.with_friction(bench.friction)
+        raise invalid(wrong)
+
+    def with_friction(self, friction: Mapping[str, Any]) -> Bench:
+        """This bench with other friction, and what scatter and preload say of that alone."""
+        update: dict[str, Any] = {"friction": dict(friction)}
+        if self.variation is not None:
+            update["variation"] = acting(self.variation, friction)
+        if self.gear.preload is not None:
+            preload = loading(self.gear.preload, friction)
+            update["gear"] = self.gear.model_copy(update={"preload": preload})
+        return self.model_copy(update=update)
+
     @property
     def torque_per_current(self) -> float:
         """N Kt: torque at the load per ampere (N m/A)."""
         return self.gear.ratio * self.motor.torque_constant
+
+
+_VARIATION: Keys = ("variation",)
+_PRELOAD: Keys = ("gear", "preload")
+
+
+def _wrong_paths(bench: Bench, tree: Any) -> Iterator[tuple[Keys, str]]:
+    """Where in `tree`, as written, a path leads nowhere on `bench`, and the message."""
+    if bench.variation is not None:
+        raw = _at(tree, _VARIATION)
+        for wrong in wrong_scatter(bench.variation, bench.friction):
+            yield (*_VARIATION, *as_written(raw, wrong.keys, FORMER_VARIATION)), wrong.message
+    if bench.gear.preload is not None:
+        raw = _at(tree, _PRELOAD)
+        for wrong in wrong_shares(bench.gear.preload, bench.friction):
+            yield (*_PRELOAD, *as_written(raw, wrong.keys, FORMER_PRELOAD)), wrong.message
+
+
+def _in_former_spelling(tree: Any) -> bool:
+    written = {*_at(tree, _VARIATION), *_at(tree, _PRELOAD)}
+    return bool(written & {*FORMER_VARIATION, *FORMER_PRELOAD})
+
+
+def _at(tree: Any, keys: Keys) -> Mapping[str, Any]:
+    """The table at `keys`; an empty one when there is none."""
+    for key in keys:
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return tree if isinstance(tree, Mapping) else {}

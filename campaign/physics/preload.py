@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
+import numpy as np
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from campaign.options import Options
+from campaign.physics.friction_paths import (
+    INTERFACE,
+    Keys,
+    Wrong,
+    changeable,
+    choices,
+    invalid,
+    matched,
+    nested,
+    split,
+    torques,
+    why_not,
+    without,
+)
 from campaign.units import Torque
 
-PARAMETERS = (
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "viscous_friction",
-    "bristle_stiffness",
-)
+FORMER: dict[str, Keys] = {
+    "static_share": ("shares", "static_torque"),
+    "coulomb_share": ("shares", "coulomb_torque"),
+}
+SLOWEST = 1e-9
+"""rad/s; an interface without a static torque holds with its friction of sliding this slowly."""
+
+Share = Annotated[float, Field(ge=0, le=2)]
+
+
+def _kind(value: Any) -> str:
+    """A share, or the table of one interface."""
+    return INTERFACE if isinstance(value, Mapping) else "share"
+
+
+Shares = dict[
+    str,
+    Annotated[
+        Annotated[Share, Tag("share")] | Annotated[dict[str, Share], Tag(INTERFACE)],
+        Discriminator(_kind),
+    ],
+]
 
 
 class PreloadOptions(Options):
@@ -26,10 +56,67 @@ class PreloadOptions(Options):
     """Breakaway torque of the axis as the gear is preloaded now."""
     nominal: Torque = Field(gt=0)
     """Breakaway torque that the friction parameters of this bench belong to."""
-    static_share: float = Field(default=1.0, ge=0, le=2)
-    """Share of the difference that static friction gains."""
-    coulomb_share: float = Field(default=0.0, ge=0, le=2)
-    """Share of the difference that Coulomb friction gains."""
+    shares: Shares = {"static_torque": 1.0}
+    """Share of the difference that a torque gains, seen at the load, by its path: `static_torque`
+    of all preloaded interfaces together, or `mesh.static_torque`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_spelling(cls, tree: Any) -> Any:
+        """The former fields `static_share` (1 when absent) and `coulomb_share` as a table."""
+        if not isinstance(tree, Mapping):
+            return tree
+        former = [name for name in FORMER if name in tree]
+        if not former:
+            return tree
+        new = {key: value for key, value in tree.items() if key not in FORMER}
+        if "shares" in tree:
+            now = ".".join(str(key) for key in FORMER[former[0]])
+            message = f"'{former[0]}' is the former spelling of '{now}', and 'shares' is given"
+            raise invalid([((former[0],), f"{message} as well; say it there")])
+        given = {"static_share": 1.0, **{name: tree[name] for name in former}}
+        # What gained nothing was written as zero.
+        return {**new, "shares": {str(FORMER[name][1]): v for name, v in given.items() if v != 0}}
+
+    @field_validator("shares", mode="before")
+    @classmethod
+    def _nested(cls, shares: Any) -> Any:
+        return nested(shares)
+
+    @property
+    def by_path(self) -> dict[str, float]:
+        """Share by dotted path."""
+        flat: dict[str, float] = {}
+        for key, value in self.shares.items():
+            if isinstance(value, Mapping):
+                flat |= {f"{key}.{name}": share for name, share in value.items()}
+            else:
+                flat[key] = value
+        return flat
+
+
+def wrong_shares(preload: PreloadOptions, friction: Mapping[str, Any]) -> Iterator[Wrong]:
+    """Every path that leads to no torque that this preload could raise.
+
+    Where no interface is preloaded it raises nothing, whatever its shares.
+    """
+    declared = {name: torques(options) for name, options in _loaded(friction).items()}
+    for path in preload.by_path if declared else ():
+        interface, parameter = split(path)
+        message = why_not(path, declared, "that is a torque")
+        if interface in friction and interface not in declared:
+            message = f"friction.{interface} is not preloaded; {choices(interface, declared)}"
+        keys = ("shares", parameter) if "." not in path else ("shares", interface, parameter)
+        if message:
+            yield Wrong(keys, message)
+
+
+def loading(preload: PreloadOptions, friction: Mapping[str, Any]) -> PreloadOptions:
+    """`preload` without the shares that lead nowhere on this friction."""
+    tree = preload.model_dump(mode="json")
+    for wrong in wrong_shares(preload, friction):
+        tree = {"shares": {}, **without(tree, wrong.keys)}
+    return PreloadOptions.model_validate(tree, context={"si": True})
 
 
 def with_preload(
@@ -37,37 +124,51 @@ def with_preload(
 ) -> dict[str, Any]:
     """Friction options by interface, with what `preload` adds to (or takes from) the nominal ones.
 
-    The axis gains what the preload says; interfaces share it as they share the static torque of
-    the axis. `ratio` is that of the gear. Raises ValueError, with a message for the user, where no
-    friction would be left.
+    The axis gains what each share says; the interfaces that it names have it among them as they
+    have the breakaway torque of the axis. `ratio` is that of the gear. Raises ValueError, with a
+    message for the user, where no friction would be left.
     """
     if preload is None or preload.torque == preload.nominal:
         return dict(friction)
-    loaded = {name: f for name, f in friction.items() if f.preloaded}
+    loaded = _loaded(friction)
+    declared = {name: torques(options) for name, options in loaded.items()}
     ratios = {name: ratio if f.side == "motor" else 1.0 for name, f in loaded.items()}
-    at_load = {name: getattr(f, "static_torque", 0.0) * ratios[name] for name, f in loaded.items()}
-    whole = sum(at_load.values())
-    raised = dict(friction)
-    for name, options in loaded.items():
-        share = at_load[name] / whole if whole > 0 else 1.0 / len(loaded)
-        raised[name] = _raised(name, options, preload, share / ratios[name])
-    return raised
+    added: dict[str, dict[str, float]] = {name: {} for name in loaded}
+    for path, share in preload.by_path.items():
+        gaining = dict(matched(path, declared))
+        at_load = {name: _breakaway(loaded[name]) * ratios[name] for name in gaining}
+        whole = sum(at_load.values())
+        for name, parameter in gaining.items():
+            part = at_load[name] / whole if whole > 0 else 1.0 / len(gaining)
+            extra = part / ratios[name] * (preload.torque - preload.nominal)
+            added[name][parameter] = added[name].get(parameter, 0.0) + share * extra
+    raised = {name: _raised(name, loaded[name], added[name], preload.torque) for name in loaded}
+    return {name: raised.get(name, options) for name, options in friction.items()}
 
 
-def _raised(name: str, options: Any, preload: PreloadOptions, share: float) -> Any:
-    """One interface with its `share` of what the preload adds (N m at the interface)."""
-    extra = share * (preload.torque - preload.nominal)
-    added = {
-        "static_torque": preload.static_share * extra,
-        "coulomb_torque": preload.coulomb_share * extra,
-    }
+def _loaded(friction: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: options for name, options in friction.items() if options.preloaded}
+
+
+def _breakaway(options: Any) -> float:
+    """What an interface holds with (N m at the interface)."""
+    from campaign.physics.friction import friction_models
+
+    if "static_torque" in torques(options):
+        return float(options.static_torque)
+    steady = friction_models()[options.model].steady_state(options, np.array([SLOWEST]))
+    return abs(float(steady[0]))
+
+
+def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) -> Any:
+    """One interface with what the preload adds to its torques (N m at the interface)."""
 
     def more(parameter: str, value: float) -> float:
         raised = value + added.get(parameter, 0.0)
         if raised <= 0 < value:
             raise ValueError(
-                f"a preload of {preload.torque:g} N m leaves friction.{name} with a "
-                f"{parameter} of {raised:.4g} N m; raise preload.torque or lower its share"
+                f"a preload of {torque:g} N m leaves friction.{name} with a {parameter} of "
+                f"{raised:.4g} N m; raise preload.torque or lower its share"
             )
         return raised
 
@@ -75,10 +176,11 @@ def _raised(name: str, options: Any, preload: PreloadOptions, share: float) -> A
 
 
 def changed(options: Any, change: Callable[[str, float], float]) -> Any:
-    """Friction options with the parameters that scatter or grow changed, in both directions."""
+    """Friction options with everything that may change changed, in both directions."""
+    names = changeable(options)
 
     def own(of: Any) -> dict[str, float]:
-        values = {name: getattr(of, name, None) for name in PARAMETERS}
+        values = {name: getattr(of, name, None) for name in names}
         return {name: change(name, value) for name, value in values.items() if value is not None}
 
     update: dict[str, Any] = own(options)

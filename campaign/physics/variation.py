@@ -7,31 +7,41 @@ the same trial always meets the same friction.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterable
 
 import numpy as np
 
-from campaign.physics.bench import Bench, VariationOptions
-from campaign.physics.preload import PARAMETERS, changed, with_preload
+from campaign.physics.bench import Bench
+from campaign.physics.friction_paths import changeable, matched
+from campaign.physics.preload import changed, with_preload
+from campaign.physics.scatter import CLASSIC, TORQUES, Line
 
 SMALLEST_FACTOR = 0.05
 """However wide the scatter, some friction is left."""
+_DAY, _TRIAL = 2, 3
+"""What tells the streams of named draws from each other, and from the first two there were."""
 
 
 def as_it_is(bench: Bench, seed: int) -> Bench:
     """`bench` with the friction of its day, its preload and the trial with this `seed`."""
     bench = of_its_day(bench)
-    if bench.variation is None:
+    variation = bench.variation
+    if variation is None:
         return bench
-    trial = np.random.Generator(np.random.PCG64([bench.variation.seed, seed, 1]))
-    scatter = 1.0 + bench.variation.trial * float(trial.standard_normal())
-    return _scaled(bench, dict.fromkeys(("coulomb_torque", "static_torque"), scatter))
+    draws = ((line, _draw_of_trial(variation.seed, seed, line.name)) for line in variation.trials)
+    return _scaled(bench, draws)
 
 
 def of_its_day(bench: Bench) -> Bench:
     """`bench` with the friction of its day and its preload: what its trials scatter around."""
     bench = preloaded(bench)
-    return _scaled(bench, _day_factors(bench.variation)) if bench.variation else bench
+    variation = bench.variation
+    if variation is None or variation.day == 0:
+        return bench
+    draws = ((line, _draw_of_day(variation.seed, variation.day, line.name))
+             for line in variation.days)  # fmt: skip
+    return _scaled(bench, draws)
 
 
 def preloaded(bench: Bench) -> Bench:
@@ -40,23 +50,47 @@ def preloaded(bench: Bench) -> Bench:
     return bench.model_copy(update={"friction": friction})
 
 
-def _day_factors(variation: VariationOptions) -> dict[str, float]:
-    """Factor on each parameter, one draw each per day; on day 0 all are 1."""
-    if variation.day == 0:
-        return {}
-    day = np.random.Generator(np.random.PCG64([variation.seed, variation.day]))
-    draws = day.standard_normal(len(PARAMETERS))
-    return {
-        name: 1.0 + float(getattr(variation, name) * draw)
-        for name, draw in zip(PARAMETERS, draws, strict=True)
-    }
+# The five classic parameters are drawn together, in their order, and Tc and Ts share the first
+# number of a trial's stream: so it was before there were paths, and an archive must be simulated
+# again to the bit. Every other path has a stream of its own, which its name seeds; a line that is
+# added to or removed from a bench then changes no draw of another, nor does their order.
 
 
-def _scaled(bench: Bench, factors: Mapping[str, float]) -> Bench:
-    """`bench` with the parameters of all its friction times `factors`."""
-    factors = {name: max(factor, SMALLEST_FACTOR) for name, factor in factors.items()}
-    friction = {
-        name: changed(options, lambda parameter, value: value * factors.get(parameter, 1.0))
-        for name, options in bench.friction.items()
-    }
+def _draw_of_day(seed: int, day: int, name: str) -> float:
+    """The standard normal number of a day for the line called `name`."""
+    if name in CLASSIC:
+        draws = np.random.Generator(np.random.PCG64([seed, day])).standard_normal(len(CLASSIC))
+        return float(draws[CLASSIC.index(name)])
+    return _draw([seed, day, _DAY, _number(name)])
+
+
+def _draw_of_trial(seed: int, trial: int, name: str) -> float:
+    """The standard normal number of the trial with the seed `trial`."""
+    if name == TORQUES:
+        return _draw([seed, trial, 1])
+    return _draw([seed, trial, _TRIAL, _number(name)])
+
+
+def _draw(entropy: list[int]) -> float:
+    return float(np.random.Generator(np.random.PCG64(entropy)).standard_normal())
+
+
+def _number(name: str) -> int:
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:16], "big")
+
+
+def _scaled(bench: Bench, draws: Iterable[tuple[Line, float]]) -> Bench:
+    """`bench` with what each line names times 1 plus its share of its draw, line after line."""
+    declared = {name: changeable(options) for name, options in bench.friction.items()}
+    friction = dict(bench.friction)
+    for line, draw in draws:
+        factor = max(1.0 + line.relative * draw, SMALLEST_FACTOR)
+        places = {place for path in line.paths for place in matched(path, declared)}
+        for name in {interface for interface, _ in places}:
+            parameters = {parameter for interface, parameter in places if interface == name}
+            friction[name] = _times(friction[name], factor, parameters)
     return bench.model_copy(update={"friction": friction})
+
+
+def _times(options: object, factor: float, parameters: set[str]) -> object:
+    return changed(options, lambda name, value: value * factor if name in parameters else value)

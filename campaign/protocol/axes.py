@@ -102,7 +102,9 @@ def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> s
     shape: Shape | None = Shape((model,))
     for depth, key in enumerate(keys):
         around = shape.narrowed(tree) if shape is not None else Shape(())
-        names = around.names() or (tuple(tree) if isinstance(tree, Mapping) else ())
+        # A number may be short for a table, but has no parts while it stands there.
+        names = () if isinstance(tree, int | float) else around.names()
+        names = tuple(dict.fromkeys((*names, *(tree if isinstance(tree, Mapping) else ()))))
         shape = around.child(key) if key in names else None
         if shape is None:
             if not names:

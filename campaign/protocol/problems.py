@@ -100,6 +100,8 @@ def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collec
             return keys, "value", f"'{field}' is missing; {tags}"
         case "union_tag_invalid":
             return _wrong_tag(keys, shape, tree, detail["ctx"])
+        case "friction_path":
+            return keys, "value" if isinstance(keys[-1], int) else "key", str(detail["msg"])
         case _:
             return keys, "value", _wrong_value(shape, detail)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
 
 from campaign.protocol.positions import Keys
@@ -84,7 +84,7 @@ def shape_of(annotation: Any) -> Shape:
         metadata += more
     members = (annotation,)
     if get_origin(annotation) in (Union, UnionType):
-        members = tuple(m for m in get_args(annotation) if m is not NoneType)
+        members = tuple(_untagged(m) for m in get_args(annotation) if m is not NoneType)
     discriminator = next(
         (m.discriminator for m in metadata if isinstance(m, FieldInfo) and m.discriminator), ""
     )
@@ -101,6 +101,13 @@ def shape_of(annotation: Any) -> Shape:
             shape.quantity or inner.quantity,
         )
     return shape
+
+
+def _untagged(member: Any) -> Any:
+    """A member of a union that is told apart by a function, without its label."""
+    if get_origin(member) is Annotated and any(isinstance(m, Tag) for m in get_args(member)[1:]):
+        return get_args(member)[0]
+    return member
 
 
 def from_location(

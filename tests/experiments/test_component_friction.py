@@ -104,6 +104,28 @@ def test_scatter_may_be_the_tests_own() -> None:
     assert 0.02 * 21.4 < deviation.value < 0.09 * 21.4
 
 
+def test_what_scatters_elsewhere_is_left_out() -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        scattering(tree)
+        tree["variation"]["day_to_day"] = {
+            "load.coulomb_torque": 0.1,
+            "motor": {"static_torque": 0.1},
+        }
+        tree["gear"]["preload"] = {
+            "torque": "33 N m",
+            "nominal": "33 N m",
+            "shares": {"load.static_torque": 1.0},
+        }
+
+    for trial in trials(KIND, bench(edit), {"components": ["motor"], "measurements": 2}):
+        alone = bench_of(trial)
+        assert alone.variation is not None
+        assert [line.name for line in alone.variation.days] == ["motor.static_torque"]
+        assert [line.name for line in alone.variation.trials] == ["torques"]
+        assert alone.gear.preload is not None
+        assert alone.gear.preload.by_path == {}
+
+
 def test_only_one_component_is_on_the_bench() -> None:
     planned = trials(KIND, bench(three), {"measurements": 3})
     assert len(planned) == 9

@@ -252,3 +252,15 @@ def test_defaults_suit_the_shipped_axis() -> None:
         assert len(result.figures) == 1
         assert all(np.isfinite(f.value) for f in result.findings), kind
         assert experiments()[kind].summary.endswith(")")
+
+
+def test_scatter_of_what_another_model_lacks_goes_with_it() -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        tree["variation"] = {
+            "day": 1,
+            "day_to_day": {"bristle_stiffness": 0.1, "static_torque": 0.1},
+        }
+
+    changed = Bench.model_validate(with_model(bench(edit), "stribeck"), context={"si": True})
+    assert changed.variation is not None
+    assert [line.name for line in changed.variation.days] == ["static_torque"]

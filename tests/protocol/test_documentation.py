@@ -53,6 +53,21 @@ def test_parts_of_the_page(tmp_path: Path) -> None:
     assert trial.setup == ("Preload the spring to 50 N m", "Remove the transport lock")
 
 
+def test_scatter_and_preload_of_the_page(tmp_path: Path) -> None:
+    (block,) = blocks("toml bench")
+    simulink = (SHIPPED / "benches" / "simulink.toml").read_text()
+    (tmp_path / "own.toml").write_text(simulink + block)
+    path = tmp_path / "my.toml"
+    path.write_text("[[test]]\nname = 'one'\nkind = 'step_response'\nbench = 'own.toml'\n")
+    [trial, *_] = make_plan(load_protocol(path, experiments(), shipped=SHIPPED)).trials
+    variation = trial.bench["variation"]
+    assert variation["day_to_day"]["load"] == {"bristle_damping": 0.05}
+    assert variation["day_to_day"]["stribeck_exponent"] == 0.02
+    sweep = "[test.matrix]\n'bench.variation.day_to_day.load.bristle_damping' = [0.05, 0.1]\n"
+    path.write_text(path.read_text() + sweep)
+    assert len(make_plan(load_protocol(path, experiments(), shipped=SHIPPED)).trials) == 2
+
+
 def test_every_key_is_documented() -> None:
     for key in [*ProtocolFile.model_fields, *TestEntry.model_fields]:
         assert f"`{key}`" in PAGE or f"`[{key}]`" in PAGE or f"`[[{key}]]`" in PAGE

@@ -214,6 +214,62 @@ def test_mistake_in_a_bench(desk, simulink: str, old: str, new: str, message: st
     assert re.search(message, str(ProtocolError(problems))), str(ProtocolError(problems))
 
 
+DAYS, TRIALS = "[variation.day_to_day]\n", "[variation.trial_to_trial]\n"
+PRELOAD = "[gear.preload]\ntorque = '2 N m'\nnominal = '1 N m'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        (
+            DAYS + "§coulomb_torqe = 0.1\n",
+            [
+                "'coulomb_torqe' that can change; allowed are coulomb_",
+                "did you mean 'coulomb_torque'",
+            ],
+        ),
+        (TRIALS + "load.§gain = 0.1\n", ["friction.load has no parameter 'gain'"]),
+        (
+            TRIALS + "§'laod.static_torque' = 0.1\n",
+            ["no friction interface 'laod'; allowed are lo"],
+        ),
+        (
+            TRIALS + "both = { relative = 0.1, paths = ['static_torque', §'x'] }\n",
+            ["no friction interface has a parameter 'x'"],
+        ),
+        (DAYS + "'*' = { §sign_smoothing = 0.1 }\n", ["has a parameter 'sign_smoothing' that can"]),
+        (
+            DAYS + "static_torque = { §relatve = 0.1 }\n",
+            ["unknown key 'relatve'; allowed are paths"],
+        ),
+        (
+            DAYS + "static_torque = §0.4\nload.coulomb_torque = §'3 %'\n",
+            ["0.4 is out of range; it must be at most 0.3", "'3 %': not a relative standard dev"],
+        ),
+        (
+            DAYS + "static_torque = 0.1\n§'*.static_torque' = 0.1\n",
+            ["'static_torque' stands there twice"],
+        ),
+        (
+            "[variation]\n§static_torque = 0.1\nday_to_day.static_torque = 0.1\n",
+            ["former spelling of 'day_to_day.static_torque', which is given as well; say it there"],
+        ),
+        (
+            PRELOAD + "shares = { §stribeck_velocity = 1.0 }\n",
+            ["'stribeck_velocity' that is a torque; allowed are coulomb_torque, static_torque"],
+        ),
+        (PRELOAD + "shares = { load = { static_torque = §3 } }\n", ["3 is out of range"]),
+    ],
+)
+def test_mistake_in_the_path_of_a_friction_parameter(
+    desk, simulink: str, text: str, messages: list[str]
+) -> None:
+    desk.write("own.toml", simulink.replace("[limits]\n", f"{text}[limits]\n"))
+    problems = desk.problems(GOOD.replace('"simulink"', '"own.toml"'))
+    for message in messages:
+        assert message in str(ProtocolError(problems))
+
+
 def test_everything_wrong_is_said_at_once(desk, simulink: str) -> None:
     desk.write(
         "own.toml", simulink.replace('"35 kg m^2"', "§35").replace("[gear]", "[gear]\n§a = 1")

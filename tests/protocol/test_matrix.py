@@ -158,3 +158,37 @@ def test_values_of_a_large_matrix_are_checked_too(desk, monkeypatch) -> None:
     protocol = desk.load(GOOD + "matrix = { cycles = [1, 2, 0] }\n")
     with pytest.raises(ProtocolError, match="must be at least 1"):
         make_plan(protocol, allow_large=True)
+
+
+def test_scatter_and_shares_are_swept_by_their_path(desk, simulink: str) -> None:
+    desk.write(
+        "own.toml",
+        simulink.replace("[limits]\n", "[variation.day_to_day]\nload.coulomb_torque = 0.1\n"
+        "static_torque = { relative = 0.1 }\n[variation.trial_to_trial]\n"
+        "both = { paths = ['static_torque', 'coulomb_torque'], relative = 0.1 }\n"
+        "[gear.preload]\ntorque = '2 N m'\nnominal = '1 N m'\n[limits]\n"),
+    )  # fmt: skip
+    test = GOOD.replace('"simulink"', '"own.toml"')
+    for path in (
+        "variation.day_to_day.load.coulomb_torque",
+        "variation.day_to_day.static_torque",
+        "variation.trial_to_trial.both.relative",
+        "gear.preload.shares.static_torque",
+    ):
+        path = f"bench.{path}"
+        assert swept(desk, f"matrix = {{ '{path}' = [0, 0.2] }}\n", path, test) == [0, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("variation.static_torque", "allowed are .*bench.variation.day_to_day, bench.variation.tr"),
+        ("gear.preload.static_share", "allowed are .*bench.gear.preload.shares"),
+        ("variation.day_to_day.static_torque.relative", "static_torque' has no parts"),
+        ("variation.day_to_day.static_torqe", "did you mean 'bench.variation.day_to_day.static_to"),
+    ],
+)
+def test_what_is_not_there_cannot_be_swept(desk, path: str, message: str) -> None:
+    platform = GOOD.replace('"simulink"', '"platform"')
+    with pytest.raises(ProtocolError, match=f"nothing to sweep at 'bench.{path}'.*{message}"):
+        desk.load(platform + f"matrix = {{ 'bench.{path}' = [0, 0.2] }}\n")

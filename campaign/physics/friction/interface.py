@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from pydantic.fields import FieldInfo
 
 from campaign.options import Options
-from campaign.units import Angle
+from campaign.units import TORQUE, Angle, Quantity
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,8 @@ class FrictionModel:
         viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
         steady_state: friction torque (N m) at constant velocity (rad/s), shape (n,), viscous
             part included.
+        changeable: the options of its own that scatter and preload may change; None for every
+            option of its own with a physical unit.
     """
 
     name: str
@@ -64,3 +67,33 @@ class FrictionModel:
     step: Any
     viscous: Callable[[Any], float]
     steady_state: Callable[[Any, Array], Array]
+    changeable: tuple[str, ...] | None = None
+
+    def may_change(self) -> tuple[str, ...]:
+        """`changeable`, or what stands for it."""
+        if self.changeable is not None:
+            return self.changeable
+        return tuple(
+            name
+            for name, field in self.options.model_fields.items()
+            if name not in FrictionOptions.model_fields and _quantity_of(field) is not None
+        )
+
+    def torques(self) -> tuple[str, ...]:
+        """Those of `may_change` that are torques: what a preload can raise."""
+        fields = self.options.model_fields
+        return tuple(
+            name
+            for name in self.may_change()
+            if name in fields and _quantity_of(fields[name]) == TORQUE
+        )
+
+
+def _quantity_of(field: FieldInfo) -> Quantity | None:
+    """The quantity of a field that is one number, optional or not."""
+    if isinstance(field.annotation, type) and issubclass(field.annotation, float):
+        return next((m for m in field.metadata if isinstance(m, Quantity)), None)
+    for member in get_args(field.annotation):  # `Torque | None`
+        if get_origin(member) is Annotated and get_args(member)[0] is float:
+            return next((m for m in get_args(member) if isinstance(m, Quantity)), None)
+    return None

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
 from campaign.physics.friction.stribeck import (
+    CURVE,
     NegativeDirection,
     curve_parameters,
     mean_viscous,
@@ -86,4 +87,5 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    changeable=(*CURVE, "bristle_stiffness", "bristle_damping"),
 )

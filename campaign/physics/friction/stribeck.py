@@ -17,6 +17,15 @@ from campaign.options import Options
 from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
 from campaign.units import AngularRate, RotationalDamping, Torque
 
+CURVE = (
+    "coulomb_torque",
+    "static_torque",
+    "stribeck_velocity",
+    "stribeck_exponent",
+    "viscous_friction",
+)
+"""The parameters of steady sliding; each may differ by direction."""
+
 
 class NegativeDirection(Options):
     """What is different when sliding in the negative direction; the rest is as in the positive."""
@@ -152,4 +161,5 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    changeable=CURVE,
 )

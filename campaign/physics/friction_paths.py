@@ -1,0 +1,181 @@
+"""Paths to the friction parameters of a bench, and the tables that say something of each.
+
+`coulomb_torque` (or `*.coulomb_torque`) means every interface whose model declares it, and
+`load.coulomb_torque` that of one interface. In a table such a path is a key, or a key within the
+table of its interface: `load.coulomb_torque = 0.03` is TOML's way to write the latter.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+Keys = tuple[str | int, ...]
+EVERY = "*"
+INTERFACE = "interface"
+"""Pydantic's label of the table of one interface, among the values of a table of paths."""
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """A path that means nothing: its keys in the normalised table, and the message."""
+
+    keys: Keys
+    message: str
+
+
+def changeable(options: Any) -> tuple[str, ...]:
+    """What may change of one interface: declared by its model, and not left out here."""
+    from campaign.physics.friction import friction_models
+
+    names = friction_models()[options.model].may_change()
+    return tuple(name for name in names if getattr(options, name, None) is not None)
+
+
+def torques(options: Any) -> tuple[str, ...]:
+    """Those of `changeable` that are torques."""
+    from campaign.physics.friction import friction_models
+
+    names = friction_models()[options.model].torques()
+    return tuple(name for name in names if getattr(options, name, None) is not None)
+
+
+def split(path: str) -> tuple[str, str]:
+    """Interface (`*` for every one) and parameter."""
+    interface, _, parameter = path.rpartition(".")
+    return interface or EVERY, parameter
+
+
+def plain(path: str) -> str:
+    """The path as it is compared: `*.` left out."""
+    interface, parameter = split(path)
+    return parameter if interface == EVERY else path
+
+
+def matched(path: str, declared: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
+    """Interface and parameter, wherever `path` leads; `declared`: parameters by interface."""
+    wanted, parameter = split(path)
+    for interface, parameters in declared.items():
+        if wanted in (EVERY, interface) and parameter in parameters:
+            yield interface, parameter
+
+
+def why_not(path: str, declared: Mapping[str, Sequence[str]], what: str) -> str:
+    """Why `path` leads nowhere, with what is allowed; "" when it leads somewhere.
+
+    `what`: which parameters are declared, e.g. "that can change". An interface that lacks the
+    parameter is no mistake as long as `*` finds it at another. Where there is no interface at all
+    nothing can be wrong: experiments take all friction away.
+    """
+    if not declared or next(matched(path, declared), None) is not None:
+        return ""
+    interface, parameter = split(path)
+    if interface not in (EVERY, *declared):
+        return f"there is no friction interface '{interface}'; {choices(interface, declared)}"
+    if interface == EVERY:
+        names = list(dict.fromkeys(name for names in declared.values() for name in names))
+        whose = "no friction interface has a parameter"
+    else:
+        names = list(declared[interface])
+        whose = f"friction.{interface} has no parameter"
+    return f"{whose} '{parameter}' {what}; {choices(parameter, names)}"
+
+
+def choices(word: str, names: Iterable[str]) -> str:
+    """What is allowed instead of `word`, and what it may be a slip for."""
+    listed = list(names)
+    close = difflib.get_close_matches(word, listed, n=1)
+    hint = f"; did you mean '{close[0]}'?" if close else ""
+    return f"allowed are {', '.join(listed)}{hint}" if listed else "there is none"
+
+
+def nested(tree: Any) -> Any:
+    """A table of paths with every path in one spelling: quoted and `*.` ones as if they were not.
+
+    Raises pydantic's error for a path that stands there twice. What is no table is left alone.
+    """
+    if not isinstance(tree, Mapping):
+        return tree
+    tidy: dict[str, Any] = {}
+    for key, value in tree.items():
+        interface, parameter = split(str(key))
+        if key == EVERY and isinstance(value, Mapping):
+            again = _merge(tidy, value)
+        else:
+            again = _merge(tidy, {parameter: value} if interface == EVERY else
+                           {interface: {parameter: value}})  # fmt: skip
+        if again:
+            message = f"'{again}' stands there twice; write it once, without quotes"
+            raise invalid([((str(key),), message)])
+    return tidy
+
+
+def _merge(tree: dict[str, Any], more: Mapping[str, Any]) -> str:
+    """Put `more` into `tree`; the dotted path of what both have, or ""."""
+    for key, value in more.items():
+        there = tree.get(key)
+        if key not in tree:
+            tree[key] = dict(value) if isinstance(value, Mapping) else value
+        elif isinstance(there, dict) and isinstance(value, Mapping):
+            again = _merge(there, value)
+            if again:
+                return f"{key}.{again}"
+        else:
+            return str(key)
+    return ""
+
+
+def without(tree: Mapping[str, Any], keys: Sequence[str | int]) -> dict[str, Any]:
+    """A copy of nested tables without what stands at `keys`, nor a table that this empties."""
+    copy = dict(tree)
+    key, *rest = keys
+    if rest and isinstance(copy.get(str(key)), Mapping):
+        copy[str(key)] = without(copy[str(key)], rest)
+    if not rest or not copy[str(key)]:
+        copy.pop(str(key), None)
+    return copy
+
+
+def as_written(raw: Any, keys: Keys, old: Mapping[str, Keys]) -> Keys:
+    """Where `keys` of a normalised table stand in what was written, with pydantic's labels.
+
+    `old`: names of the former spelling, and what each stands for now.
+    """
+    if not isinstance(raw, Mapping):
+        return keys
+    table, *rest = keys
+    written = raw.get(str(table))
+    written = written if isinstance(written, Mapping) else {}
+    path = ".".join(str(key) for key in rest[:2])
+    if len(rest) == 2 and path in written:
+        return table, path
+    if len(rest) == 1 and f"{EVERY}.{rest[0]}" in written:
+        return table, f"{EVERY}.{rest[0]}"
+    if len(rest) == 1 and rest[0] not in written and EVERY in written:
+        return table, EVERY, INTERFACE, rest[0]
+    if not rest or rest[0] not in written:
+        former = next((name for name, now in old.items() if keys[: len(now)] == now), None)
+        return (former,) if former is not None and former in raw else keys
+    label = () if len(rest) == 1 else (INTERFACE if len(rest) == 2 else "Scatter",)
+    return (table, rest[0], *label, *rest[1:])
+
+
+def invalid(wrong: Iterable[tuple[Keys, str]]) -> ValidationError:
+    """The error that pydantic reports with each message at its own place."""
+    return ValidationError.from_exception_data(
+        "Bench",
+        [
+            InitErrorDetails(
+                # A brace in a message would be taken for a placeholder.
+                type=PydanticCustomError("friction_path", "{message}", {"message": message}),
+                loc=keys,
+                input=None,
+            )
+            for keys, message in wrong
+        ],
+    )

@@ -1,0 +1,210 @@
+"""How the friction of a simulated bench scatters: what a bench says of it in `[variation]`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
+
+from campaign.options import Options
+from campaign.physics.friction_paths import (
+    INTERFACE,
+    Keys,
+    Wrong,
+    changeable,
+    choices,
+    invalid,
+    nested,
+    plain,
+    why_not,
+    without,
+)
+
+CLASSIC = (
+    "coulomb_torque",
+    "static_torque",
+    "stribeck_velocity",
+    "viscous_friction",
+    "bristle_stiffness",
+)
+"""What could scatter from day to day when each had a field of its own."""
+TORQUES = "torques"
+"""What the former `trial` is called: one draw of Tc and Ts."""
+FORMER: dict[str, Keys] = {name: ("day_to_day", name) for name in CLASSIC}
+FORMER["trial"] = ("trial_to_trial", TORQUES)
+
+
+class Scatter(Options):
+    """What a friction parameter is multiplied by: a distribution around 1.
+
+    `0.02` is short for `{ relative = 0.02 }`.
+    """
+
+    paths: tuple[str, ...] = ()
+    """What one common draw multiplies; its key is then any name. Absent: what its key says."""
+    relative: float = Field(ge=0, le=0.3)
+    """Relative standard deviation of a normal distribution."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, value: Any) -> Any:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return {"relative": value}
+        if not isinstance(value, Mapping | Scatter):
+            raise ValueError("not a relative standard deviation such as 0.02, nor a table")
+        return value
+
+    @field_validator("paths")
+    @classmethod
+    def _plain(cls, paths: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(plain(path) for path in paths))
+
+    @model_serializer(mode="wrap")
+    def _shortest(self, whole: SerializerFunctionWrapHandler) -> Any:
+        return whole(self) if self.paths else self.relative
+
+
+@dataclass(frozen=True)
+class Line:
+    """One draw.
+
+    Attributes:
+        keys: where it stands in its table.
+        paths: what it multiplies.
+    """
+
+    keys: tuple[str, ...]
+    paths: tuple[str, ...]
+    relative: float
+
+    @property
+    def name(self) -> str:
+        """Its path, or what a common draw is called: its draws follow from it."""
+        return ".".join(self.keys)
+
+
+def _kind(value: Any) -> str:
+    """A distribution, or the table of one interface."""
+    if isinstance(value, Mapping) and not value.keys() & Scatter.model_fields.keys():
+        return INTERFACE
+    return "Scatter"
+
+
+Scatters = dict[
+    str,
+    Annotated[
+        Annotated[Scatter, Tag("Scatter")] | Annotated[dict[str, Scatter], Tag(INTERFACE)],
+        Discriminator(_kind),
+    ],
+]
+
+
+class VariationOptions(Options):
+    """How the friction of a simulated bench scatters: relative standard deviations by path."""
+
+    seed: int = Field(default=0, ge=0, lt=2**63)
+    """Of all draws."""
+    day: int = Field(default=0, ge=0, lt=2**31)
+    """Which day it is: each has its own friction; on day 0 it is exactly as described."""
+    day_to_day: Scatters = {}
+    """How a parameter scatters from day to day, by its path, `coulomb_torque` of every interface or
+    `load.coulomb_torque`: its relative standard deviation, or a table."""
+    trial_to_trial: Scatters = {}
+    """How a parameter scatters from trial to trial, in the same form."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_spelling(cls, tree: Any) -> Any:
+        """The former fields (`coulomb_torque = 0.003`, `trial = 0.002`) as tables by path."""
+        if not isinstance(tree, Mapping):
+            return tree
+        new = {key: value for key, value in tree.items() if key not in FORMER}
+        for old, (table, name) in FORMER.items():
+            if old not in tree:
+                continue
+            lines = new.get(str(table), {})
+            if not isinstance(lines, Mapping) or name in lines:
+                message = f"'{old}' is the former spelling of '{table}.{name}', which is given"
+                raise invalid([((old,), f"{message} as well; say it there")])
+            if tree[old] == 0:
+                continue  # what did not scatter was written as zero
+            joint = {"paths": list(CLASSIC[:2]), "relative": tree[old]}
+            new[str(table)] = {**lines, str(name): joint if old == "trial" else tree[old]}
+        return new
+
+    @field_validator("day_to_day", "trial_to_trial", mode="before")
+    @classmethod
+    def _nested(cls, table: Any) -> Any:
+        return nested(table)
+
+    @property
+    def days(self) -> tuple[Line, ...]:
+        """The draws of a day."""
+        return tuple(_lines(self.day_to_day))
+
+    @property
+    def trials(self) -> tuple[Line, ...]:
+        """The draws of a trial."""
+        return tuple(_lines(self.trial_to_trial))
+
+
+def _lines(table: Scatters) -> Iterator[Line]:
+    for key, value in table.items():
+        if isinstance(value, Scatter):
+            yield Line((key,), value.paths or (key,), value.relative)
+        else:
+            for name, one in value.items():
+                yield Line((key, name), one.paths or (f"{key}.{name}",), one.relative)
+
+
+def wrong_scatter(variation: VariationOptions, friction: Mapping[str, Any]) -> Iterator[Wrong]:
+    """Every path that leads to nothing that could scatter."""
+    declared = {name: changeable(options) for name, options in friction.items()}
+    for table, lines in (("day_to_day", variation.days), ("trial_to_trial", variation.trials)):
+        for line in lines:
+            common = line.paths != (line.name,)
+            for index, path in enumerate(line.paths):
+                message = _no_distribution(line, declared)
+                message = message or why_not(path, declared, "that can change")
+                if message:
+                    place: Keys = ("paths", index) if common else ()
+                    yield Wrong((table, *line.keys, *place), message)
+        for key, value in getattr(variation, table).items():
+            if value == {}:
+                yield Wrong((table, key), f"nothing is said of '{key}'")
+
+
+def _no_distribution(line: Line, declared: Mapping[str, Sequence[str]]) -> str:
+    """What to say of `coulomb_torque = { relatve = 0.02 }`, which looks like an interface."""
+    name, *parts = line.keys
+    parameters = {each for names in declared.values() for each in names}
+    if not parts or name in declared or name not in parameters:
+        return ""
+    return f"unknown key '{parts[0]}'; {choices(parts[0], Scatter.model_fields)}"
+
+
+def acting(variation: VariationOptions, friction: Mapping[str, Any]) -> VariationOptions:
+    """`variation` without what leads nowhere on this friction; no draw of the rest changes."""
+    tree = variation.model_dump(mode="json")
+    for wrong in reversed(list(wrong_scatter(variation, friction))):
+        *keys, last = wrong.keys
+        if not isinstance(last, int):
+            tree = without(tree, wrong.keys)
+            continue
+        table: Any = tree
+        for key in keys:
+            table = table[key]
+        del table[last]
+        if not table:  # a common draw of nothing
+            tree = without(tree, keys[:-1])
+    return VariationOptions.model_validate(tree)

@@ -1,0 +1,131 @@
+"""Samples of what is archived must not change: the friction of a day and a trial, to the bit."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from campaign.physics.bench import Bench
+from tests.physics.drawn import digest, drawn
+
+BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
+PLATFORM = "1e5b0a23510bbb530736c275e6bd566d37207d0912e6c3667f0e8038b464b549"
+SIMULINK = "f77a99ae99f6e9af74d7e6df0791387053e401ca6dbfb174451a6e26ff21b3bd"
+TRIAL_ONLY = "42ec1a623a1d1a0029e78a5ba2716da65ec903f249c7b20be4089adbb7373ad5"
+
+PLATFORM_FORMER = {
+    "seed": 44,
+    "coulomb_torque": 0.003,
+    "static_torque": 0.02,
+    "stribeck_velocity": 0.005,
+    "viscous_friction": 0.01,
+    "bristle_stiffness": 0.03,
+    "trial": 0.002,
+}
+WIDE = {
+    "coulomb_torque": 0.02,
+    "static_torque": 0.04,
+    "stribeck_velocity": 0.06,
+    "viscous_friction": 0.05,
+    "bristle_stiffness": 0.03,
+}
+TOGETHER = {"paths": ["coulomb_torque", "static_torque"], "relative": 0.1}
+NOMINAL = {"torque": "33 N m", "nominal": "33 N m"}
+
+
+def written(name: str) -> dict[str, Any]:
+    return tomllib.loads((BENCHES / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def simulink(variation: dict[str, Any], preload: dict[str, Any]) -> dict[str, Any]:
+    tree = written("simulink")
+    tree["variation"] = {"seed": 5, **variation}
+    tree["gear"]["preload"] = {**NOMINAL, **preload}
+    return tree
+
+
+def lopsided(variation: dict[str, Any], preload: dict[str, Any]) -> dict[str, Any]:
+    tree = simulink(variation, preload)
+    tree["friction"]["load"]["negative"] = {"static_torque": "35 N m"}
+    return tree
+
+
+def test_the_platform_has_the_friction_that_it_always_had() -> None:
+    tree = written("platform")
+    found = drawn(tree, "50 N m", 3, 44)
+    assert found["load.coulomb_torque"] == 16.220326975242507
+    assert found["mesh.negative.static_torque"] == 21.157594298115526
+    assert found["load.negative.stribeck_velocity"] == 0.029107154176369842
+    assert found["load.negative.viscous_friction"] == 4.280837474917904
+    assert found["motor.bristle_stiffness"] == 998.9528515560273
+    assert drawn(tree, "31.5 N m", 5, 1)["mesh.static_torque"] == 1.4827681844106704
+    assert drawn(tree, "33 N m", 0, 44)["load.coulomb_torque"] == 16.082740102881093
+    assert digest(tree) == PLATFORM
+
+
+def test_the_former_spelling_is_read_as_what_it_meant() -> None:
+    new = written("platform")
+    former = copy.deepcopy(new)
+    former["variation"] = dict(PLATFORM_FORMER)
+    former["gear"]["preload"] = {**NOMINAL, "static_share": 1.0, "coulomb_share": 0.0}
+    assert Bench.model_validate(former) == Bench.model_validate(new)
+    assert digest(former) == PLATFORM
+
+
+@pytest.mark.parametrize(
+    ("variation", "preload"),
+    [
+        ({**WIDE, "trial": 0.1}, {"static_share": 0.7, "coulomb_share": 0.4}),
+        (
+            {"day_to_day": WIDE, "trial_to_trial": {"torques": TOGETHER}},
+            {"shares": {"static_torque": 0.7, "coulomb_torque": 0.4}},
+        ),
+        (
+            {"trial": 0.1, "day_to_day": {f"*.{name}": r for name, r in WIDE.items()}},
+            {"shares": {"*": {"static_torque": 0.7}, "coulomb_torque": 0.4}},
+        ),
+    ],
+)
+def test_every_spelling_has_the_same_draws(variation: Any, preload: Any) -> None:
+    assert digest(lopsided(variation, preload)) == SIMULINK
+
+
+@pytest.mark.parametrize(
+    "variation",
+    [
+        {"trial": 0.25},
+        {**dict.fromkeys(WIDE, 0.0), "trial": 0.25},
+        {"trial_to_trial": {"torques": {**TOGETHER, "relative": 0.25}}},
+    ],
+)
+def test_a_trial_scatters_as_it_did(variation: Any) -> None:
+    tree = lopsided(variation, {})
+    assert digest(tree) == TRIAL_ONLY
+    # Zeros of the former spelling are no lines: whoever wrote them out meant the same bench.
+    assert Bench.model_validate(tree) == Bench.model_validate(lopsided({"trial": 0.25}, {}))
+
+
+def test_a_normalised_bench_reads_back_as_it_is() -> None:
+    tree = lopsided(
+        {
+            "day_to_day": {"coulomb_torque": 0.02, "load.bristle_damping": {"relative": 0.1}},
+            "trial_to_trial": {"both": {"paths": ["*.static_torque", "motor.coulomb_torque"],
+                                        "relative": 0.1}},
+        },
+        {"shares": {"load.static_torque": 0.5}},
+    )  # fmt: skip
+    bench = Bench.model_validate(tree)
+    normalised = bench.model_dump(mode="json")
+    assert normalised["variation"]["day_to_day"] == {
+        "coulomb_torque": 0.02,
+        "load": {"bristle_damping": 0.1},
+    }
+    assert normalised["variation"]["trial_to_trial"]["both"]["paths"][0] == "static_torque"
+    assert normalised["gear"]["preload"]["shares"] == {"load": {"static_torque": 0.5}}
+    again = Bench.model_validate(normalised, context={"si": True})
+    assert again == bench
+    assert again.model_dump(mode="json") == normalised
