@@ -27,6 +27,13 @@ def main() -> None:
         run()
     except KeyboardInterrupt:
         _leave()
+    except SystemExit as leaving:
+        if leaving.code == INTERRUPTED:
+            # Python would end itself by SIGINT, had a KeyboardInterrupt passed through `exec`.
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left to do is to end
 

@@ -1,0 +1,144 @@
+"""Ctrl-C once and twice, at any instant: no traceback, no lost request, and the last line says what
+was kept."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.system.user import ROOT, SEA, campaign, command, environment, write
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+LONG = SEA.replace("cycles = 1\n", "cycles = 2\nrepeat = 1000\n", 1)
+ENDED = r"interrupted \(stopped by Ctrl-C\): .*|campaign: interrupted"
+"""What the last line says when the program ended in order."""
+LEFT = rf"{ENDED}|stopped at once; .*|left at once; .*"
+
+
+def started(folder: Path, *more: str, path: str = "") -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        command("run", "protocol.toml", *more),
+        cwd=folder,
+        env={**environment(), "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT))))},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+
+
+def interrupt(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+
+
+def check(folder: Path, seed: int, times: int) -> float:
+    """Interrupt a run `times` times at instants drawn from `seed`; s until it had ended."""
+    chance = random.Random(seed)
+    write(folder, LONG)
+    process = started(folder)
+    # From when Python listens: what a signal does to a starting interpreter is not ours to say.
+    time.sleep(chance.uniform(0.2, 4.0))
+    interrupt(process)
+    if times == 2:
+        time.sleep(chance.choice((0.0, 0.001, 0.02, 0.1, 0.5)))
+        interrupt(process)
+    began = time.monotonic()
+    out, err = process.communicate(timeout=120)
+    took = time.monotonic() - began
+    said = err.strip().splitlines()[-1] if err.strip() else ""
+    told = f"seed {seed}: exit code {process.returncode}\n{out}\n{err}"
+    assert process.returncode == 130, told
+    assert "Traceback" not in err, told
+    assert "ignored" not in err, told
+    assert re.fullmatch(LEFT if times == 2 else ENDED, said), told
+    partial = list((folder / "results").glob("*.partial"))
+    assert times == 2 or not partial, told
+    if partial:
+        assert str(Path("results") / partial[0].name) in said, told
+        campaign(folder, "show", partial[0].stem)
+    return took
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("seed", range(4))
+def test_at_some_instants(tmp_path: Path, seed: int, times: int) -> None:
+    check(tmp_path, seed, times)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("decade", range(20))
+def test_at_many_instants(tmp_path: Path, decade: int, times: int) -> None:
+    for seed in range(1000 + 10 * decade, 1010 + 10 * decade):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        check(folder, seed, times)
+
+
+STUCK = '''
+"""A backend that hangs in a call into a library; with `hold`, in one that lets no thread run."""
+import ctypes, pathlib
+from campaign.backends.interface import BackendKind, Source
+from campaign.options import Options
+from campaign.trial import SafeState
+
+class StuckOptions(Options):
+    hold: bool = False
+
+class Stuck:
+    def __init__(self, options): self.options = options
+    def __enter__(self): return self
+    def __exit__(self, *exception): return None
+    def refuses(self, trial): return None
+    def channels(self, trial): return None
+    def execute(self, trial, recorder, stop):
+        pathlib.Path("stuck").touch()
+        (ctypes.PyDLL if self.options.hold else ctypes.CDLL)(None).sleep(600)
+    def make_safe(self):
+        pathlib.Path("safe").touch()
+        return SafeState.CONFIRMED
+
+BACKEND = BackendKind("stuck", "hangs", StuckOptions, Stuck, Source.SIMULATION)
+'''
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_inside_a_call_that_does_not_return(tmp_path: Path, hold: bool) -> None:
+    packages = tmp_path / "packages"
+    about = packages / "stuck-1.0.dist-info"
+    about.mkdir(parents=True)
+    (packages / "stuck.py").write_text(STUCK)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: stuck\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[campaign.backends]\nstuck = stuck:BACKEND\n")
+    write(tmp_path, LONG)
+    options = ("--backend", "stuck", "--set", f"backend.hold={str(hold).lower()}")
+    with started(tmp_path, *options, path=str(packages)) as process:
+        deadline = time.monotonic() + 120
+        while not (tmp_path / "stuck").exists():
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        interrupt(process)
+        time.sleep(0.3)
+        assert process.poll() is None  # the first one only asks
+        interrupt(process)
+        _, err = process.communicate(timeout=60)  # it would take ten minutes
+    assert process.returncode == (-signal.SIGKILL if hold else 130), err
+    assert (tmp_path / "safe").exists() is not hold
+    assert "Traceback" not in err
+    (kept,) = (tmp_path / "results").glob("*.partial")
+    assert re.fullmatch(
+        rf"stopped at once; the finished trials are in results/{kept.name}; .*",
+        err.strip().splitlines()[-1],
+    )
+    campaign(tmp_path, "show", kept.stem)
