@@ -9,6 +9,7 @@ from pathlib import Path
 from campaign.archive import RunSummary, list_runs
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
 from campaign.cli.selection import Selection
+from campaign.interrupts import unwinding
 from campaign.resources import copy_shipped
 
 _HEADINGS = (
@@ -33,6 +34,7 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
             print_note(f"{run.name}: {run.problem}", style="yellow")
 
 
+@unwinding()
 def init_folder(folder: Path) -> None:
     """Copy what is shipped into `folder` and say how to go on."""
     written = copy_shipped(folder)

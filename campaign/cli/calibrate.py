@@ -21,6 +21,7 @@ from campaign.cli.output import error_console, print_line, print_note, print_tab
 from campaign.cli.prepare import find_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
+from campaign.interrupts import unwinding
 from campaign.protocol import Protocol, load_protocol
 from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
@@ -29,6 +30,7 @@ PLAIN_INTERVAL = 10.0  # s between plain lines of one phase
 SHOWN_PROBLEMS = 5  # of the simulation; the result has them all
 
 
+@unwinding()
 def calibrate_protocol(
     name: str, results: Path, output: Path | None, *, workers: int | None, leave_out: bool
 ) -> ExitCode:

@@ -20,10 +20,12 @@ from campaign.device.machine import Setup
 from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
 from campaign.errors import ExitCode, UsageError
+from campaign.interrupts import unwinding
 
 ANY_PORT = "127.0.0.1:0"
 
 
+@unwinding()
 def run_device(
     bench: str,
     *,

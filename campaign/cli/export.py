@@ -10,8 +10,10 @@ from campaign.cli.output import print_note
 from campaign.errors import ExitCode, UsageError
 from campaign.export import exports
 from campaign.export.run_export import export_run
+from campaign.interrupts import unwinding
 
 
+@unwinding()
 def export_archive(
     name: str | None,
     results: Path,

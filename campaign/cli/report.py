@@ -8,10 +8,12 @@ from pathlib import Path
 from campaign.archive import find_run, open_run
 from campaign.cli.output import print_note
 from campaign.experiments import experiments
+from campaign.interrupts import unwinding
 from campaign.report.build import build_report
 from campaign.resources import templates_folder
 
 
+@unwinding()
 def report_run(
     name: str | None,
     results: Path,

@@ -7,7 +7,6 @@ from contextlib import nullcontext
 import pytest
 
 from campaign.cli.ask import AssumingOperator, ConsoleOperator
-from campaign.execution.stop import StopSwitch
 from tests.execution.fakes import make_trials
 
 
@@ -28,10 +27,14 @@ def test_an_answer_is_recorded_as_given(
 ):
     waiting = iter(lines)
     monkeypatch.setattr("campaign.cli.ask.read_line", lambda stop: next(waiting))
-    operator = ConsoleOperator(StopSwitch(), nullcontext)
-    assert operator.confirm(make_trials(1)[0], "Preload the spring to 1 N m") == answer
+    operator = ConsoleOperator(nullcontext)
+    assert (
+        operator.confirm(make_trials(1)[0], "Preload the spring to 1 N m", lambda: False) == answer
+    )
     assert "Preload the spring to 1 N m" in capsys.readouterr().err
 
 
 def test_a_script_takes_steps_for_done_and_the_record_says_so():
-    assert AssumingOperator().confirm(make_trials(1)[0], "x") == "assumed done (--yes)"
+    assert (
+        AssumingOperator().confirm(make_trials(1)[0], "x", lambda: False) == "assumed done (--yes)"
+    )

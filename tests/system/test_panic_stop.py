@@ -1,0 +1,343 @@
+"""After a panic stop the drive never comes on again, wherever in a run the stop falls.
+
+Judged from the controller's own log: between "latched" and "cleared" there is no "drive on". No
+judgement here depends on how fast the machine is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import open_run
+from campaign.archive.journal import Decision
+from campaign.archive.story import read_lines
+from campaign.cli.stop import stop_bench
+from campaign.errors import ExitCode
+from campaign.wire.codes import Kind
+from tests.link.controllers import controller
+from tests.link.proxy import proxy
+from tests.system.user import campaign, command, environment, write
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+PROTOCOL = """\
+title = "Short on hardware"
+
+[faults]
+default = { do = "retry", times = 2, pause = "1 s" }
+
+[rest]
+every = "0.5 s"
+pause = "1 s"
+
+[[test]]
+name = "sea"
+kind = "stabilization"
+bench = "simulink"
+seed = 7
+frequency = "4 Hz"
+acceleration = "18 deg/s^2"
+cycles = 2
+settle_cycles = 1
+
+[test.matrix]
+compensation = ["none", "lugre", "static"]
+"""
+TRIALS = 3
+ON = ("--backend", "serial", "--set", "backend.motion=emulated", "--yes")
+
+
+@dataclass
+class Bench:
+    """A rehearsal controller with its log, and the run that it is stopped in."""
+
+    folder: Path
+    port: str
+
+    @property
+    def log(self) -> list[dict[str, object]]:
+        text = (self.folder / "device.log").read_text(encoding="utf-8")
+        return [json.loads(line) for line in text.splitlines()]
+
+    def count(self, event: str) -> int:
+        return sum(line["event"] == event for line in self.log)
+
+    def stop(self) -> None:
+        assert stop_bench(self.port, 2_000_000, 30.0) is ExitCode.DONE
+
+    def run(self, port: str = "", *more: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            command("run", "protocol.toml", *ON, "--port", port or self.port, *more),
+            cwd=self.folder,
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            stdin=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def never_on_after_a_stop(self) -> None:
+        latched = False
+        for line in self.log:
+            latched = line["event"] == "latched" or (latched and line["event"] != "cleared")
+            assert not (latched and line["event"] == "drive on"), self.log
+        assert latched, "it was not stopped"
+
+    def judged(self, process: subprocess.Popen[str], *, began: bool | None = None) -> None:
+        """The run has ended by the stop, and screen, archive, journal and report say so."""
+        out, err = process.communicate(timeout=120)
+        self.never_on_after_a_stop()
+        if not out.strip():  # the stop came before the run had begun
+            assert began is not True, err
+            assert process.returncode == 3, err
+            assert "nothing was moved" in err
+            assert not list(self.folder.glob("results/*"))
+            return
+        assert began is not False, err
+        assert process.returncode == 130, err
+        assert "PANIC STOP by " in err
+        run = open_run(self.folder / out.splitlines()[-1])
+        assert run.status == "interrupted"
+        assert run.reason.startswith("panic stop by ")
+        assert "campaign stop" in run.reason  # by whom
+        assert run.safe_state == "confirmed"
+        decisions = read_lines(run.journal.encode()).all(Decision)
+        assert [d for d in decisions if d.decision == "panic stop"]
+
+
+@contextmanager
+def bench(folder: Path, *options: str, speed: str = "max", text: str = PROTOCOL) -> Iterator[Bench]:
+    write(folder, text)
+    (folder / "device.log").touch()
+    log = ("--log", str(folder / "device.log"), "--latch", str(folder / "latch.json"))
+    with controller("--speed", speed, *log, *options, bench="simulink") as port:
+        yield Bench(folder, port)
+
+
+def wait_for(condition: Callable[[], object], process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 120
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+# Aimed: just before the controller hears a chosen message of the host
+
+AIMS = [
+    (Kind.HELLO, 1, False),
+    (Kind.SET, 1, True),
+    (Kind.SET, 3, True),
+    (Kind.ARM, 1, True),
+    (Kind.START, 1, True),  # between ARM and START
+    (Kind.START, 2, True),
+    (Kind.RELEASE, 1, True),  # between the end of a trial and its release
+    (Kind.QUERY, 1, None),
+    (Kind.QUERY, 4, None),
+    (Kind.SAFE, 1, None),  # the host's own, after the last trial
+]
+
+
+@pytest.mark.parametrize(("kind", "number", "began"), AIMS)
+def test_just_before_a_message(tmp_path: Path, kind: Kind, number: int, began: bool | None) -> None:
+    with bench(tmp_path) as rig, proxy(rig.port, kind, number, rig.stop) as line:
+        process = rig.run(line.port)
+        assert acted(line.acted, process), process.communicate(timeout=60)
+        rig.judged(process, began=began)
+
+
+def acted(event: threading.Event, process: subprocess.Popen[str]) -> bool:
+    while process.poll() is None:
+        if event.wait(0.02):
+            return True
+    return event.is_set()
+
+
+# Where nothing is said
+
+
+def test_in_a_rest(tmp_path: Path) -> None:
+    text = PROTOCOL.replace('pause = "1 s"\n\n[[', 'pause = "100 s"\n\n[[')
+    with bench(tmp_path, text=text) as rig:
+        process = rig.run()
+        lines = iter(process.stderr.readline, "")
+        assert any("the bench rests" in line for line in lines)
+        rig.stop()
+        rig.judged(process, began=True)
+
+
+def test_in_the_pause_before_a_retry(tmp_path: Path) -> None:
+    text = PROTOCOL.replace('times = 2, pause = "1 s"', 'times = 2, pause = "100 s"')
+    with bench(tmp_path, "--fault", "limit-switch@trial=1@time=0.1", text=text) as rig:
+        process = rig.run()
+        lines = iter(process.stderr.readline, "")
+        assert any("is executed again in 100 s" in line for line in lines)
+        rig.stop()  # in state FAULT
+        rig.judged(process, began=True)
+
+
+def test_at_a_prompt(tmp_path: Path) -> None:
+    import pty
+
+    step = '\n[[test.operator]]\nstep = "Look at the gear"\n'
+    with bench(tmp_path, text=PROTOCOL + step) as rig:
+        terminal, theirs = pty.openpty()
+        process = subprocess.Popen(
+            [*command("run", "protocol.toml", *ON[:-1], "--port", rig.port)],
+            cwd=tmp_path,
+            env=environment(),
+            stdin=theirs,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        os.write(terminal, b"yes\n")
+        lines = iter(process.stderr.readline, "")
+        assert any("Look at the gear" in line for line in lines)
+        rig.stop()
+        rig.judged(process, began=True)
+        os.close(terminal)
+        os.close(theirs)
+
+
+@pytest.mark.parametrize("on", [1, 2])
+def test_while_the_host_hangs(tmp_path: Path, on: int) -> None:
+    with bench(tmp_path, speed="1") as rig:
+        process = rig.run()
+        wait_for(lambda: rig.count("drive on") >= on, process)
+        os.kill(process.pid, signal.SIGSTOP)
+        rig.stop()
+        os.kill(process.pid, signal.SIGCONT)
+        rig.judged(process, began=True)
+
+
+def test_while_the_controller_starts_anew(tmp_path: Path) -> None:
+    with bench(tmp_path, "--fault", "reboot=1@trial=2@time=0.2") as rig:
+        process = rig.run()
+        wait_for(lambda: rig.count("switched on") == 2, process)
+        rig.stop()
+        rig.judged(process, began=True)
+
+
+# What is done about it
+
+
+def test_nobody_but_a_person_clears_it(tmp_path: Path) -> None:
+    with bench(tmp_path) as rig:
+        rig.stop()
+        refused = campaign(tmp_path, "run", "protocol.toml", *ON, "--port", rig.port, code=3)
+        assert "campaign stop" in refused.err
+        assert "--clear-stop 1" in refused.err
+        assert not (tmp_path / "results").exists()
+        wrong = (*ON, "--port", rig.port, "--clear-stop", "7")
+        assert "nothing was moved" in campaign(tmp_path, "run", "protocol.toml", *wrong, code=3).err
+        assert rig.count("drive on") == 0
+        shown = json.loads(campaign(tmp_path, "status", "--port", rig.port, "--json").out)
+        assert (shown["latched"], shown["stop"]["count"], shown["held"]) == (True, 1, False)
+        right = (*ON, "--port", rig.port, "--clear-stop", "1")
+        done = campaign(tmp_path, "run", "protocol.toml", *right)
+        assert open_run(tmp_path / done.last_line).status == "complete"
+        assert rig.count("cleared") == 1
+
+
+@pytest.mark.parametrize(("answer", "code"), [("clear", 0), ("yes", 3), ("", 3)])
+def test_at_a_terminal_it_is_asked_with_when_and_by_whom(
+    tmp_path: Path, answer: str, code: int
+) -> None:
+    """`--yes` is no answer."""
+    import pty
+
+    with bench(tmp_path) as rig:
+        rig.stop()
+        terminal, theirs = pty.openpty()
+        process = subprocess.Popen(
+            command("run", "protocol.toml", *ON, "--port", rig.port),
+            cwd=tmp_path, env=environment(), stdin=theirs, stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        os.write(terminal, f"{answer}\n".encode())
+        _, err = process.communicate(timeout=120)
+        os.close(terminal)
+        os.close(theirs)
+        assert process.returncode == code, err
+        assert "campaign stop, 0:0" in err  # by whom, and how long ago
+        assert rig.count("drive on") == (TRIALS if code == 0 else 0)
+
+
+def test_a_second_host_is_told_who_holds_it_and_disturbs_nothing(tmp_path: Path) -> None:
+    with bench(tmp_path, speed="1") as rig:
+        process = rig.run()
+        wait_for(lambda: rig.count("drive on") == 1, process)
+        second = campaign(tmp_path, "run", "protocol.toml", *ON, "--port", rig.port, code=3)
+        assert f"pid {process.pid}" in second.err
+        status = campaign(tmp_path, "status", "--port", rig.port).out
+        assert f"pid {process.pid}, run " in status
+        out, err = process.communicate(timeout=120)
+        assert process.returncode == 0, err
+        assert open_run(tmp_path / out.splitlines()[-1]).status == "complete"
+        assert rig.count("latched") == 0
+
+
+def test_the_report_says_it(tmp_path: Path) -> None:
+    with bench(tmp_path) as rig, proxy(rig.port, Kind.START, 2, rig.stop) as line:
+        process = rig.run(line.port)
+        out, _ = process.communicate(timeout=120)
+    campaign(tmp_path, "report", out.splitlines()[-1])
+    (page,) = (tmp_path / "results").glob("*-report/report.html")
+    assert "panic stop by " in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("batch", range(30))
+def test_at_random(tmp_path: Path, batch: int) -> None:
+    """300 stops in all: by the clock, by a message, with the host stopped, in resets."""
+    for number in range(10):
+        chance = random.Random(10_000 + 10 * batch + number)
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        how = chance.choice(["clock", "clock", "message", "message", "hang", "reset"])
+        fault = ("--fault", f"reboot={chance.uniform(0.1, 2.0):.2f}@trial=2@time=0.2")
+        options = fault if how == "reset" else ()
+        with bench(folder, *options, speed=chance.choice(["1", "4", "max"])) as rig:
+            at_random(rig, how, chance)
+
+
+def at_random(rig: Bench, how: str, chance: random.Random) -> None:
+    if how == "message":
+        kinds = [Kind.SET, Kind.ARM, Kind.START, Kind.RELEASE, Kind.HEARTBEAT, Kind.QUERY]
+        number = chance.randint(1, 3)
+        with proxy(rig.port, chance.choice(kinds), number, rig.stop) as line:
+            process = rig.run(line.port)
+            if acted(line.acted, process):
+                rig.judged(process)
+            return
+    process = rig.run()
+    wait_for(lambda: rig.count("hello") >= 1, process)
+    time.sleep(chance.uniform(0.0, 3.0))
+    if process.poll() is not None:
+        return
+    if how == "hang":
+        os.kill(process.pid, signal.SIGSTOP)
+        time.sleep(chance.uniform(0.0, 0.5))
+    before = rig.count("drive off")
+    rig.stop()
+    os.kill(process.pid, signal.SIGCONT)
+    if process.poll() is None or before < TRIALS:
+        out, err = process.communicate(timeout=120)
+        rig.never_on_after_a_stop()
+        assert process.returncode in (130, 0), (out, err)
+        # Complete is a run whose last words the stop came after.
+        assert process.returncode == 130 or rig.count("drive on") >= TRIALS, err
