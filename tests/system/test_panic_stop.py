@@ -192,7 +192,7 @@ def test_in_the_pause_before_a_retry(tmp_path: Path) -> None:
 def test_at_a_prompt(tmp_path: Path) -> None:
     import pty
 
-    step = '\n[[test.operator]]\nstep = "Look at the gear"\n'
+    step = '\n[[test.operator]]\ntext = "Look at the gear"\n'
     with bench(tmp_path, text=PROTOCOL + step) as rig:
         terminal, theirs = pty.openpty()
         process = subprocess.Popen(
@@ -206,7 +206,7 @@ def test_at_a_prompt(tmp_path: Path) -> None:
         )
         os.write(terminal, b"yes\n")
         lines = iter(process.stderr.readline, "")
-        assert any("Look at the gear" in line for line in lines)
+        assert any(line == "  Look at the gear\n" for line in lines)
         rig.stop()
         rig.judged(process, began=True)
         os.close(terminal)
