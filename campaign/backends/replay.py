@@ -24,7 +24,6 @@ from campaign.errors import ArchiveError
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.trial import (
-    ChannelInfo,
     Ending,
     Fault,
     Outcome,
@@ -131,12 +130,7 @@ class ReplayBackend:
             return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
         channels = list(recording.channels.values())
         if channels:
-            recorder.start(
-                tuple(
-                    ChannelInfo(c.name, c.unit, c.label, c.display_unit, c.measured)
-                    for c in channels
-                )
-            )
+            recorder.start(tuple(channel.info for channel in channels))
             samples = np.stack([channel.samples for channel in channels])
             for first in range(0, len(recording.time), _BLOCK):
                 if stop():

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
 from campaign.experiments.frequency_response_figures import closed_loop_figures, torque_figure
 from campaign.experiments.frequency_response_tables import (
@@ -176,9 +177,9 @@ def _torque_sine(
 def _point(data: TrialData) -> SinePoint:
     task = data.trial.task
     recording = data.recording().window(*task.window)
-    drive = recording["command" if task.mode == "rate" else "drive_torque"]
+    drive = recording[COMMAND if task.mode == "rate" else DRIVE_TORQUE]
     frequency = float(str(data.trial.point["frequency"]))
-    return sine_point(recording.time, drive, recording["gyro_rate"], frequency)
+    return sine_point(recording.time, drive, recording[GYRO_RATE], frequency)
 
 
 def _analyse(data: TestData) -> Result:

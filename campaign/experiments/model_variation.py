@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
 from campaign.experiments.common import method_label
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
@@ -135,16 +136,16 @@ def _reversal(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
     middle = 0.5 / frequency
     cut = recording.window(middle - AROUND / frequency, middle + 2 * AROUND / frequency)
     axis = Axis("Time from the reversal", "s", "s")
-    return axis, cut.time - middle, cut["compensation_torque"]
+    return axis, cut.time - middle, cut[COMPENSATION_TORQUE]
 
 
 def _all(recording: Recording, frequency: float, share: float = 1.0) -> tuple[Axis, Any, Any]:
     """Torque over rate, one whole cycle."""
     cut = recording.window(0.5 / frequency, 1.5 / frequency)
-    rate = cut["relative_rate"]
+    rate = cut[RELATIVE_RATE]
     largest = share * float(np.max(np.abs(rate)))
     axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
-    return axis, rate, cut["compensation_torque"]
+    return axis, rate, cut[COMPENSATION_TORQUE]
 
 
 def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:

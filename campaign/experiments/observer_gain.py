@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, JsonValue
 
+from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
 from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
@@ -207,7 +208,7 @@ def predicted_error(
     count = len(time)
     step = float(np.ptp(time)) / (count - 1)
     frequency: Array = np.fft.rfftfreq(count, step)[1:].astype(float)
-    torque = np.fft.rfft(recording["friction_torque"])[1:] / count
+    torque = np.fft.rfft(recording[FRICTION_TORQUE])[1:] / count
     s = 2j * np.pi * frequency
     high_pass = 2 * np.pi * bench.controller.pointing_high_pass
     angle = torque * theory.rejection(bench, corner, inertia, frequency) / (s + high_pass)
@@ -251,16 +252,16 @@ def _gain(
     for item in by_kind.get("error", [])[:1]:
         cut = item.recording().window(*item.trial.task.window)
         found["error"] = stabilization_error(cut, options.frequency)
-        if "friction_torque" in cut.channels:
+        if FRICTION_TORQUE in cut.channels:
             found["error_theory"] = predicted_error(cut, bench, corner, inertia)
     for item in by_kind.get("noise", [])[:1]:
         cut = item.recording().window(*item.trial.task.window)
-        found["noise"] = float(np.std(cut["load_rate"])) if "load_rate" in cut.channels else None
+        found["noise"] = float(np.std(cut[LOAD_RATE])) if LOAD_RATE in cut.channels else None
     points = []
     for item in by_kind.get("rejection", []):
         frequency = float(str(item.trial.point["disturbance_frequency"]))
         cut = item.recording().window(*item.trial.task.window)
-        measured = amplitude(cut, "gyro_rate", frequency) / options.disturbance
+        measured = amplitude(cut, GYRO_RATE, frequency) / options.disturbance
         expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
         points.append((frequency, measured, float(expected)))
     return Gain(

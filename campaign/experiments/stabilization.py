@@ -12,6 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import (
+    BASE_RATE,
+    COMPENSATION_TORQUE,
+    FRICTION_TORQUE,
+    POINTING_ERROR,
+    RELATIVE_RATE,
+)
 from campaign.experiments.common import (
     conditions,
     failures_note,
@@ -30,7 +37,7 @@ from campaign.trial import Recording, Task, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
 
 TIME = Axis("Time", "s", "s")
-RELATIVE_RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
+RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
 ERROR = Axis("Position error", "rad", "mrad")
 SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
@@ -112,7 +119,7 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
 
 def stabilization_error(recording: Recording, frequency: float) -> float:
     """Standard deviation (rad) of the pointing error over the whole cycles of `recording`."""
-    samples = recording["pointing_error"]
+    samples = recording[POINTING_ERROR]
     rate = (len(recording.time) - 1) / float(np.ptp(recording.time))
     whole = int(len(samples) * frequency / rate + 1e-6)
     count = round(whole * rate / frequency) if whole else len(samples)
@@ -121,15 +128,15 @@ def stabilization_error(recording: Recording, frequency: float) -> float:
 
 def stuck_share(recording: Recording) -> float:
     """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate."""
-    threshold = 0.001 * float(np.max(np.abs(recording["base_rate"])))
-    return float(np.mean(np.abs(recording["relative_rate"]) < threshold))
+    threshold = 0.001 * float(np.max(np.abs(recording[BASE_RATE])))
+    return float(np.mean(np.abs(recording[RELATIVE_RATE]) < threshold))
 
 
 def _measure(data: TrialData) -> tuple[float, float, float]:
     """Error (rad, 1 sigma), largest deviation from the mean (rad), stuck share of one trial."""
     recording = data.recording().window(*data.trial.task.window)
     signal = data.trial.task.base_acceleration
-    position = recording["pointing_error"]
+    position = recording[POINTING_ERROR]
     peak = float(np.max(np.abs(position - np.mean(position))))
     whole = float(np.std(position))
     error = stabilization_error(recording, signal.frequency) if isinstance(signal, Sine) else whole
@@ -251,19 +258,17 @@ def _cut(data: TrialData) -> Recording:
 def _rate_figure(shown: dict[str, TrialData]) -> Figure:
     cuts = {name: _cut(item) for name, item in shown.items()}
     reference = next(iter(cuts.values()))
-    largest = float(np.max(np.abs(reference["base_rate"])))
+    largest = float(np.max(np.abs(reference[BASE_RATE])))
     zoom = _reversal(reference)
-    hull = Curve(
-        reference.time, -reference["base_rate"], "held still in space", "reference", "thin"
-    )
+    hull = Curve(reference.time, -reference[BASE_RATE], "held still in space", "reference", "thin")
     curves = [hull]
     for name, cut in cuts.items():
-        curves.append(Curve(cut.time, cut["relative_rate"], method_label(name), name))
+        curves.append(Curve(cut.time, cut[RELATIVE_RATE], method_label(name), name))
     inside = (reference.time >= zoom[0]) & (reference.time <= zoom[1])
     near = [Curve(c.x[inside], c.y[inside], c.label, c.series, c.style) for c in curves]
     zoomed_time = Axis("Time", "s", "s", limits=zoom)
     zoomed_rate = Axis(
-        RELATIVE_RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
+        RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
     )
     return Figure(
         key="relative-rate",
@@ -274,7 +279,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
         alt="Relative rate over time for each compensation method, and a zoom on one reversal "
         "where the uncompensated curve stays at zero the longest.",
         panels=(
-            Panel(TIME, RELATIVE_RATE, curves, "Base motion"),
+            Panel(TIME, RATE, curves, "Base motion"),
             Panel(zoomed_time, zoomed_rate, near, "At a reversal"),
         ),
         thesis=("5.4", "5.18", "5.8", "5.22"),
@@ -284,7 +289,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
 
 def _reversal(recording: Recording) -> tuple[float, float]:
     """Times (s) around a sign change of the base rate, wide enough to show the sticking."""
-    rate = recording["base_rate"]
+    rate = recording[BASE_RATE]
     changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
     span = float(np.ptp(recording.time))
     middle = recording.time[changes[len(changes) // 2]] if len(changes) else span / 2
@@ -295,7 +300,7 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
     panels = []
     for name, item in shown.items():
         cut = _cut(item)
-        error = cut["pointing_error"] - np.mean(cut["pointing_error"])
+        error = cut[POINTING_ERROR] - np.mean(cut[POINTING_ERROR])
         panels.append(
             Panel(
                 TIME, ERROR, [Curve(cut.time, error, method_label(name), name)], method_label(name)
@@ -320,12 +325,12 @@ def _torque_figure(shown: dict[str, TrialData]) -> Figure:
     for name, item in shown.items():
         cut = _cut(item)
         if name == "none":
-            if "friction_torque" in cut.channels:
+            if FRICTION_TORQUE in cut.channels:
                 curves.append(
-                    Curve(cut.time, cut["friction_torque"], "true friction", "reference", "thin")
+                    Curve(cut.time, cut[FRICTION_TORQUE], "true friction", "reference", "thin")
                 )
         else:
-            curves.append(Curve(cut.time, cut["compensation_torque"], method_label(name), name))
+            curves.append(Curve(cut.time, cut[COMPENSATION_TORQUE], method_label(name), name))
     return Figure(
         key="compensation-torque",
         title="Compensation torque",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMMAND, GYRO_RATE
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.identification.step_response import StepCharacteristics, step_characteristics
@@ -104,7 +105,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
     options = StepResponseOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
     found = step_characteristics(
-        recording.time, recording["gyro_rate"], options.rest, options.step, options.band
+        recording.time, recording[GYRO_RATE], options.rest, options.step, options.band
     )
     place = conditions(data, "compensation", "linear")
     words = ["linear loop" if options.linear else "with friction"]
@@ -118,8 +119,8 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
         label,
         "measured" if plain else label,
         recording.time - options.rest,
-        recording["gyro_rate"],
-        recording["command"],
+        recording[GYRO_RATE],
+        recording[COMMAND],
         options,
         found,
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field, JsonValue
 
+from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.common import failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.least_squares import Fit
@@ -211,7 +212,7 @@ def map_points(data: TrialData) -> Iterator[MapPoint]:
     recording = data.recording()
     for direction in DIRECTIONS.values():
         cut = recording.window(*run.window_of(direction))
-        rate, torque = cut["gyro_rate"], cut["drive_torque"]
+        rate, torque = cut[GYRO_RATE], cut[DRIVE_TORQUE]
         # The rate's slope over the window, by least squares: robust to the gyro's noise.
         acceleration = float(np.polyfit(cut.time - cut.time[0], rate, 1)[0])
         yield MapPoint(
@@ -425,17 +426,15 @@ def _example(data: TestData) -> tuple[Figure, ...]:
                     time,
                     RATE,
                     [
-                        Curve(recording.time, recording["gyro_rate"], "measured", "measured"),
-                        Curve(
-                            recording.time, recording["command"], "commanded", "reference", "thin"
-                        ),
+                        Curve(recording.time, recording[GYRO_RATE], "measured", "measured"),
+                        Curve(recording.time, recording[COMMAND], "commanded", "reference", "thin"),
                     ],
                     marks=marks,
                 ),
                 Panel(
                     time,
                     Axis("Drive torque", "N m", "N m"),
-                    [Curve(recording.time, recording["drive_torque"], "measured", "measured")],
+                    [Curve(recording.time, recording[DRIVE_TORQUE], "measured", "measured")],
                     marks=marks,
                 ),
             ),
