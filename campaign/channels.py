@@ -290,6 +290,8 @@ def info(
 
     Args:
         mode: of the task; decides what a command is, and nothing else.
+        axis: how the side of the bench moves that the channel is about: a rotary motor may well
+            drive a linear load.
         own_rate: of a slower channel (Hz): see above.
     """
     what = VOCABULARY[name]

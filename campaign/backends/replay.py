@@ -110,9 +110,18 @@ class ReplayBackend:
         return None if self._answer(trial) else self._why_not(trial)
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """What the archive has for `trial`; None where it has nothing."""
+        """What the archive has for `trial`; None where it has nothing.
+
+        An archived trial that ended before its channels were announced, or whose record is damaged,
+        ends here as it did there, or as a fault: nothing is said of its channels.
+        """
         archived = self._answer(trial)
-        return frozenset(archived.recording().channels) if archived is not None else None
+        if archived is None:
+            return None
+        try:
+            return archived.channel_names() or None
+        except ArchiveError:
+            return None
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Copy channels, samples, events and ending of the archived trial; the same one again.

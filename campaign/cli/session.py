@@ -14,6 +14,7 @@ from campaign.archive.header import SEALED
 from campaign.backends.interface import Backend, BackendKind
 from campaign.cli.ask import attendance_of
 from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.prepare import check_channels
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.naming import how_to_go_on, reference
@@ -49,6 +50,11 @@ class Session:
     yes: bool = False
     finished: Mapping[int, Outcome] = field(default_factory=dict)
 
+    @property
+    def left(self) -> Iterator[Trial]:
+        """The trials that are executed."""
+        return (trial for trial in self.trials if trial.number not in self.finished)
+
 
 def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: bool) -> ExitCode:
     """Execute a session; the archive's path is the last line of standard output.
@@ -68,7 +74,11 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
 
 
 def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[RunOutcome, ExitCode]:
-    """Connect, execute, seal and let go; also the exit code that follows from all of it."""
+    """Connect, execute, seal and let go; also the exit code that follows from all of it.
+
+    Raises UsageError, before anything moves and before there is an archive, when the connected
+    bench turns out not to record what a trial requires.
+    """
     outcome: RunOutcome | None = None
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
@@ -77,6 +87,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             connected(session.backend, print_warning) as backend,
         ):
             with safe_when_broken_off(backend):
+                check_channels(session.kind, backend, session.left)
                 writer = open_archive()
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)

@@ -369,4 +369,9 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        DRIVE_TORQUE: "the torque at which the load slides",
+        GYRO_RATE: "the moment at which it slides",
+        RELATIVE_ANGLE: "the presliding curve",
+    },
 )

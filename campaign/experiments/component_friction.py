@@ -294,4 +294,8 @@ EXPERIMENT = Experiment(
     options=ComponentFrictionOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        DRIVE_TORQUE: "the torque at which the component turns",
+        GYRO_RATE: "the moment at which it turns",
+    },
 )

@@ -180,4 +180,8 @@ EXPERIMENT = Experiment(
     options=ForceRateOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        FRICTION_TORQUE: "its peak, which is the breakaway torque",
+        LOAD_RATE: "the moment at which the load slides",
+    },
 )

@@ -117,7 +117,13 @@ def _trials(options: FrequencyResponseOptions, bench: Bench) -> Iterator[TrialRe
             ),
             point={"frequency": frequency},
             note=f"{options.cycles} cycles after {settle} to settle; {_amplitude(command, closed)}",
+            requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         )
+
+
+def _excitation(mode: str) -> str:
+    """The channel to which the gyro's rate is the response."""
+    return COMMAND if mode == "rate" else DRIVE_TORQUE
 
 
 def _amplitude(command: Sine, closed: bool) -> str:
@@ -177,7 +183,7 @@ def _torque_sine(
 def _point(data: TrialData) -> SinePoint:
     task = data.trial.task
     recording = data.recording().window(*task.window)
-    drive = recording[COMMAND if task.mode == "rate" else DRIVE_TORQUE]
+    drive = recording[_excitation(task.mode)]
     frequency = float(str(data.trial.point["frequency"]))
     return sine_point(recording.time, drive, recording[GYRO_RATE], frequency)
 
@@ -256,4 +262,9 @@ EXPERIMENT = Experiment(
     options=FrequencyResponseOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        GYRO_RATE: "the response",
+        COMMAND: "what a closed loop responds to",
+        DRIVE_TORQUE: "what an open loop responds to",
+    },
 )

@@ -200,4 +200,5 @@ EXPERIMENT = Experiment(
     options=FrictionLagOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the loops", LOAD_RATE: "the loops"},
 )

@@ -123,7 +123,13 @@ def _request(
         ),
         point=point,
         bench=bench,
+        requires=(LOAD_RATE, _shown_torque(compensation)),
     )
+
+
+def _shown_torque(compensation: str) -> str:
+    """The channel that a trial is about: of friction or of compensation."""
+    return FRICTION_TORQUE if compensation == "none" else COMPENSATION_TORQUE
 
 
 def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
@@ -179,10 +185,9 @@ def _analyse(data: TestData) -> Result:
 
 
 def _cycle(data: TrialData) -> tuple[Recording, Array]:
-    """The last cycle, and the torque that this trial is about: of friction or of compensation."""
+    """The last cycle, and the torque that this trial is about."""
     cut = data.recording().window(*data.trial.task.window)
-    chosen = FRICTION_TORQUE if data.trial.task.compensation == "none" else COMPENSATION_TORQUE
-    return cut, cut[chosen]
+    return cut, cut[_shown_torque(data.trial.task.compensation)]
 
 
 def _source(data: TrialData) -> str:
@@ -358,4 +363,9 @@ EXPERIMENT = Experiment(
     options=ModelOutputOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        LOAD_RATE: "the rate that the models are told",
+        FRICTION_TORQUE: "the output of a friction model",
+        COMPENSATION_TORQUE: "the output of a compensation",
+    },
 )

@@ -67,11 +67,15 @@ def model_trials(
             point={"parameter": parameter, "change": change, "repetition": 1},
             note="the model alone, at a prescribed rate",
             bench=tree,
+            requires=(),  # nothing but figures comes of it
+            can_use=(COMPENSATION_TORQUE, RELATIVE_RATE),
         )
 
 
 def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
-    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for."""
+    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for, as far as they can be
+    drawn from what was recorded.
+    """
     runs: dict[str, dict[float, TrialData]] = {}
     for data in measured:
         if data.trial.task.mode == "prescribed":
@@ -83,6 +87,12 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
         return
     dynamic = [name for name in runs if name in DYNAMIC]
     static = [name for name in runs if name not in DYNAMIC]
+    shown = [plain, *(data for by_change in runs.values() for data in by_change.values())]
+    recorded = frozenset.intersection(*(data.channel_names() for data in shown))
+    if COMPENSATION_TORQUE not in recorded:
+        return
+    if RELATIVE_RATE not in recorded:
+        static = []
     if dynamic:
         yield Figure(
             key="model-dynamic",

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, JsonValue
 
-from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
+from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
@@ -125,9 +125,15 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
             yield _request(task, linear, corner, "rejection", disturbance_frequency=frequency)
 
 
+REQUIRED = {"error": POINTING_ERROR, "noise": LOAD_RATE, "rejection": GYRO_RATE}
+"""The channel that a trial is about, by what it measures."""
+
+
 def _request(task: Task, bench: Tree, corner: float, measured: str, **more: float) -> TrialRequest:
     point: dict[str, JsonValue] = {"measured": measured, "corner": corner, **more}
-    return TrialRequest(task, point=point, bench=bench)
+    can_use = (FRICTION_TORQUE,) if measured == "error" else ()
+    requires = (REQUIRED[measured],)
+    return TrialRequest(task, point=point, bench=bench, requires=requires, can_use=can_use)
 
 
 def _is_noisy(bench: Bench) -> bool:
@@ -378,4 +384,10 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        POINTING_ERROR: "the stabilization error",
+        GYRO_RATE: "the rejection of disturbances; disturbance_frequencies = [] does without",
+        LOAD_RATE: 'what the noise of the gyro does to the load; noise_time = "0 s" does without',
+    },
+    can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
 )

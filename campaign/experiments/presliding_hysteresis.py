@@ -209,4 +209,5 @@ EXPERIMENT = Experiment(
     options=PreslidingHysteresisOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

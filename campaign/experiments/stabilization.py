@@ -18,6 +18,7 @@ from campaign.channels import (
     FRICTION_TORQUE,
     POINTING_ERROR,
     RELATIVE_RATE,
+    missing,
 )
 from campaign.experiments.common import (
     conditions,
@@ -94,6 +95,7 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
             sample_rate=options.sample_rate,
         ),
         note=f"{options.cycles} cycles measured after {options.settle_cycles} to settle",
+        can_use=_can_use(options),
     )
 
 
@@ -114,7 +116,14 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
         window=(start, stop),
         sample_rate=options.sample_rate,
     )
-    return TrialRequest(task, note=f"{stop - start:.4g} s measured after {start:.4g} s to settle")
+    note = f"{stop - start:.4g} s measured after {start:.4g} s to settle"
+    return TrialRequest(task, note=note, can_use=_can_use(options))
+
+
+def _can_use(options: StabilizationOptions) -> tuple[str, ...]:
+    """Channels of its figures; the torque shown without compensation is that of friction."""
+    plain = options.compensation == "none"
+    return BASE_RATE, RELATIVE_RATE, FRICTION_TORQUE if plain else COMPENSATION_TORQUE
 
 
 def stabilization_error(recording: Recording, frequency: float) -> float:
@@ -127,7 +136,12 @@ def stabilization_error(recording: Recording, frequency: float) -> float:
 
 
 def stuck_share(recording: Recording) -> float:
-    """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate."""
+    """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate.
+
+    NaN where a channel that would show it is missing.
+    """
+    if missing((BASE_RATE, RELATIVE_RATE), recording.channels):
+        return float("nan")
     threshold = 0.001 * float(np.max(np.abs(recording[BASE_RATE])))
     return float(np.mean(np.abs(recording[RELATIVE_RATE]) < threshold))
 
@@ -165,12 +179,14 @@ def _analyse(data: TestData) -> Result:
         told = _told(group[0], columns) | preload_of(group[0])
         findings.append(Finding("stabilization_error", float(error), "rad", told))
         spread = float(np.std(measures[:, 0], ddof=1)) if len(group) > 1 else None
-        row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
+        row = {**told, "error": float(error), "peak": float(peak)}
+        row["stuck"] = float(stuck) if np.isfinite(stuck) else None
         rows.append(row | {"repeats": len(group), "spread": spread})
     extra = [path for path in paths if path not in columns]
     firsts = [group[0] for group in groups.values()]
     sines = any("frequency" in row for row in rows)
     irregular = any("motion" in row for row in rows)
+    stuck_known = any(row["stuck"] is not None for row in rows)
     table = Table(
         key="stabilization-error",
         title="Stabilization error by compensation method",
@@ -188,7 +204,7 @@ def _analyse(data: TestData) -> Result:
             *(Column(path, path) for path in extra),
             Column("error", "Error (1σ)", "rad", "mrad"),
             Column("peak", "Largest error", "rad", "mrad"),
-            Column("stuck", "Time stuck", "", "percent"),
+            *((Column("stuck", "Time stuck", "", "percent"),) if stuck_known else ()),
             *(
                 (Column("repeats", "Repeats"), Column("spread", "Spread (1σ)", "rad", "mrad"))
                 if any(len(group) > 1 for group in groups.values())
@@ -216,10 +232,10 @@ def _figures(
 ) -> Iterator[Figure]:
     shown = _one_per_method(firsts)
     if shown:
-        yield _rate_figure(shown)
+        yield from _rate_figure(shown)
         yield _error_figure(shown)
         if any(name != "none" for name in shown):
-            yield _torque_figure(shown)
+            yield from _torque_figure(shown)
     numeric = [
         path
         for path in paths
@@ -255,8 +271,10 @@ def _cut(data: TrialData) -> Recording:
     return Recording(cut.time - start, cut.channels, cut.events, cut.ending)
 
 
-def _rate_figure(shown: dict[str, TrialData]) -> Figure:
+def _rate_figure(shown: dict[str, TrialData]) -> Iterator[Figure]:
     cuts = {name: _cut(item) for name, item in shown.items()}
+    if any(missing((BASE_RATE, RELATIVE_RATE), cut.channels) for cut in cuts.values()):
+        return
     reference = next(iter(cuts.values()))
     largest = float(np.max(np.abs(reference[BASE_RATE])))
     zoom = _reversal(reference)
@@ -270,7 +288,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
     zoomed_rate = Axis(
         RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
     )
-    return Figure(
+    yield Figure(
         key="relative-rate",
         title="Rate of the load relative to the hull",
         caption="Where the relative rate passes zero the load sticks to the hull and is carried "
@@ -319,7 +337,7 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
     )
 
 
-def _torque_figure(shown: dict[str, TrialData]) -> Figure:
+def _torque_figure(shown: dict[str, TrialData]) -> Iterator[Figure]:
     torque = Axis("Torque", "N m", "N m")
     curves = []
     for name, item in shown.items():
@@ -329,9 +347,11 @@ def _torque_figure(shown: dict[str, TrialData]) -> Figure:
                 curves.append(
                     Curve(cut.time, cut[FRICTION_TORQUE], "true friction", "reference", "thin")
                 )
-        else:
+        elif COMPENSATION_TORQUE in cut.channels:
             curves.append(Curve(cut.time, cut[COMPENSATION_TORQUE], method_label(name), name))
-    return Figure(
+    if all(curve.series == "reference" for curve in curves):
+        return
+    yield Figure(
         key="compensation-torque",
         title="Compensation torque",
         caption="What each method adds to the drive torque, beside the friction that acts without "
@@ -372,4 +392,11 @@ EXPERIMENT = Experiment(
     options=StabilizationOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={POINTING_ERROR: "the stabilization error"},
+    can_use={
+        BASE_RATE: "time stuck, and no figure of the relative rate",
+        RELATIVE_RATE: "time stuck, and no figure of the relative rate",
+        COMPENSATION_TORQUE: "figure of what the compensation adds",
+        FRICTION_TORQUE: "true friction beside the compensation torque",
+    },
 )

@@ -143,8 +143,11 @@ def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
         series = model_series(model) or "measured"
         torque.append(Curve(recording.time, recording[DRIVE_TORQUE], label, series))
         rate.append(Curve(recording.time, recording[LOAD_RATE], label, series))
-        angle.append(Curve(recording.time, recording[RELATIVE_ANGLE], label, series))
-    angle.append(Curve(recording.time, recording[COMMAND], "end of the spring", "reference"))
+        if RELATIVE_ANGLE in recording.channels:
+            angle.append(Curve(recording.time, recording[RELATIVE_ANGLE], label, series))
+    if COMMAND in recording.channels:
+        angle.append(Curve(recording.time, recording[COMMAND], "end of the spring", "reference"))
+    angles = (Panel(time, Axis("Angle", "rad", "rad"), angle, "Angle of the load"),)
     return Figure(
         key="stick-slip",
         title="Stick-slip motion",
@@ -155,7 +158,7 @@ def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
         panels=(
             Panel(time, Axis("Spring torque", "N m", "N m"), torque, "Torque of the spring"),
             Panel(time, Axis("Rate", "rad/s", "rad/s"), rate, "Rate of the load"),
-            Panel(time, Axis("Angle", "rad", "rad"), angle, "Angle of the load"),
+            *(angles if angle else ()),
         ),
         thesis=("2.12",),
     )
@@ -167,4 +170,12 @@ EXPERIMENT = Experiment(
     options=StickSlipOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        LOAD_RATE: "the slips",
+        DRIVE_TORQUE: "the torque of the spring",
+    },
+    can_use={
+        RELATIVE_ANGLE: "angle of the load in the figure",
+        COMMAND: "far end of the spring in the figure",
+    },
 )

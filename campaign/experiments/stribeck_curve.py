@@ -179,4 +179,5 @@ EXPERIMENT = Experiment(
     options=StribeckCurveOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the friction of each point", LOAD_RATE: "the rate of each point"},
 )

@@ -116,6 +116,13 @@ class Run:
         return Polyline(times=tuple(times), values=tuple(values))
 
 
+REQUIRED = {
+    GYRO_RATE: "the rate of each point",
+    DRIVE_TORQUE: "the friction torque of each point",
+}
+"""Channels of a map, whatever is made of it."""
+
+
 def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     """The run at `speed` (rad/s). ValueError when it cannot settle within the travel allowed."""
     ramp = speed / options.acceleration
@@ -413,6 +420,10 @@ def _example(data: TestData) -> tuple[Figure, ...]:
     marks = (FigureMark("window", x=start), FigureMark("", x=stop))
     time = Axis("Time", "s", "s")
     speed = f"{np.rad2deg(run.speed):.3g} deg/s"
+    rates = [Curve(recording.time, recording[GYRO_RATE], "measured", "measured")]
+    if COMMAND in recording.channels:
+        command = recording[COMMAND]
+        rates.append(Curve(recording.time, command, "commanded", "reference", "thin"))
     return (
         Figure(
             key="one-point",
@@ -425,10 +436,7 @@ def _example(data: TestData) -> tuple[Figure, ...]:
                 Panel(
                     time,
                     RATE,
-                    [
-                        Curve(recording.time, recording[GYRO_RATE], "measured", "measured"),
-                        Curve(recording.time, recording[COMMAND], "commanded", "reference", "thin"),
-                    ],
+                    rates,
                     marks=marks,
                 ),
                 Panel(
@@ -449,4 +457,6 @@ EXPERIMENT = Experiment(
     options=VelocityMapOptions,
     trials=map_trials,
     analyse=_analyse,
+    requires=REQUIRED,
+    can_use={COMMAND: "command in the figure of one point"},
 )
