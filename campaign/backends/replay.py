@@ -95,6 +95,7 @@ class ReplayBackend:
         self._lock = threading.Lock()
         self._trials = [t for t in run.trials if t.ending.outcome is not Outcome.INTERRUPTED]
         self._alike: dict[str, _Alike] = {}
+        self._channels: dict[tuple[Path, str], frozenset[str] | None] = {}
         for archived in self._trials:
             key = canonical_json(_asked_of_bench(archived.trial))
             self._alike.setdefault(key, _Alike()).archived.append(archived)
@@ -118,10 +119,13 @@ class ReplayBackend:
         archived = self._answer(trial)
         if archived is None:
             return None
-        try:
-            return archived.channel_names() or None
-        except ArchiveError:
-            return None
+        key = (archived.path, archived.entry)
+        if key not in self._channels:
+            try:
+                self._channels[key] = archived.channel_names() or None
+            except ArchiveError:
+                self._channels[key] = None
+        return self._channels[key]
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Copy channels, samples, events and ending of the archived trial; the same one again.
