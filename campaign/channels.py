@@ -313,4 +313,7 @@ def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, .
 def explained(name: str) -> str:
     """The name with its meaning, for messages; alone when the vocabulary does not have it."""
     what = VOCABULARY.get(name)
-    return name if what is None else f"{name} ({what.label[:1].lower()}{what.label[1:]})"
+    if what is None:
+        return name
+    meaning = what.meaning.removesuffix(".")
+    return f"{name} ({meaning[:1].lower()}{meaning[1:]})"

@@ -82,7 +82,7 @@ def test_every_name_can_be_archived_and_shown(name: str, axis: AxisKind) -> None
 
 def test_what_is_missing_keeps_its_order_and_is_explained() -> None:
     assert missing(("load_rate", "command", "base_rate"), {"command"}) == ("load_rate", "base_rate")
-    assert explained("base_rate") == "base_rate (rate of the hull)"
+    assert explained("base_rate") == "base_rate (rate of the hull in space, about the axis)"
     assert explained("vibration") == "vibration"
     with pytest.raises(KeyError):
         info("vibration")

@@ -103,7 +103,7 @@ def test_plan_and_run_refuse_what_the_backend_is_known_not_to_record(
         "the backend 'sim'",
         "the experiment 'velocity_map'",
         "trial-00004 (map [speed=",  # after the sea and the warm-up, which do not need it
-        "gyro_rate (rate of the load (gyro)), for the rate of each point",
+        "gyro_rate (rate of the load in space, as its gyro shows it), for the rate of each point",
         "leave out the test 'map'",
     ):
         assert word in said
@@ -121,7 +121,7 @@ def test_a_bench_that_tells_only_when_connected_is_refused_before_it_moves(
     bench = Bench("pointing_error", unconnected=False).put_in_place(monkeypatch)
     request = Request(str(write(tmp_path, SEA)))
     show_plan(request, tmp_path / "results", as_json=False)  # it does not know
-    with pytest.raises(UsageError, match=r"pointing_error \(integrated gyro rate\).*\n.*was moved"):
+    with pytest.raises(UsageError, match=r"pointing_error \(integral of.*\n.*was moved"):
         run_protocol(request, tmp_path / "results", workers=1, report=False)
     assert (bench.executed, bench.made_safe) == (0, 1)
     assert not (tmp_path / "results").exists()
