@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -89,6 +89,8 @@ class Trial(Options):
             before the first trial for which it differs from what was confirmed last.
         set_by_operator: the paths of `point` that this sets, e.g. `bench.gear.preload.torque`; all
             other swept values are the controller's business.
+        requires: names of the channels without which its analysis finds nothing.
+        can_use: names of those without which it only leaves something out.
     """
 
     number: int = Field(ge=1)
@@ -104,6 +106,8 @@ class Trial(Options):
     note: str = ""
     setup: tuple[str, ...] = ()
     set_by_operator: tuple[str, ...] = ()
+    requires: tuple[str, ...] = ()
+    can_use: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -134,6 +138,8 @@ class TrialRequest:
         note: what the plan should say about it.
         bench: a whole normalised bench (SI) to execute it on instead of the test's, for an
             experiment that varies the bench itself; see `experiments.common.with_changes`.
+        requires, can_use: names of the channels, where they are not all that the experiment
+            declares; None: a measurement has all of those, and any other role none.
     """
 
     task: Task
@@ -141,6 +147,8 @@ class TrialRequest:
     point: Mapping[str, JsonValue] = field(default_factory=dict)
     note: str = ""
     bench: Tree | None = None
+    requires: Collection[str] | None = None
+    can_use: Collection[str] | None = None
 
 
 class Outcome(StrEnum):
@@ -228,6 +236,8 @@ class Channel:
     Attributes:
         samples: shape (n,), float64.
         measured: False for what only a simulator can know (the true friction torque).
+        own_rate: how often the value is new (Hz), where that is not with every sample; between,
+            it is held: `campaign.channels`.
     """
 
     name: str
@@ -236,20 +246,40 @@ class Channel:
     display_unit: str
     samples: Array
     measured: bool = True
+    own_rate: float | None = None
+
+    @property
+    def info(self) -> ChannelInfo:
+        """All of it but the samples."""
+        return ChannelInfo(
+            self.name, self.unit, self.label, self.display_unit, self.measured, self.own_rate
+        )
 
 
 @dataclass(frozen=True)
 class ChannelInfo:
-    """A channel before it has samples: what a backend announces when a trial starts."""
+    """A channel before it has samples: what a backend announces when a trial starts.
+
+    `campaign.channels.info` makes it for the names that analyses know.
+    """
 
     name: str
     unit: str
     label: str
     display_unit: str
     measured: bool = True
+    own_rate: float | None = None
 
     def with_samples(self, samples: Array) -> Channel:
-        return Channel(self.name, self.unit, self.label, self.display_unit, samples, self.measured)
+        return Channel(
+            self.name,
+            self.unit,
+            self.label,
+            self.display_unit,
+            samples,
+            self.measured,
+            self.own_rate,
+        )
 
 
 @dataclass(frozen=True)
@@ -281,8 +311,8 @@ class Recording:
         first, last = np.searchsorted(self.time, (start - half, stop - half))
         cut = slice(int(first), int(last))
         channels = {
-            name: Channel(c.name, c.unit, c.label, c.display_unit, c.samples[cut], c.measured)
-            for name, c in self.channels.items()
+            name: channel.info.with_samples(channel.samples[cut])
+            for name, channel in self.channels.items()
         }
         return Recording(self.time[cut], channels, self.events, self.ending)
 

@@ -13,7 +13,7 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
 from campaign.protocol import Plan, as_tree, load_protocol, make_plan
 from campaign.resources import protocols_folder
-from campaign.trial import Channel, ChannelInfo, Ending, Outcome, Recording, Trial
+from campaign.trial import Ending, Outcome, Recording, Trial
 
 PROTOCOL = """
 title = "A stabilized axis"
@@ -68,7 +68,7 @@ def archived(results: Path, pairs: Sequence[tuple[Trial, Recording | None]]) -> 
         ending = Ending(Outcome.FAULT, "no power at 5 °C")
         if recording is not None:
             ending = recording.ending
-            recorder.start(tuple(_info(channel) for channel in recording.channels.values()))
+            recorder.start(tuple(channel.info for channel in recording.channels.values()))
             block = [channel.samples for channel in recording.channels.values()]
             recorder.append(recording.time, np.stack(block))
             for event in recording.events:
@@ -82,10 +82,4 @@ def _header(tests: Sequence[object], results: Path) -> RunHeader:
     return RunHeader.model_validate(
         {"name": name, "created": "2026-11-21T09:36:58Z", "title": "A stabilized axis"}
         | {"protocol_name": "axis", "backend": "sim", "tests": tests}
-    )
-
-
-def _info(channel: Channel) -> ChannelInfo:
-    return ChannelInfo(
-        channel.name, channel.unit, channel.label, channel.display_unit, channel.measured
     )

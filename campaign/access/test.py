@@ -12,7 +12,7 @@ from campaign.access.trial import TrialView
 from campaign.archive import ArchivedTrial
 from campaign.errors import UsageError
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData
+from campaign.experiments.interface import TestData, result_of
 from campaign.result import Result
 from campaign.trial import Tree
 
@@ -51,7 +51,8 @@ class TestView:
         experiment = experiments().get(self.kind)
         if experiment is None:
             raise UsageError(f"no experiment is called {self.kind!r}; install what provides it")
-        return experiment.analyse(TestData(self.name, self.kind, self.options, self.archived))
+        data = TestData(self.name, self.kind, self.options, self.archived)
+        return result_of(experiment, data)
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.trial import Ending, Recording, Trial
+from campaign.trial import ChannelInfo, Ending, Recording, Trial
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,16 @@ class ArchivedTrial:
         from campaign.archive.sample_reading import read_recording
 
         return read_recording(self.path, self.entry, self.ending)
+
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        """What was announced, without its samples; nothing when the trial did not come to that."""
+        from campaign.archive.sample_reading import read_channels
+
+        return read_channels(self.path, self.entry)
+
+    def channel_names(self) -> frozenset[str]:
+        """The names of `channels`."""
+        return frozenset(channel.name for channel in self.channels())
 
     def problems(self) -> Iterator[str]:
         """Reads every sample in flat memory; what is damaged, by trial and channel."""

@@ -19,22 +19,23 @@ import h5py
 from h5py import h5f, h5o, h5p
 
 from campaign.archive import hdf5
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_CURRENT,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
 from campaign.trial import ChannelInfo, Tree
 
 DEFINITION = "NXfriction_trial"
 VERSION = "1.0"
 
-REQUIRED = (
-    "command",
-    "gyro_rate",
-    "relative_rate",
-    "relative_angle",
-    "motor_current",
-    "drive_torque",
-)
+REQUIRED = (COMMAND, GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE, MOTOR_CURRENT, DRIVE_TORQUE)
 """The channels without which an entry does not follow the definition."""
 
-_SENSORS = {"gyro": "gyro_rate", "encoder": "relative_angle", "current_sensor": "motor_current"}
+_SENSORS = {"gyro": GYRO_RATE, "encoder": RELATIVE_ANGLE, "current_sensor": MOTOR_CURRENT}
 _GAIN_UNITS = {"rate": ("A s/rad", "A/rad"), "current": ("V/A", "V/(A s)")}
 
 

@@ -39,6 +39,14 @@ def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
         return Recording(time, channels, events, ending)
 
 
+def read_channels(path: Path, entry_name: str) -> tuple[ChannelInfo, ...]:
+    """The channels that a trial announced. Raises ArchiveError when they cannot be read."""
+    with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry_name}"):
+        entry = guarded.group_at(file, entry_name, "NXentry")
+        record = guarded.group_at(entry, "record", "NXcollection")
+        return tuple(_CHANNELS.validate_json(guarded.text_at(record, "channels")))
+
+
 def check_recordings(path: Path, entries: Iterable[str]) -> Iterator[str]:
     """What is damaged of the trials in a file, one line each; reads them in flat memory."""
     try:

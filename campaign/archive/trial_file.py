@@ -23,16 +23,17 @@ from campaign.archive import hdf5, nexus
 from campaign.archive.files import PART, publish, sha256_of, why
 from campaign.archive.header import SEALED
 from campaign.archive.preview import PREVIEW_POINTS, Preview
+from campaign.channels import FRICTION_TORQUE, GYRO_RATE, RELATIVE_RATE
 from campaign.errors import ArchiveError, BackendError
 from campaign.trial import ChannelInfo, Ending, Event, Trial, canonical_json
 
 Array = NDArray[np.float64]
 
 TELLING = {
-    "rate": "gyro_rate",
-    "torque": "relative_rate",
-    "prescribed": "friction_torque",
-    "spring": "relative_rate",
+    "rate": GYRO_RATE,
+    "torque": RELATIVE_RATE,
+    "prescribed": FRICTION_TORQUE,
+    "spring": RELATIVE_RATE,
 }
 """By a task's mode, the channel that the default plot shows; else it is the first one."""
 
@@ -189,9 +190,14 @@ def _write_record(
     hdf5.put_text(record, "safe_state", ending.safe_state)
     hdf5.put_text(record, "fault", ending.fault or "")
     hdf5.put_text(record, "telemetry", canonical_json(_plain(ending.telemetry)))
-    hdf5.put_text(record, "channels", canonical_json([vars(channel) for channel in channels]))
+    hdf5.put_text(record, "channels", canonical_json([_described(channel) for channel in channels]))
     told = [{"time": float(event.time), "text": event.text} for event in events]
     hdf5.put_text(record, "events", canonical_json(told))
+
+
+def _described(channel: ChannelInfo) -> dict[str, Any]:
+    """What there is to say of a channel; its own rate only where it has one."""
+    return {name: value for name, value in vars(channel).items() if value is not None}
 
 
 def _plain(value: Any) -> Any:
@@ -252,3 +258,7 @@ def _check_names(trial: Trial, channels: tuple[ChannelInfo, ...]) -> None:
                 f"{trial.name}: {name!r} cannot name a channel: letters, digits and '_', "
                 "not 'time', and each once"
             )
+    for channel in channels:
+        rate = channel.own_rate
+        if rate is not None and not (math.isfinite(rate) and rate > 0):
+            raise BackendError(f"{trial.name}: {channel.name}: its own rate is {rate} Hz")

@@ -24,7 +24,6 @@ from campaign.errors import ArchiveError
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.trial import (
-    ChannelInfo,
     Ending,
     Fault,
     Outcome,
@@ -96,6 +95,7 @@ class ReplayBackend:
         self._lock = threading.Lock()
         self._trials = [t for t in run.trials if t.ending.outcome is not Outcome.INTERRUPTED]
         self._alike: dict[str, _Alike] = {}
+        self._channels: dict[tuple[Path, str], frozenset[str] | None] = {}
         for archived in self._trials:
             key = canonical_json(_asked_of_bench(archived.trial))
             self._alike.setdefault(key, _Alike()).archived.append(archived)
@@ -111,9 +111,21 @@ class ReplayBackend:
         return None if self._answer(trial) else self._why_not(trial)
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """What the archive has for `trial`; None where it has nothing."""
+        """What the archive has for `trial`; None where it has nothing.
+
+        An archived trial that ended before its channels were announced, or whose record is damaged,
+        ends here as it did there, or as a fault: nothing is said of its channels.
+        """
         archived = self._answer(trial)
-        return frozenset(archived.recording().channels) if archived is not None else None
+        if archived is None:
+            return None
+        key = (archived.path, archived.entry)
+        if key not in self._channels:
+            try:
+                self._channels[key] = archived.channel_names() or None
+            except ArchiveError:
+                self._channels[key] = None
+        return self._channels[key]
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Copy channels, samples, events and ending of the archived trial; the same one again.
@@ -131,12 +143,7 @@ class ReplayBackend:
             return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
         channels = list(recording.channels.values())
         if channels:
-            recorder.start(
-                tuple(
-                    ChannelInfo(c.name, c.unit, c.label, c.display_unit, c.measured)
-                    for c in channels
-                )
-            )
+            recorder.start(tuple(channel.info for channel in channels))
             samples = np.stack([channel.samples for channel in channels])
             for first in range(0, len(recording.time), _BLOCK):
                 if stop():

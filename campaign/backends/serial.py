@@ -38,6 +38,7 @@ from campaign.trial import (
     Trial,
 )
 from campaign.units import Time
+from campaign.wire.channel_features import named_channels
 from campaign.wire.configuration import REHEARSAL, configuration_of
 from campaign.wire.messages import Channel, Release, State, Value, WireError
 
@@ -125,8 +126,11 @@ class SerialBackend:
         return self._refusal(trial)
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """Not known before a controller has said so."""
-        return None
+        """What the controller's features name; None before it is connected, or if they do not."""
+        session = self._session
+        if session is None or session.capabilities is None:
+            return None
+        return named_channels(session.capabilities.features)
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Configure, arm, start and record `trial`; STOP when `stop()`."""

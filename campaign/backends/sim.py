@@ -6,11 +6,24 @@ import numpy as np
 from pydantic import Field
 
 from campaign.backends.interface import BackendKind, Source, StopFlag
+from campaign.channels import (
+    BASE_RATE,
+    COMMAND,
+    COMPENSATION_TORQUE,
+    DRIVE_TORQUE,
+    FRICTION_TORQUE,
+    GYRO_RATE,
+    LOAD_RATE,
+    MOTOR_CURRENT,
+    POINTING_ERROR,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+    info,
+)
 from campaign.options import Options
 from campaign.physics.bench import Bench, LimitsOptions
 from campaign.trial import (
     Array,
-    ChannelInfo,
     Ending,
     Event,
     Outcome,
@@ -21,27 +34,28 @@ from campaign.trial import (
 )
 from campaign.units import Time, convert
 
-CHANNELS = (
-    ChannelInfo("command", "", "Command", ""),
-    ChannelInfo("base_rate", "rad/s", "Rate of the hull", "deg/s"),
-    ChannelInfo("gyro_rate", "rad/s", "Rate of the load (gyro)", "deg/s"),
-    ChannelInfo("relative_rate", "rad/s", "Rate of the load relative to the hull", "deg/s"),
-    ChannelInfo("relative_angle", "rad", "Angle of the load relative to the hull", "deg"),
-    ChannelInfo("motor_current", "A", "Motor current", "A"),
-    ChannelInfo("drive_torque", "N m", "Drive torque at the load", "N m"),
-    ChannelInfo("pointing_error", "rad", "Integrated gyro rate", "mrad"),
-    ChannelInfo("compensation_torque", "N m", "Compensation torque", "N m"),
-    ChannelInfo("friction_torque", "N m", "True friction torque", "N m", measured=False),
-    ChannelInfo("load_rate", "rad/s", "True rate of the load", "deg/s", measured=False),
+CHANNELS = tuple(
+    info(name)
+    for name in (
+        COMMAND,
+        BASE_RATE,
+        GYRO_RATE,
+        RELATIVE_RATE,
+        RELATIVE_ANGLE,
+        MOTOR_CURRENT,
+        DRIVE_TORQUE,
+        POINTING_ERROR,
+        COMPENSATION_TORQUE,
+        FRICTION_TORQUE,
+        LOAD_RATE,
+    )
 )
+"""In the order of a block; what the command is depends on the task."""
 
-COMMANDS = {
-    "rate": ChannelInfo("command", "rad/s", "Commanded rate", "deg/s"),
-    "torque": ChannelInfo("command", "N m", "Commanded torque", "N m"),
-    "prescribed": ChannelInfo("command", "rad/s", "Prescribed relative rate", "deg/s"),
-    "spring": ChannelInfo("command", "rad", "Angle of the spring's far end", "deg"),
-}
+COMMANDS = {mode: info(COMMAND, mode) for mode in ("rate", "torque", "prescribed", "spring")}
 """What the command channel holds, by the mode of the task."""
+
+_NAMES = frozenset(channel.name for channel in CHANNELS)
 
 
 class SimOptions(Options):
@@ -79,7 +93,7 @@ class SimBackend:
 
     def channels(self, trial: Trial) -> frozenset[str]:
         """All that the simulation knows."""
-        return frozenset(info.name for info in CHANNELS)
+        return _NAMES
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""
@@ -153,7 +167,7 @@ def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[
     Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
     Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
     """
-    names = {info.name: row for info, row in zip(CHANNELS, block, strict=True)}
+    names = {channel.name: row for channel, row in zip(CHANNELS, block, strict=True)}
     whole = len(time)
     bad = ~np.isfinite(block).all(axis=0)
     first = int(np.argmax(bad)) if bad.any() else whole
@@ -163,10 +177,10 @@ def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[
             Outcome.DIVERGED, f"the simulation diverged at {time[first]:.4g} s: no finite value"
         )
     watched = (
-        ("angle", "relative_angle", limits.angle, "rad", "deg"),
-        ("rate", "relative_rate", limits.rate, "rad/s", "deg/s"),
-        ("torque", "drive_torque", limits.torque, "N m", "N m"),
-        ("current", "motor_current", limits.current, "A", "A"),
+        ("angle", RELATIVE_ANGLE, limits.angle, "rad", "deg"),
+        ("rate", RELATIVE_RATE, limits.rate, "rad/s", "deg/s"),
+        ("torque", DRIVE_TORQUE, limits.torque, "N m", "N m"),
+        ("current", MOTOR_CURRENT, limits.current, "A", "A"),
     )
     for limit, channel, bound, unit, display in watched:
         beyond = np.abs(names[channel][:first]) > bound

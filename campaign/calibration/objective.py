@@ -42,6 +42,9 @@ class FinishedTrial:
     def recording(self) -> Recording:
         return self.record
 
+    def channel_names(self) -> frozenset[str]:
+        return frozenset(self.record.channels)
+
 
 @dataclass(frozen=True)
 class Evaluation:

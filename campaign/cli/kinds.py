@@ -7,29 +7,37 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from campaign.backends import backends
+from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.cli.output import print_line, print_table
 from campaign.errors import UsageError
 from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
 from campaign.units import convert
 
+EXPERIMENT = "experiment"
+CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
 def list_kinds() -> None:
     """One line per kind."""
-    print_table(("room", "name", "what it is"), [kind[:3] for kind in _all_kinds()])
+    print_table(("room", "name", "what it is"), [*(k[:3] for k in _all_kinds()), CHANNELS])
 
 
 def show_kind(name: str) -> None:
     """Every kind of that name with its options. Raises UsageError when there is none."""
+    if name == CHANNELS[1]:
+        _show_channels()
+        return
     kinds = list(_all_kinds())
     chosen = [kind for kind in kinds if kind[1] == name]
     if not chosen:
-        close = difflib.get_close_matches(name, sorted({kind[1] for kind in kinds}), n=1)
+        names = {CHANNELS[1], *(kind[1] for kind in kinds)}
+        close = difflib.get_close_matches(name, sorted(names), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
     for room, kind, summary, options in chosen:
@@ -37,11 +45,34 @@ def show_kind(name: str) -> None:
         print_line()
         rows = [_row(info) for info in describe(options)]
         print_table(("option", "unit or values", "default", "meaning"), rows)
+        if room == EXPERIMENT:
+            _show_needs(experiments()[kind])
+
+
+def _show_needs(experiment: Experiment) -> None:
+    """The channels that its analysis reads."""
+    required, optional = experiment.requires.items(), experiment.can_use.items()
+    rows = [(name, "required", f"for {what}") for name, what in required]
+    rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
+    if rows:
+        print_line()
+        print_table(("channel", "", "what it is for"), rows)
+
+
+def _show_channels() -> None:
+    """The vocabulary."""
+    print_line(f"{CHANNELS[1]} ({CHANNELS[0]}): {CHANNELS[2]}")
+    print_line()
+    rows = []
+    for name, what in VOCABULARY.items():
+        units = [UNITS[axis][what.quantity][0] or what.quantity.value for axis in AxisKind]
+        rows.append((name, *units, what.side.value, what.known_by.value, what.meaning))
+    print_table(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
 
 
 def _all_kinds() -> Iterator[tuple[str, str, str, Any]]:
     rooms: Sequence[tuple[str, dict[str, Any]]] = (
-        ("experiment", experiments()),
+        (EXPERIMENT, experiments()),
         ("friction model", friction_models()),
         ("compensation method", compensation_methods()),
         ("backend", backends()),

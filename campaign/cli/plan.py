@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
-from campaign.cli.prepare import Prepared, Request, prepare
+from campaign.cli.prepare import Prepared, Request, lacking, prepare
 from campaign.execution.display import clock
+from campaign.experiments import experiments
+from campaign.experiments.interface import lost_without
 from campaign.policy import Policy, Response
 from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
 from campaign.protocol.limit_check import in_display_units
@@ -24,16 +26,27 @@ NOTES = 5
 def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
     """Show the plan. Raises LimitError, after showing it, when it would break a limit."""
     prepared = prepare(request)
-    prepared.open_backend()  # refuses what it cannot execute; it is not connected
+    backend = prepared.open_backend()  # refuses what it cannot execute; it is not connected
+    losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
     if as_json:
-        tree = {**as_tree(prepared.plan), "backend": prepared.kind.name}
+        tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
         print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        _print(prepared, results)
+        _print(prepared, results, losses)
     check_limits(prepared.plan)
 
 
-def _print(prepared: Prepared, results: Path) -> None:
+def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
+    """Each channel that a test could use and will not have, and what there will be none of."""
+    known = experiments()
+    return [
+        {"test": test.name, "channel": name, "no": lost_without(known[test.kind], name)}
+        for test in plan.tests
+        for name in names.get(test.name, ())
+    ]
+
+
+def _print(prepared: Prepared, results: Path, losses: Sequence[Mapping[str, str]]) -> None:
     plan = prepared.plan
     if plan.title:
         print_line(plan.title)
@@ -41,7 +54,7 @@ def _print(prepared: Prepared, results: Path) -> None:
     headings = ("test", "kind", "bench", "trials", "bench time", "closest limits")
     print_table(headings, [_row(test) for test in plan.tests])
     for test in plan.tests:
-        _print_details(plan, test)
+        _print_details(plan, test, [loss for loss in losses if loss["test"] == test.name])
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
@@ -93,7 +106,7 @@ def _row(test: PlannedTest) -> tuple[str, ...]:
     return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
 
 
-def _print_details(plan: Plan, test: PlannedTest) -> None:
+def _print_details(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]]) -> None:
     """How close the test comes to every limit, and what its trials are noted with."""
     trials = [plan.trials[number - 1] for number in test.numbers]
     print_line(f"{test.name}{f': {test.title}' if test.title else ''}")
@@ -110,6 +123,8 @@ def _print_details(plan: Plan, test: PlannedTest) -> None:
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
+    for loss in losses:
+        print_line(f"  without {loss['channel']}: no {loss['no']}")
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

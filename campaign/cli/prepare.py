@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from campaign.archive import find_run
 from campaign.backends import backends
 from campaign.backends.interface import Backend, BackendKind
+from campaign.channels import explained, missing
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.options import Options
@@ -69,7 +70,10 @@ def prepare(request: Request) -> Prepared:
 
 
 def open_backend(kind: BackendKind, options: Options, trials: Sequence[Trial]) -> Backend:
-    """A backend that accepts every one of `trials`. Raises UsageError when it does not."""
+    """A backend that accepts every one of `trials`, not yet connected.
+
+    Raises UsageError when it does not, or is known not to record what one of them requires.
+    """
     backend = kind.open(options)
     for trial in trials:
         why = backend.refuses(trial)
@@ -77,7 +81,46 @@ def open_backend(kind: BackendKind, options: Options, trials: Sequence[Trial]) -
             raise UsageError(
                 f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label}): {why}"
             )
+    check_channels(kind, backend, trials)
     return backend
+
+
+def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:
+    """Raises UsageError when the backend is known not to record what one of `trials` requires.
+
+    What it cannot know before it is connected is asked again when it is.
+    """
+    for trial in trials:
+        if not trial.requires:
+            continue
+        known = backend.channels(trial)
+        if known is not None and (names := missing(trial.requires, known)):
+            raise UsageError(_not_recorded(kind, trial, names))
+
+
+def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
+    experiment = experiments().get(trial.kind)
+    purposes = experiment.requires if experiment is not None else {}
+    what = "; ".join(
+        f"{explained(name)}{f', for {purposes[name]}' if name in purposes else ''}"
+        for name in names
+    )
+    return (
+        f"the backend {kind.name!r} does not record what the experiment {trial.kind!r} requires in "
+        f"{trial.name} ({trial.label}): {what}\n"
+        "let the bench record it under that name, take another backend, or leave out the test "
+        f"{trial.test!r}; nothing was moved"
+    )
+
+
+def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, ...]]:
+    """By test, the channels that its analysis can use and that are known not to be recorded."""
+    found: dict[str, dict[str, None]] = {}
+    for trial in trials:
+        known = backend.channels(trial) if trial.can_use else None
+        if known is not None and (names := missing(trial.can_use, known)):
+            found.setdefault(trial.test, {}).update(dict.fromkeys(names))
+    return {test: tuple(names) for test, names in found.items()}
 
 
 def short_settings(port: str | None, source: str | None, results: Path) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from campaign.backends.interface import Backend, BackendKind, StoppedOutside
 from campaign.cli.ask import attendance_of
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.prepare import check_channels
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.naming import how_to_go_on, reference
@@ -56,6 +57,11 @@ class Session:
     clear_stop: int | None = None
     finished: Mapping[int, Outcome] = field(default_factory=dict)
 
+    @property
+    def left(self) -> Iterator[Trial]:
+        """The trials that are executed."""
+        return (trial for trial in self.trials if trial.number not in self.finished)
+
 
 def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: bool) -> ExitCode:
     """Execute a session; the archive's path is the last line of standard output.
@@ -75,7 +81,11 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
 
 
 def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[RunOutcome, ExitCode]:
-    """Connect, execute, seal and let go; also the exit code that follows from all of it."""
+    """Connect, execute, seal and let go; also the exit code that follows from all of it.
+
+    Raises UsageError, before anything moves and before there is an archive, when the connected
+    bench turns out not to record what a trial requires.
+    """
     outcome: RunOutcome | None = None
     if isinstance(session.backend, StoppedOutside):
         session.backend.introduce(session.run)
@@ -87,6 +97,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
         ):
             stop.make_safe = partial(safe_at_once, backend)
             with safe_when_broken_off(backend):
+                check_channels(session.kind, backend, session.left)
                 clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
             stop.kept(

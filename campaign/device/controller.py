@@ -10,6 +10,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from campaign.backends.sim import CHANNELS
 from campaign.device.configuration import Refused, make_trial
 from campaign.device.faults import FaultName
 from campaign.device.latch import LatchMemory
@@ -19,6 +20,7 @@ from campaign.device.session import LONGEST_ARRAY, Configuration, Session
 from campaign.physics.compensation import compensation_methods
 from campaign.trial import Ending, Fault, Outcome
 from campaign.wire import codes
+from campaign.wire.channel_features import channel_features
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
 from campaign.wire.device import Ack, Capabilities, Holder, Lost, Nak, Status
 from campaign.wire.fields import clipped
@@ -56,7 +58,10 @@ PATIENCE = 3.0
 FASTEST_RECORDING = 1e5
 """Hz."""
 STOPPED = Ending(Outcome.INTERRUPTED, "stopped by the operator")
-FEATURES = ("rate", "torque", "prescribed", "spring", "base-motion", "rehearsal")
+FEATURES = (
+    *("rate", "torque", "prescribed", "spring", "base-motion", "rehearsal"),
+    *channel_features(channel.name for channel in CHANNELS),
+)
 
 Send = Callable[[int | None, Message], None]
 """Sends a message to one client, or to all of them (None)."""

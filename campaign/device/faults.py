@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from campaign.backends.sim import CHANNELS
+from campaign.channels import COMMAND, GYRO_RATE
 from campaign.errors import UsageError
 
 
@@ -40,7 +41,7 @@ SECONDS = {
 """Faults that last a while, with how long when the user names no time (s of the wall clock)."""
 DEFAULT_TIME = 0.5
 """s into the trial."""
-STUCK_CHANNELS = tuple(info.name for info in CHANNELS if info.measured and info.name != "command")
+STUCK_CHANNELS = tuple(info.name for info in CHANNELS if info.measured and info.name != COMMAND)
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _seconds(text: str, name: FaultName, value: str | None) -> float:
 
 def _channel(text: str, name: FaultName, value: str | None) -> str:
     if name is FaultName.SENSOR:
-        channel = value if value is not None else "gyro_rate"
+        channel = value if value is not None else GYRO_RATE
         if channel not in STUCK_CHANNELS:
             raise UsageError(
                 f"--fault {text}: {channel!r} cannot be stuck; one of {', '.join(STUCK_CHANNELS)}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.channels import MOTOR_CURRENT
 from campaign.device.clock import Pace
 from campaign.device.faults import RATES, FaultSpec
 from campaign.device.producer import Producer
@@ -147,7 +148,7 @@ class Motion:
             return False
         block = self._producer.take(ready)
         self._freeze(block)
-        self._winding.heat(block[self._names.index("motor_current")], ready / self._rate)
+        self._winding.heat(block[self._names.index(MOTOR_CURRENT)], ready / self._rate)
         data = np.ascontiguousarray(block.T, dtype="<f8").tobytes()
         ring = self._ring
         self._add(Samples(ring.trial, ring.next, self.released, ready, data))

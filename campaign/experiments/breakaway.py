@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.experiments.common import conditions, failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.presliding import (
@@ -125,9 +126,9 @@ def _evaluate(data: TrialData) -> Ramp:
     options = BreakawayOptions.model_validate(data.trial.options, context={"si": True})
     bench = bench_of(data.trial)
     recording = data.recording()
-    torque, rate = recording["drive_torque"], recording["gyro_rate"]
+    torque, rate = recording[DRIVE_TORQUE], recording[GYRO_RATE]
     before = recording.time <= options.rest
-    angle = fine_angle(recording.time, rate, recording["relative_angle"])
+    angle = fine_angle(recording.time, rate, recording[RELATIVE_ANGLE])
     angle = angle - float(np.mean(angle[before]))
     sign = 1.0 if options.peak_torque > 0 else -1.0
     breakaway, at = breakaway_torque(
@@ -368,4 +369,9 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        DRIVE_TORQUE: "the torque at which the load slides",
+        GYRO_RATE: "the moment at which it slides",
+        RELATIVE_ANGLE: "the presliding curve",
+    },
 )

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.common import conditions, failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.presliding import breakaway_torque
@@ -143,14 +144,14 @@ def _read(data: TrialData) -> Reading:
     recording = data.recording()
     true, _ = breakaway_torque(
         recording.time,
-        recording["gyro_rate"],
-        recording["drive_torque"],
+        recording[GYRO_RATE],
+        recording[DRIVE_TORQUE],
         bench.axis.inertia,
         options.sliding_rate,
     )
     count = options.sensor_resolution
     shown = round(true / ratio / count) * count if count > 0 else true / ratio
-    history = np.abs(recording["drive_torque"]), np.abs(recording["gyro_rate"])
+    history = np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
     number = int(str(place["measurement"]))
     return Reading(place, component, number, side, shown * ratio, shown, history)
 
@@ -302,4 +303,8 @@ EXPERIMENT = Experiment(
     options=ComponentFrictionOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        DRIVE_TORQUE: "the torque at which the component turns",
+        GYRO_RATE: "the moment at which it turns",
+    },
 )

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import Place, in_models, model_series, places
 from campaign.experiments.interface import Experiment, TestData, TrialData
@@ -72,10 +73,10 @@ def _peak(data: TrialData) -> tuple[float, float]:
     """Largest friction before sliding (N m), and the torque applied at that moment (N m)."""
     options = ForceRateOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
-    sliding = np.abs(recording["load_rate"]) > options.sliding_rate
+    sliding = np.abs(recording[LOAD_RATE]) > options.sliding_rate
     if not sliding.any():
         raise ValueError("the load did not slide; raise peak_torque or lower sliding_rate")
-    friction = recording["friction_torque"][: max(int(np.argmax(sliding)), 1)]
+    friction = recording[FRICTION_TORQUE][: max(int(np.argmax(sliding)), 1)]
     at = int(np.argmax(friction))
     applied = data.trial.task.disturbance.sample(recording.time[at : at + 1])
     return float(friction[at]), float(applied[0])
@@ -170,7 +171,7 @@ def _histories(
         if item.trial.point["torque_rate"] in (rates[0], rates[-1]):
             recording = item.recording()
             applied = item.trial.task.disturbance.sample(recording.time)
-            yield Curve(applied, recording["friction_torque"], label, series)
+            yield Curve(applied, recording[FRICTION_TORQUE], label, series)
 
 
 EXPERIMENT = Experiment(
@@ -179,4 +180,8 @@ EXPERIMENT = Experiment(
     options=ForceRateOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        FRICTION_TORQUE: "its peak, which is the breakaway torque",
+        LOAD_RATE: "the moment at which the load slides",
+    },
 )

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
 from campaign.experiments.frequency_response_figures import closed_loop_figures, torque_figure
 from campaign.experiments.frequency_response_tables import (
@@ -116,7 +117,13 @@ def _trials(options: FrequencyResponseOptions, bench: Bench) -> Iterator[TrialRe
             ),
             point={"frequency": frequency},
             note=f"{options.cycles} cycles after {settle} to settle; {_amplitude(command, closed)}",
+            requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         )
+
+
+def _excitation(mode: str) -> str:
+    """The channel to which the gyro's rate is the response."""
+    return COMMAND if mode == "rate" else DRIVE_TORQUE
 
 
 def _amplitude(command: Sine, closed: bool) -> str:
@@ -176,9 +183,9 @@ def _torque_sine(
 def _point(data: TrialData) -> SinePoint:
     task = data.trial.task
     recording = data.recording().window(*task.window)
-    drive = recording["command" if task.mode == "rate" else "drive_torque"]
+    drive = recording[_excitation(task.mode)]
     frequency = float(str(data.trial.point["frequency"]))
-    return sine_point(recording.time, drive, recording["gyro_rate"], frequency)
+    return sine_point(recording.time, drive, recording[GYRO_RATE], frequency)
 
 
 def _analyse(data: TestData) -> Result:
@@ -255,4 +262,9 @@ EXPERIMENT = Experiment(
     options=FrequencyResponseOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        GYRO_RATE: "the response",
+        COMMAND: "what a closed loop responds to",
+        DRIVE_TORQUE: "what an open loop responds to",
+    },
 )

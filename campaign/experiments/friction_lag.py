@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import Place, in_models, places
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
@@ -110,7 +111,7 @@ class Loop:
 def _loop(data: TrialData) -> Loop:
     options = FrictionLagOptions.model_validate(data.trial.options, context={"si": True})
     cut = data.recording().window(*data.trial.task.window)
-    rate, friction = cut["load_rate"], cut["friction_torque"]
+    rate, friction = cut[LOAD_RATE], cut[FRICTION_TORQUE]
     top = int(np.argmax(rate))
     common = options.mean_rate + options.amplitude * np.linspace(-0.98, 0.98, 99)
     rising = np.interp(common, rate[: top + 1], friction[: top + 1])
@@ -199,4 +200,5 @@ EXPERIMENT = Experiment(
     options=FrictionLagOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the loops", LOAD_RATE: "the loops"},
 )

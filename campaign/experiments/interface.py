@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
+from campaign.channels import missing
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
@@ -23,6 +24,9 @@ class TrialData(Protocol):
 
     def recording(self) -> Recording:
         """The samples. Raises ArchiveError when they cannot be read."""
+
+    def channel_names(self) -> frozenset[str]:
+        """What was recorded, without reading any of it. Raises ArchiveError likewise."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,12 @@ class Experiment:
         options: what a test of this kind accepts, besides what every test accepts.
         trials: the trials of one point of the test's matrix, in the order to execute them. Raises
             ValueError with a message for the user when options and bench do not go together.
-        analyse: tables, figures and findings of a whole test. Must cope with failed trials.
+        analyse: tables, figures and findings of a whole test. Must cope with failed trials, and
+            with recordings that lack a channel of `can_use`.
+        requires: names of the channels without which a measurement is in vain, and what each is
+            for. A `TrialRequest` says so where its trial requires only some of them.
+        can_use: names of further channels, and what there is none of without them, in words that
+            go on after "no": `figure of the command`.
     """
 
     name: str
@@ -66,6 +75,24 @@ class Experiment:
     options: type[Options]
     trials: Callable[[Any, Bench], Iterable[TrialRequest]]
     analyse: Callable[[TestData], Result]
+    requires: Mapping[str, str] = field(default_factory=dict)
+    can_use: Mapping[str, str] = field(default_factory=dict)
+
+
+def result_of(experiment: Experiment, data: TestData) -> Result:
+    """What the analysis finds, with a note on every channel that it had to do without."""
+    result = experiment.analyse(data)
+    lacking: dict[str, None] = {}
+    for item in data.trials:
+        if item.trial.can_use and item.ending.outcome == "completed":
+            lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
+    notes = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
+    return replace(result, notes=(*result.notes, *notes))
+
+
+def lost_without(experiment: Experiment, name: str) -> str:
+    """What there is none of without a channel that the experiment can use."""
+    return experiment.can_use.get(name, "result that needs it")
 
 
 def bench_of(trial: Trial) -> Bench:

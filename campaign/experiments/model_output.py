@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, JsonValue
 
+from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.common import conditions, failures_note, method_label, with_changes
 from campaign.experiments.friction_models import in_models, model_label, model_series, places
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
@@ -122,7 +123,13 @@ def _request(
         ),
         point=point,
         bench=bench,
+        requires=(LOAD_RATE, _shown_torque(compensation)),
     )
+
+
+def _shown_torque(compensation: str) -> str:
+    """The channel that a trial is about: of friction or of compensation."""
+    return FRICTION_TORQUE if compensation == "none" else COMPENSATION_TORQUE
 
 
 def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
@@ -178,10 +185,9 @@ def _analyse(data: TestData) -> Result:
 
 
 def _cycle(data: TrialData) -> tuple[Recording, Array]:
-    """The last cycle, and the torque that this trial is about: of friction or of compensation."""
+    """The last cycle, and the torque that this trial is about."""
     cut = data.recording().window(*data.trial.task.window)
-    chosen = "friction_torque" if data.trial.task.compensation == "none" else "compensation_torque"
-    return cut, cut[chosen]
+    return cut, cut[_shown_torque(data.trial.task.compensation)]
 
 
 def _source(data: TrialData) -> str:
@@ -201,7 +207,7 @@ def _symbol(parameter: str) -> str:
 
 def _row(data: TrialData) -> dict[str, Value]:
     cut, torque = _cycle(data)
-    rate = cut["load_rate"]
+    rate = cut[LOAD_RATE]
     falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
     reversal = float(torque[falling[0]]) if len(falling) else float("nan")
     peak = float(np.max(torque))
@@ -253,7 +259,7 @@ def _sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
         name = str(point.get("compensation", model_series(str(point.get("model", "none")))))
         thin = compensated and "compensation" not in point
         style: Style = "thin" if thin else "line"
-        curves.append(Curve(*_closed(cut["load_rate"], torque), _source(item), name, style))
+        curves.append(Curve(*_closed(cut[LOAD_RATE], torque), _source(item), name, style))
     near = NEAR_ZERO * float(max(np.max(curve.x) for curve in curves))
     zoom = Axis(RATE.label, "rad/s", "deg/s", limits=(-near, near))
     mark = (Mark("", x=0.0),)
@@ -327,7 +333,7 @@ def _variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Fig
 
 def _is_dynamic(varied: list[TrialData], plain: list[TrialData]) -> bool:
     """Whether steady sliding is the same for all values of a parameter."""
-    rate = np.linspace(1e-6, 1.0, 50) * float(np.max(varied[0].recording()["load_rate"]))
+    rate = np.linspace(1e-6, 1.0, 50) * float(np.max(varied[0].recording()[LOAD_RATE]))
     curves = [np.add(*steady_friction(bench_of(item.trial), rate)) for item in (*plain, *varied)]
     return all(np.allclose(curve, curves[0], rtol=1e-12) for curve in curves)
 
@@ -342,7 +348,7 @@ def _variation(
         cut, torque = _cycle(item)
         series = "reference" if factor == 1.0 else f"factor {factor:g}"
         label = UNCHANGED if factor == 1.0 else f"× {factor:g}"
-        curves.append(Curve(*_closed(cut["load_rate"], torque), label, series))
+        curves.append(Curve(*_closed(cut[LOAD_RATE], torque), label, series))
     largest = float(np.max(curves[0].x))
     shown = NEAR_ZERO * largest if near_zero else largest
     axis = Axis(RATE.label, "rad/s", "deg/s", limits=(-1.02 * shown, 1.02 * shown))
@@ -357,4 +363,9 @@ EXPERIMENT = Experiment(
     options=ModelOutputOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        LOAD_RATE: "the rate that the models are told",
+        FRICTION_TORQUE: "the output of a friction model",
+        COMPENSATION_TORQUE: "the output of a compensation",
+    },
 )

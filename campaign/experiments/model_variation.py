@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
 from campaign.experiments.common import method_label
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
@@ -66,11 +67,15 @@ def model_trials(
             point={"parameter": parameter, "change": change, "repetition": 1},
             note="the model alone, at a prescribed rate",
             bench=tree,
+            requires=(),  # nothing but figures comes of it
+            can_use=(COMPENSATION_TORQUE, RELATIVE_RATE),
         )
 
 
 def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
-    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for."""
+    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for, as far as they can be
+    drawn from what was recorded.
+    """
     runs: dict[str, dict[float, TrialData]] = {}
     for data in measured:
         if data.trial.task.mode == "prescribed":
@@ -82,6 +87,12 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
         return
     dynamic = [name for name in runs if name in DYNAMIC]
     static = [name for name in runs if name not in DYNAMIC]
+    shown = [plain, *(data for by_change in runs.values() for data in by_change.values())]
+    recorded = frozenset.intersection(*(data.channel_names() for data in shown))
+    if COMPENSATION_TORQUE not in recorded:
+        return
+    if RELATIVE_RATE not in recorded:
+        static = []
     if dynamic:
         yield Figure(
             key="model-dynamic",
@@ -135,16 +146,16 @@ def _reversal(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
     middle = 0.5 / frequency
     cut = recording.window(middle - AROUND / frequency, middle + 2 * AROUND / frequency)
     axis = Axis("Time from the reversal", "s", "s")
-    return axis, cut.time - middle, cut["compensation_torque"]
+    return axis, cut.time - middle, cut[COMPENSATION_TORQUE]
 
 
 def _all(recording: Recording, frequency: float, share: float = 1.0) -> tuple[Axis, Any, Any]:
     """Torque over rate, one whole cycle."""
     cut = recording.window(0.5 / frequency, 1.5 / frequency)
-    rate = cut["relative_rate"]
+    rate = cut[RELATIVE_RATE]
     largest = share * float(np.max(np.abs(rate)))
     axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
-    return axis, rate, cut["compensation_torque"]
+    return axis, rate, cut[COMPENSATION_TORQUE]
 
 
 def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:

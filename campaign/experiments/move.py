@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import RELATIVE_ANGLE
 from campaign.experiments.common import failures_note
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.options import Options
@@ -79,6 +80,7 @@ def _trials(options: MoveOptions, bench: Bench) -> Iterator[TrialRequest]:
             start_angle=options.position,
         ),
         role=Role(options.role),
+        can_use=(RELATIVE_ANGLE,),
     )
 
 
@@ -110,7 +112,9 @@ def _row(data: TrialData) -> dict[str, Value]:
     recording = data.recording()
     row: dict[str, Value] = {"trial": data.trial.name, "role": data.trial.role.value}
     row |= {"target": target, "reached": None, "deviation": None}
-    last = recording["relative_angle"][recording.time >= data.trial.task.duration - LOOKED_AT]
+    if RELATIVE_ANGLE not in recording.channels:
+        return row
+    last = recording[RELATIVE_ANGLE][recording.time >= data.trial.task.duration - LOOKED_AT]
     if last.size and np.isfinite(last).all():
         reached = float(last.mean())
         row |= {"reached": reached, "deviation": reached - target}
@@ -123,4 +127,5 @@ EXPERIMENT = Experiment(
     options=MoveOptions,
     trials=_trials,
     analyse=_analyse,
+    can_use={RELATIVE_ANGLE: "angle reached, and no deviation from the command's end"},
 )

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, JsonValue
 
+from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
@@ -124,9 +125,15 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
             yield _request(task, linear, corner, "rejection", disturbance_frequency=frequency)
 
 
+REQUIRED = {"error": POINTING_ERROR, "noise": LOAD_RATE, "rejection": GYRO_RATE}
+"""The channel that a trial is about, by what it measures."""
+
+
 def _request(task: Task, bench: Tree, corner: float, measured: str, **more: float) -> TrialRequest:
     point: dict[str, JsonValue] = {"measured": measured, "corner": corner, **more}
-    return TrialRequest(task, point=point, bench=bench)
+    can_use = (FRICTION_TORQUE,) if measured == "error" else ()
+    requires = (REQUIRED[measured],)
+    return TrialRequest(task, point=point, bench=bench, requires=requires, can_use=can_use)
 
 
 def _is_noisy(bench: Bench) -> bool:
@@ -207,7 +214,7 @@ def predicted_error(
     count = len(time)
     step = float(np.ptp(time)) / (count - 1)
     frequency: Array = np.fft.rfftfreq(count, step)[1:].astype(float)
-    torque = np.fft.rfft(recording["friction_torque"])[1:] / count
+    torque = np.fft.rfft(recording[FRICTION_TORQUE])[1:] / count
     s = 2j * np.pi * frequency
     high_pass = 2 * np.pi * bench.controller.pointing_high_pass
     angle = torque * theory.rejection(bench, corner, inertia, frequency) / (s + high_pass)
@@ -251,16 +258,16 @@ def _gain(
     for item in by_kind.get("error", [])[:1]:
         cut = item.recording().window(*item.trial.task.window)
         found["error"] = stabilization_error(cut, options.frequency)
-        if "friction_torque" in cut.channels:
+        if FRICTION_TORQUE in cut.channels:
             found["error_theory"] = predicted_error(cut, bench, corner, inertia)
     for item in by_kind.get("noise", [])[:1]:
         cut = item.recording().window(*item.trial.task.window)
-        found["noise"] = float(np.std(cut["load_rate"])) if "load_rate" in cut.channels else None
+        found["noise"] = float(np.std(cut[LOAD_RATE])) if LOAD_RATE in cut.channels else None
     points = []
     for item in by_kind.get("rejection", []):
         frequency = float(str(item.trial.point["disturbance_frequency"]))
         cut = item.recording().window(*item.trial.task.window)
-        measured = amplitude(cut, "gyro_rate", frequency) / options.disturbance
+        measured = amplitude(cut, GYRO_RATE, frequency) / options.disturbance
         expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
         points.append((frequency, measured, float(expected)))
     return Gain(
@@ -377,4 +384,10 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        POINTING_ERROR: "the stabilization error",
+        GYRO_RATE: "the rejection of disturbances; disturbance_frequencies = [] does without",
+        LOAD_RATE: 'what the noise of the gyro does to the load; noise_time = "0 s" does without',
+    },
+    can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
 )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import Place, in_models, places
 from campaign.experiments.interface import Experiment, TestData, TrialData
@@ -114,8 +115,8 @@ class Loop:
 
 def _loop(data: TrialData) -> Loop:
     cut = data.recording().window(*data.trial.task.window)
-    displacement = np.append(cut["relative_angle"], cut["relative_angle"][0])
-    friction = np.append(cut["friction_torque"], cut["friction_torque"][0])
+    displacement = np.append(cut[RELATIVE_ANGLE], cut[RELATIVE_ANGLE][0])
+    friction = np.append(cut[FRICTION_TORQUE], cut[FRICTION_TORQUE][0])
     return Loop(
         amplitude=float(str(data.trial.point["amplitude"])),
         displacement=displacement,
@@ -208,4 +209,5 @@ EXPERIMENT = Experiment(
     options=PreslidingHysteresisOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

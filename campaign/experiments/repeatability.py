@@ -17,6 +17,7 @@ from campaign.experiments.common import failures_note
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.velocity_map import (
     DIRECTIONS,
+    REQUIRED,
     SYMBOLS,
     DirectionFit,
     MapPoint,
@@ -215,4 +216,5 @@ EXPERIMENT = Experiment(
     options=VelocityMapOptions,
     trials=map_trials,
     analyse=_analyse,
+    requires=REQUIRED,
 )

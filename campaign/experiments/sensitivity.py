@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.experiments.common import failures_note, method_label, with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.model_variation import model_figures, model_trials
@@ -142,6 +143,7 @@ def _trials(options: SensitivityOptions, bench: Bench) -> Iterator[TrialRequest]
         for repetition in range(1, options.repeats + 1):
             yield TrialRequest(
                 task,
+                can_use=(),
                 point={"parameter": parameter, "change": change, "repetition": repetition},
                 note=f"{parameter} {change:+.0%}" if parameter else "the model as it is",
                 bench=tree,
@@ -369,4 +371,9 @@ EXPERIMENT = Experiment(
     options=SensitivityOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={POINTING_ERROR: "the stabilization error"},
+    can_use={
+        COMPENSATION_TORQUE: "figures of the model alone",
+        RELATIVE_RATE: "figure of the model alone for its parameters of sliding",
+    },
 )

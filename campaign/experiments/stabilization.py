@@ -12,6 +12,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import (
+    BASE_RATE,
+    COMPENSATION_TORQUE,
+    FRICTION_TORQUE,
+    POINTING_ERROR,
+    RELATIVE_RATE,
+    missing,
+)
 from campaign.experiments.common import (
     conditions,
     failures_note,
@@ -30,7 +38,7 @@ from campaign.trial import Recording, Task, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
 
 TIME = Axis("Time", "s", "s")
-RELATIVE_RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
+RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
 ERROR = Axis("Position error", "rad", "mrad")
 SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
@@ -87,6 +95,7 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
             sample_rate=options.sample_rate,
         ),
         note=f"{options.cycles} cycles measured after {options.settle_cycles} to settle",
+        can_use=_can_use(options),
     )
 
 
@@ -107,12 +116,19 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
         window=(start, stop),
         sample_rate=options.sample_rate,
     )
-    return TrialRequest(task, note=f"{stop - start:.4g} s measured after {start:.4g} s to settle")
+    note = f"{stop - start:.4g} s measured after {start:.4g} s to settle"
+    return TrialRequest(task, note=note, can_use=_can_use(options))
+
+
+def _can_use(options: StabilizationOptions) -> tuple[str, ...]:
+    """Channels of its figures; the torque shown without compensation is that of friction."""
+    plain = options.compensation == "none"
+    return BASE_RATE, RELATIVE_RATE, FRICTION_TORQUE if plain else COMPENSATION_TORQUE
 
 
 def stabilization_error(recording: Recording, frequency: float) -> float:
     """Standard deviation (rad) of the pointing error over the whole cycles of `recording`."""
-    samples = recording["pointing_error"]
+    samples = recording[POINTING_ERROR]
     rate = (len(recording.time) - 1) / float(np.ptp(recording.time))
     whole = int(len(samples) * frequency / rate + 1e-6)
     count = round(whole * rate / frequency) if whole else len(samples)
@@ -120,16 +136,21 @@ def stabilization_error(recording: Recording, frequency: float) -> float:
 
 
 def stuck_share(recording: Recording) -> float:
-    """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate."""
-    threshold = 0.001 * float(np.max(np.abs(recording["base_rate"])))
-    return float(np.mean(np.abs(recording["relative_rate"]) < threshold))
+    """Share of the time that the load moves with the hull: below 0.1 % of the largest base rate.
+
+    NaN where a channel that would show it is missing.
+    """
+    if missing((BASE_RATE, RELATIVE_RATE), recording.channels):
+        return float("nan")
+    threshold = 0.001 * float(np.max(np.abs(recording[BASE_RATE])))
+    return float(np.mean(np.abs(recording[RELATIVE_RATE]) < threshold))
 
 
 def _measure(data: TrialData) -> tuple[float, float, float]:
     """Error (rad, 1 sigma), largest deviation from the mean (rad), stuck share of one trial."""
     recording = data.recording().window(*data.trial.task.window)
     signal = data.trial.task.base_acceleration
-    position = recording["pointing_error"]
+    position = recording[POINTING_ERROR]
     peak = float(np.max(np.abs(position - np.mean(position))))
     whole = float(np.std(position))
     error = stabilization_error(recording, signal.frequency) if isinstance(signal, Sine) else whole
@@ -158,12 +179,14 @@ def _analyse(data: TestData) -> Result:
         told = _told(group[0], columns) | preload_of(group[0])
         findings.append(Finding("stabilization_error", float(error), "rad", told))
         spread = float(np.std(measures[:, 0], ddof=1)) if len(group) > 1 else None
-        row = {**told, "error": float(error), "peak": float(peak), "stuck": float(stuck)}
+        row = {**told, "error": float(error), "peak": float(peak)}
+        row["stuck"] = float(stuck) if np.isfinite(stuck) else None
         rows.append(row | {"repeats": len(group), "spread": spread})
     extra = [path for path in paths if path not in columns]
     firsts = [group[0] for group in groups.values()]
     sines = any("frequency" in row for row in rows)
     irregular = any("motion" in row for row in rows)
+    stuck_known = any(row["stuck"] is not None for row in rows)
     table = Table(
         key="stabilization-error",
         title="Stabilization error by compensation method",
@@ -181,7 +204,7 @@ def _analyse(data: TestData) -> Result:
             *(Column(path, path) for path in extra),
             Column("error", "Error (1σ)", "rad", "mrad"),
             Column("peak", "Largest error", "rad", "mrad"),
-            Column("stuck", "Time stuck", "", "percent"),
+            *((Column("stuck", "Time stuck", "", "percent"),) if stuck_known else ()),
             *(
                 (Column("repeats", "Repeats"), Column("spread", "Spread (1σ)", "rad", "mrad"))
                 if any(len(group) > 1 for group in groups.values())
@@ -209,10 +232,10 @@ def _figures(
 ) -> Iterator[Figure]:
     shown = _one_per_method(firsts)
     if shown:
-        yield _rate_figure(shown)
+        yield from _rate_figure(shown)
         yield _error_figure(shown)
         if any(name != "none" for name in shown):
-            yield _torque_figure(shown)
+            yield from _torque_figure(shown)
     numeric = [
         path
         for path in paths
@@ -248,24 +271,24 @@ def _cut(data: TrialData) -> Recording:
     return Recording(cut.time - start, cut.channels, cut.events, cut.ending)
 
 
-def _rate_figure(shown: dict[str, TrialData]) -> Figure:
+def _rate_figure(shown: dict[str, TrialData]) -> Iterator[Figure]:
     cuts = {name: _cut(item) for name, item in shown.items()}
+    if any(missing((BASE_RATE, RELATIVE_RATE), cut.channels) for cut in cuts.values()):
+        return
     reference = next(iter(cuts.values()))
-    largest = float(np.max(np.abs(reference["base_rate"])))
+    largest = float(np.max(np.abs(reference[BASE_RATE])))
     zoom = _reversal(reference)
-    hull = Curve(
-        reference.time, -reference["base_rate"], "held still in space", "reference", "thin"
-    )
+    hull = Curve(reference.time, -reference[BASE_RATE], "held still in space", "reference", "thin")
     curves = [hull]
     for name, cut in cuts.items():
-        curves.append(Curve(cut.time, cut["relative_rate"], method_label(name), name))
+        curves.append(Curve(cut.time, cut[RELATIVE_RATE], method_label(name), name))
     inside = (reference.time >= zoom[0]) & (reference.time <= zoom[1])
     near = [Curve(c.x[inside], c.y[inside], c.label, c.series, c.style) for c in curves]
     zoomed_time = Axis("Time", "s", "s", limits=zoom)
     zoomed_rate = Axis(
-        RELATIVE_RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
+        RATE.label, "rad/s", "deg/s", limits=(-ZOOM_RATE * largest, ZOOM_RATE * largest)
     )
-    return Figure(
+    yield Figure(
         key="relative-rate",
         title="Rate of the load relative to the hull",
         caption="Where the relative rate passes zero the load sticks to the hull and is carried "
@@ -274,7 +297,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
         alt="Relative rate over time for each compensation method, and a zoom on one reversal "
         "where the uncompensated curve stays at zero the longest.",
         panels=(
-            Panel(TIME, RELATIVE_RATE, curves, "Base motion"),
+            Panel(TIME, RATE, curves, "Base motion"),
             Panel(zoomed_time, zoomed_rate, near, "At a reversal"),
         ),
         thesis=("5.4", "5.18", "5.8", "5.22"),
@@ -284,7 +307,7 @@ def _rate_figure(shown: dict[str, TrialData]) -> Figure:
 
 def _reversal(recording: Recording) -> tuple[float, float]:
     """Times (s) around a sign change of the base rate, wide enough to show the sticking."""
-    rate = recording["base_rate"]
+    rate = recording[BASE_RATE]
     changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
     span = float(np.ptp(recording.time))
     middle = recording.time[changes[len(changes) // 2]] if len(changes) else span / 2
@@ -295,7 +318,7 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
     panels = []
     for name, item in shown.items():
         cut = _cut(item)
-        error = cut["pointing_error"] - np.mean(cut["pointing_error"])
+        error = cut[POINTING_ERROR] - np.mean(cut[POINTING_ERROR])
         panels.append(
             Panel(
                 TIME, ERROR, [Curve(cut.time, error, method_label(name), name)], method_label(name)
@@ -314,19 +337,21 @@ def _error_figure(shown: dict[str, TrialData]) -> Figure:
     )
 
 
-def _torque_figure(shown: dict[str, TrialData]) -> Figure:
+def _torque_figure(shown: dict[str, TrialData]) -> Iterator[Figure]:
     torque = Axis("Torque", "N m", "N m")
     curves = []
     for name, item in shown.items():
         cut = _cut(item)
         if name == "none":
-            if "friction_torque" in cut.channels:
+            if FRICTION_TORQUE in cut.channels:
                 curves.append(
-                    Curve(cut.time, cut["friction_torque"], "true friction", "reference", "thin")
+                    Curve(cut.time, cut[FRICTION_TORQUE], "true friction", "reference", "thin")
                 )
-        else:
-            curves.append(Curve(cut.time, cut["compensation_torque"], method_label(name), name))
-    return Figure(
+        elif COMPENSATION_TORQUE in cut.channels:
+            curves.append(Curve(cut.time, cut[COMPENSATION_TORQUE], method_label(name), name))
+    if all(curve.series == "reference" for curve in curves):
+        return
+    yield Figure(
         key="compensation-torque",
         title="Compensation torque",
         caption="What each method adds to the drive torque, beside the friction that acts without "
@@ -367,4 +392,11 @@ EXPERIMENT = Experiment(
     options=StabilizationOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={POINTING_ERROR: "the stabilization error"},
+    can_use={
+        BASE_RATE: "time stuck, and no figure of the relative rate",
+        RELATIVE_RATE: "time stuck, and no figure of the relative rate",
+        COMPENSATION_TORQUE: "figure of what the compensation adds",
+        FRICTION_TORQUE: "true friction beside the compensation torque",
+    },
 )

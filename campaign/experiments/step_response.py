@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMMAND, GYRO_RATE
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.identification.step_response import StepCharacteristics, step_characteristics
@@ -88,14 +89,17 @@ def _without_friction(bench: Bench) -> Tree:
 
 @dataclass(frozen=True)
 class Step:
-    """One step and what it says: time from the step and rate, shape (n,), SI."""
+    """One step and what it says: time from the step, rate and command, shape (n,), SI.
+
+    The command is None where it was not recorded.
+    """
 
     place: dict[str, Value]
     label: str
     series: str
     time: Array
     rate: Array
-    command: Array
+    command: Array | None
     options: StepResponseOptions
     found: StepCharacteristics
 
@@ -104,7 +108,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
     options = StepResponseOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
     found = step_characteristics(
-        recording.time, recording["gyro_rate"], options.rest, options.step, options.band
+        recording.time, recording[GYRO_RATE], options.rest, options.step, options.band
     )
     place = conditions(data, "compensation", "linear")
     words = ["linear loop" if options.linear else "with friction"]
@@ -118,8 +122,8 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
         label,
         "measured" if plain else label,
         recording.time - options.rest,
-        recording["gyro_rate"],
-        recording["command"],
+        recording[GYRO_RATE],
+        recording[COMMAND] if COMMAND in recording.channels else None,
         options,
         found,
     )
@@ -191,7 +195,9 @@ def _figure(steps: list[Step]) -> Figure:
     settled = [s.found.settling_time for s in steps if math.isfinite(s.found.settling_time)]
     end = min(SHOWN * max(settled), first.options.duration) if settled else first.options.duration
     height = first.options.step
-    curves = [Curve(first.time, first.command, "command", "reference", "thin")]
+    curves = []
+    if first.command is not None:
+        curves.append(Curve(first.time, first.command, "command", "reference", "thin"))
     curves += [Curve(step.time, step.rate, step.label, step.series) for step in steps]
     band = first.options.band
     marks = [
@@ -225,4 +231,6 @@ EXPERIMENT = Experiment(
     options=StepResponseOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={GYRO_RATE: "the response"},
+    can_use={COMMAND: "command in the figure"},
 )

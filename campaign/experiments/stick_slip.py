@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import in_models, model_series, places
 from campaign.experiments.interface import Experiment, TestData, TrialData
@@ -78,7 +79,7 @@ class StickSlip:
 
 def slip_times(recording: Recording, slip_rate: float) -> list[float]:
     """Times (s) at which the load passes `slip_rate` (rad/s) upwards."""
-    fast = recording["load_rate"] > slip_rate
+    fast = recording[LOAD_RATE] > slip_rate
     return [float(t) for t in recording.time[1:][fast[1:] & ~fast[:-1]]]
 
 
@@ -90,8 +91,8 @@ def _measure(data: TrialData) -> StickSlip:
         slips=len(times),
         first_slip=times[0] if times else float("nan"),
         period=float(np.mean(np.diff(times[1:]))) if len(times) > 2 else float("nan"),
-        peak_torque=float(np.max(recording["drive_torque"])),
-        top_rate=float(np.max(recording["load_rate"])),
+        peak_torque=float(np.max(recording[DRIVE_TORQUE])),
+        top_rate=float(np.max(recording[LOAD_RATE])),
     )
 
 
@@ -140,10 +141,13 @@ def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
     for label, model, item in shown:
         recording = item.recording()
         series = model_series(model) or "measured"
-        torque.append(Curve(recording.time, recording["drive_torque"], label, series))
-        rate.append(Curve(recording.time, recording["load_rate"], label, series))
-        angle.append(Curve(recording.time, recording["relative_angle"], label, series))
-    angle.append(Curve(recording.time, recording["command"], "end of the spring", "reference"))
+        torque.append(Curve(recording.time, recording[DRIVE_TORQUE], label, series))
+        rate.append(Curve(recording.time, recording[LOAD_RATE], label, series))
+        if RELATIVE_ANGLE in recording.channels:
+            angle.append(Curve(recording.time, recording[RELATIVE_ANGLE], label, series))
+    if COMMAND in recording.channels:
+        angle.append(Curve(recording.time, recording[COMMAND], "end of the spring", "reference"))
+    angles = (Panel(time, Axis("Angle", "rad", "rad"), angle, "Angle of the load"),)
     return Figure(
         key="stick-slip",
         title="Stick-slip motion",
@@ -154,7 +158,7 @@ def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
         panels=(
             Panel(time, Axis("Spring torque", "N m", "N m"), torque, "Torque of the spring"),
             Panel(time, Axis("Rate", "rad/s", "rad/s"), rate, "Rate of the load"),
-            Panel(time, Axis("Angle", "rad", "rad"), angle, "Angle of the load"),
+            *(angles if angle else ()),
         ),
         thesis=("2.12",),
     )
@@ -166,4 +170,12 @@ EXPERIMENT = Experiment(
     options=StickSlipOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={
+        LOAD_RATE: "the slips",
+        DRIVE_TORQUE: "the torque of the spring",
+    },
+    can_use={
+        RELATIVE_ANGLE: "angle of the load in the figure",
+        COMMAND: "far end of the spring in the figure",
+    },
 )

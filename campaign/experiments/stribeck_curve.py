@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from pydantic import Field
 
+from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import Place, in_models, places
 from campaign.experiments.interface import Experiment, TestData, bench_of
@@ -94,7 +95,7 @@ def _points(place: Place) -> tuple[Array, Array]:
     points = []
     for item in place.trials:
         cut = item.recording().window(*item.trial.task.window)
-        points.append((float(np.mean(cut["load_rate"])), float(np.mean(cut["friction_torque"]))))
+        points.append((float(np.mean(cut[LOAD_RATE])), float(np.mean(cut[FRICTION_TORQUE]))))
     rate, torque = np.array(sorted(points)).T
     return rate, torque
 
@@ -178,4 +179,5 @@ EXPERIMENT = Experiment(
     options=StribeckCurveOptions,
     trials=_trials,
     analyse=_analyse,
+    requires={FRICTION_TORQUE: "the friction of each point", LOAD_RATE: "the rate of each point"},
 )

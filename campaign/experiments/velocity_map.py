@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field, JsonValue
 
+from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.common import failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.least_squares import Fit
@@ -115,6 +116,13 @@ class Run:
         return Polyline(times=tuple(times), values=tuple(values))
 
 
+REQUIRED = {
+    GYRO_RATE: "the rate of each point",
+    DRIVE_TORQUE: "the friction torque of each point",
+}
+"""Channels of a map, whatever is made of it."""
+
+
 def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     """The run at `speed` (rad/s). ValueError when it cannot settle within the travel allowed."""
     ramp = speed / options.acceleration
@@ -211,7 +219,7 @@ def map_points(data: TrialData) -> Iterator[MapPoint]:
     recording = data.recording()
     for direction in DIRECTIONS.values():
         cut = recording.window(*run.window_of(direction))
-        rate, torque = cut["gyro_rate"], cut["drive_torque"]
+        rate, torque = cut[GYRO_RATE], cut[DRIVE_TORQUE]
         # The rate's slope over the window, by least squares: robust to the gyro's noise.
         acceleration = float(np.polyfit(cut.time - cut.time[0], rate, 1)[0])
         yield MapPoint(
@@ -412,6 +420,10 @@ def _example(data: TestData) -> tuple[Figure, ...]:
     marks = (FigureMark("window", x=start), FigureMark("", x=stop))
     time = Axis("Time", "s", "s")
     speed = f"{np.rad2deg(run.speed):.3g} deg/s"
+    rates = [Curve(recording.time, recording[GYRO_RATE], "measured", "measured")]
+    if COMMAND in recording.channels:
+        command = recording[COMMAND]
+        rates.append(Curve(recording.time, command, "commanded", "reference", "thin"))
     return (
         Figure(
             key="one-point",
@@ -424,18 +436,13 @@ def _example(data: TestData) -> tuple[Figure, ...]:
                 Panel(
                     time,
                     RATE,
-                    [
-                        Curve(recording.time, recording["gyro_rate"], "measured", "measured"),
-                        Curve(
-                            recording.time, recording["command"], "commanded", "reference", "thin"
-                        ),
-                    ],
+                    rates,
                     marks=marks,
                 ),
                 Panel(
                     time,
                     Axis("Drive torque", "N m", "N m"),
-                    [Curve(recording.time, recording["drive_torque"], "measured", "measured")],
+                    [Curve(recording.time, recording[DRIVE_TORQUE], "measured", "measured")],
                     marks=marks,
                 ),
             ),
@@ -450,4 +457,6 @@ EXPERIMENT = Experiment(
     options=VelocityMapOptions,
     trials=map_trials,
     analyse=_analyse,
+    requires=REQUIRED,
+    can_use={COMMAND: "command in the figure of one point"},
 )

@@ -14,8 +14,10 @@ from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
 from campaign.protocol.points import Point, PointError, points_of
-from campaign.protocol.schema import Test
+from campaign.protocol.schema import ExperimentKind, Test
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
+
+Names = tuple[str, ...]
 
 LARGEST_RECORDING = 200_000_000
 """samples of one trial; more fills a disk, and is a slip of units."""
@@ -142,6 +144,7 @@ def _trial(
     # All parts are validated; constructing without validation shares one bench tree among the
     # trials of a point, where validation would copy it for each of up to 100 000.
     request = place.request
+    requires, can_use = channels_of(test.experiment, request)
     swept = {**place.point.values, **request.point}
     return Trial.model_construct(
         number=number,
@@ -157,7 +160,20 @@ def _trial(
         note=request.note,
         setup=setup,
         set_by_operator=set_by_hand,
+        requires=requires,
+        can_use=can_use,
     )
+
+
+def channels_of(experiment: ExperimentKind, request: TrialRequest) -> tuple[Names, Names]:
+    """Names of the channels that a trial requires and of those that it can use, sorted."""
+    declared = request.role is Role.MEASUREMENT
+    requires, can_use = request.requires, request.can_use
+    if requires is None:
+        requires = experiment.requires if declared else ()
+    if can_use is None:
+        can_use = experiment.can_use if declared else ()
+    return tuple(sorted(requires)), tuple(sorted(can_use))
 
 
 def size_problem(test: Test, what: str) -> Problem:

@@ -70,6 +70,8 @@ def _trial(trial: Trial) -> dict[str, Any]:
         "note": trial.note,
         "setup": list(trial.setup),
         "set_by_operator": list(trial.set_by_operator),
+        "requires": list(trial.requires),
+        "can_use": list(trial.can_use),
         "fingerprint": trial.fingerprint,
     }
 

@@ -38,6 +38,12 @@ class ExperimentKind(typing.Protocol):
     @property
     def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
 
+    @property
+    def requires(self) -> Mapping[str, str]: ...
+
+    @property
+    def can_use(self) -> Mapping[str, str]: ...
+
 
 class OperatorEntry(Options):
     """One `[[test.operator]]`: what a person must do to the bench."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.errors import ArchiveError
-from campaign.experiments.interface import Experiment, TestData, bench_of
+from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
 from campaign.published.scoreboard import Evidence, evidence_of
 from campaign.published.values import Published, published_values
@@ -128,7 +128,7 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
     if not data.trials:
         return Result(), "none of its trials was executed"
     try:
-        return experiment.analyse(data), ""
+        return result_of(experiment, data), ""
     except ArchiveError:
         raise
     except Exception as error:  # noqa: BLE001 (one bad analysis must not cost the other tests)

@@ -7,6 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.archive import ArchivedTrial, RunReader
+from campaign.channels import (
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_CURRENT,
+    POINTING_ERROR,
+    RELATIVE_RATE,
+)
 from campaign.errors import ArchiveError
 from campaign.report.analysis import one_line
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table, Value
@@ -70,9 +77,9 @@ def _window(trial: ArchivedTrial) -> Recording:
 
 def _telling(recording: Recording, task: Task) -> str:
     """What a change of the bench shows in: the error where the hull moves, else the current."""
-    wanted = ["motor_current", "drive_torque", "gyro_rate", "relative_rate"]
+    wanted = [MOTOR_CURRENT, DRIVE_TORQUE, GYRO_RATE, RELATIVE_RATE]
     if task.base_acceleration.shape != "zero":
-        wanted.insert(0, "pointing_error")
+        wanted.insert(0, POINTING_ERROR)
     measured = [name for name, channel in recording.channels.items() if channel.measured]
     return next((name for name in wanted if name in measured), measured[-1])
 

@@ -24,6 +24,8 @@ def backend_checks() -> dict[str, Check]:
         accepts_a_possible_trial,
         refuses_an_impossible_trial_naming_the_field,
         announces_channels_once_before_samples,
+        announces_the_channels_it_names,
+        holds_slower_channels,
         describes_channels_in_known_units,
         appends_blocks_that_fit_the_channels,
         keeps_the_promised_sample_times,
@@ -60,6 +62,32 @@ def announces_channels_once_before_samples(under_test: BackendUnderTest) -> None
     recorder, _ = _executed(under_test)
     require(not recorder.order, "; ".join(recorder.order))
     require(recorder.channels, "no channel was announced")
+
+
+def announces_the_channels_it_names(under_test: BackendUnderTest) -> None:
+    """What `channels` says of a trial, before or after connecting, is what is then announced."""
+    trial = under_test.possible
+    with under_test.open() as backend:
+        named = (under_test.open().channels(trial), backend.channels(trial))
+        recorder, _ = _on(backend, trial)
+    announced = {info.name for info in recorder.channels}
+    for names in named:
+        told = f"channels() named {sorted(names or ())}, and {sorted(announced)} were announced"
+        require(names is None or names == announced, told)
+
+
+def holds_slower_channels(under_test: BackendUnderTest) -> None:
+    """A channel with a rate of its own changes no more often than that, and is never filled."""
+    recording, _ = _recorded(under_test)
+    rate = under_test.possible.task.sample_rate
+    for name, channel in recording.channels.items():
+        own = channel.own_rate
+        if own is None:
+            continue
+        require(0 < own <= rate, f"{name}: its own rate is {own:g} Hz of {rate:g} Hz recorded")
+        changes = int(np.count_nonzero(np.diff(channel.samples)))  # NaN differs from anything
+        most = own * len(recording.time) / rate + 1
+        require(changes <= most, f"{name}: {changes} values at {own:g} Hz; at most {most:g} can be")
 
 
 def describes_channels_in_known_units(under_test: BackendUnderTest) -> None:

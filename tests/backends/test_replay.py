@@ -207,3 +207,41 @@ def test_a_damaged_recording_is_a_fault_that_names_the_channel(tmp_path, trial):
 
 def test_it_is_not_live_and_may_run_several_trials_at_a_time():
     assert (BACKEND.live, BACKEND.several) == (False, True)
+
+
+def test_the_channels_are_known_without_a_sample_being_read(tmp_path, monkeypatch):
+    path = simulated_run(tmp_path)
+    (first, second) = plan_of(tmp_path).trials
+    backend = replay(path)
+    announced = set(open_run(path).trials[0].recording().channels)
+
+    def unread(*arguments: object) -> None:
+        raise AssertionError("samples were read")
+
+    monkeypatch.setattr("campaign.archive.guarded.read_samples", unread)
+    assert len(announced) == 11
+    assert backend.channels(first) == backend.channels(second) == announced
+    other = changed(first, task=first.task.model_copy(update={"duration": 9.0}))
+    assert backend.channels(other) is None
+
+
+def test_a_trial_that_recorded_nothing_says_nothing_of_its_channels(tmp_path, trial):
+    """It ends again as it did then, and does not keep the others from being replayed."""
+    path = archived(tmp_path / "results", [(trial, None)])
+    backend = replay(path)
+    asking = changed(trial, requires=("pointing_error",))
+    assert backend.refuses(asking) is None
+    assert backend.channels(asking) is None
+    assert served(backend, asking).ending.reason == "no power at 5 °C"
+
+
+def test_a_damaged_list_of_channels_says_nothing_of_them(tmp_path, trial):
+    path = archived(tmp_path / "results", [(trial, marked(1.0))])
+    backend = replay(path)
+    assert backend.channels(trial) == replay(path).channels(trial) == {"gyro_rate"}
+    with h5py.File(path, "r+") as file:
+        record = file["trial_00001/record"]
+        del record["channels"]
+        record["channels"] = "[1]"
+    assert replay(path).channels(trial) is None
+    assert served(backend, trial).ending.fault is Fault.OTHER

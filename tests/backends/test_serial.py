@@ -25,6 +25,7 @@ from campaign.trial import (
     Task,
     Trial,
 )
+from campaign.wire.channel_features import channel_features, named_channels
 from tests.link.controllers import controller
 
 PLATFORM = load_bench("platform").model_dump(mode="json")
@@ -245,3 +246,22 @@ def test_without_a_port_nothing_is_connected_and_the_message_says_what_to_do() -
         SerialBackend(SerialOptions(port="socket://127.0.0.1:9")).__enter__()
     with pytest.raises(UsageError, match="plugged in"):
         SerialBackend(SerialOptions(port="/dev/no-such-port")).__enter__()
+
+
+def test_the_channels_are_those_that_the_controller_names_when_it_is_connected() -> None:
+    what = trial()
+    with controller("--speed", "max") as port:
+        backend = backend_at(port)
+        assert backend.channels(what) is None
+        with backend:
+            known = backend.channels(what)
+            assert known is not None
+            assert known == set(execute(backend, what)[1].channels)
+        assert backend.channels(what) is None
+
+
+def test_a_feature_word_names_a_channel() -> None:
+    assert channel_features(["gyro_rate", "command"]) == ("channel:gyro_rate", "channel:command")
+    words = ("rate", "channel:gyro_rate", "torque", "channel:vibration", "channels")
+    assert named_channels(words) == {"gyro_rate", "vibration"}
+    assert named_channels(("rate", "torque")) is None  # it will say when it is armed

@@ -8,8 +8,9 @@ from typing import Any
 
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData
+from campaign.experiments.interface import TestData, result_of
 from campaign.physics.bench import Bench
+from campaign.protocol.expand import channels_of
 from campaign.result import Finding, Result, Table
 from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
 
@@ -27,6 +28,9 @@ class Done:
     def recording(self) -> Recording:
         return self.samples
 
+    def channel_names(self) -> frozenset[str]:
+        return frozenset(self.samples.channels)
+
 
 def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},)) -> list[Trial]:
     experiment = experiments()[kind]
@@ -34,6 +38,7 @@ def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},
     for point in matrix:
         chosen = experiment.options.model_validate({**options, **point})
         for request in experiment.trials(chosen, bench):
+            requires, can_use = channels_of(experiment, request)
             found.append(
                 Trial(
                     number=len(found) + 1,
@@ -46,6 +51,8 @@ def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},
                     bench=request.bench or bench.model_dump(mode="json"),
                     task=request.task,
                     note=request.note,
+                    requires=requires,
+                    can_use=can_use,
                 )
             )
     return found
@@ -62,7 +69,7 @@ def execute(planned: Iterable[Trial]) -> tuple[Done, ...]:
 
 
 def analyse(kind: str, done: Iterable[Done]) -> Result:
-    return experiments()[kind].analyse(TestData(kind, kind, {}, tuple(done)))
+    return result_of(experiments()[kind], TestData(kind, kind, {}, tuple(done)))
 
 
 def failed(item: Done) -> Done:

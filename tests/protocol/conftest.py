@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -88,6 +88,8 @@ class Kind:
     name: str
     options: type[Options]
     trials: Callable[[Any, Bench], Iterator[TrialRequest]]
+    requires: Mapping[str, str] = field(default_factory=dict)
+    can_use: Mapping[str, str] = field(default_factory=dict)
 
 
 KINDS = {

@@ -48,6 +48,7 @@ class Quirks:
         "task.mode: it has no spring" if trial.task.mode == "spring" else None
     )
     channels: tuple[ChannelInfo, ...] = CHANNELS
+    names: Callable[[tuple[str, ...]], frozenset[str] | None] = frozenset
     announced: int = 1
     announced_first: bool = True
     block: Callable[[np.ndarray], np.ndarray] = lambda block: block
@@ -87,7 +88,7 @@ class Fake:
         return self._quirks.refuses(trial)
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        return frozenset(info.name for info in self._quirks.channels)
+        return self._quirks.names(tuple(info.name for info in self._quirks.channels))
 
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         quirks = self._quirks

@@ -43,6 +43,17 @@ def test_a_good_backend_passes(name: str) -> None:
     CHECKS[name](under_test())
 
 
+def held(block: np.ndarray) -> np.ndarray:
+    block[1] = np.repeat(block[1, ::10], 10)
+    return block
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_a_backend_with_a_slower_channel_that_it_does_not_name_passes(name: str) -> None:
+    slower = (CHANNELS[0], replace(CHANNELS[1], own_rate=10.0))
+    CHECKS[name](under_test(channels=slower, block=held, names=lambda names: None))
+
+
 NOT_SAFE = SafeState.NOT_CONFIRMED
 BROKEN: list[tuple[str, dict[str, Any], str]] = [
     ("accepts_a_possible_trial", {"refuses": lambda t: "no"}, "'no' of the possible trial"),
@@ -59,6 +70,22 @@ BROKEN: list[tuple[str, dict[str, Any], str]] = [
     ("announces_channels_once_before_samples", {"announced": 2}, "announced twice"),
     ("announces_channels_once_before_samples", {"announced_first": False}, "samples came before"),
     ("announces_channels_once_before_samples", {"announced": 0, "samples": 0}, "no channel was"),
+    (
+        "announces_the_channels_it_names",
+        {"names": lambda names: frozenset(names[:1])},
+        r"named \['gyro_rate'\], and \['gyro_rate', 'motor_current'\] were",
+    ),
+    ("announces_the_channels_it_names", {"names": lambda names: frozenset()}, r"named \[\]"),
+    (
+        "holds_slower_channels",
+        {"channels": (CHANNELS[0], replace(CHANNELS[1], own_rate=10.0))},
+        "motor_current: 499 values at 10 Hz",
+    ),
+    (
+        "holds_slower_channels",
+        {"channels": (replace(CHANNELS[0], own_rate=200.0),)},
+        "its own rate is 200 Hz of 100 Hz",
+    ),
     ("describes_channels_in_known_units", {"channels": renamed("a", "a")}, "share a name"),
     ("describes_channels_in_known_units", {"channels": renamed("Rate (x)")}, "lower-case"),
     ("describes_channels_in_known_units", {"channels": renamed("time")}, "not 'time'"),

@@ -1,0 +1,319 @@
+"""The vocabulary of channels: what a name in a recording means, in one place.
+
+A backend that calls a quantity by its name here is understood by every analysis; `campaign kinds
+channels` lists them. Names that are not here stay allowed: they are archived with what their
+backend says of them, and no shipped analysis reads them.
+
+Quantity and kind of axis decide the unit, so that a linear axis has the same names with other
+units: its `gyro_rate` is in m/s, its `drive_torque` is a force in N.
+
+Channels of other rates have one rule. Every channel of a trial has the time base of the trial. A
+slower one is held: each sample is the last value that was known at its time, at the beginning the
+one from before the trial; it is never interpolated and never filled with NaN, which stands for lost
+samples alone. `ChannelInfo.own_rate` says how often its value is really new (Hz). A faster one is
+not held back by that: its trial is recorded at its rate, and the others are held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from campaign.trial import ChannelInfo
+
+COMMAND = "command"
+REFERENCE = "reference"
+BASE_RATE = "base_rate"
+GYRO_RATE = "gyro_rate"
+RELATIVE_RATE = "relative_rate"
+RELATIVE_ANGLE = "relative_angle"
+MOTOR_ANGLE = "motor_angle"
+MOTOR_RATE = "motor_rate"
+MOTOR_CURRENT = "motor_current"
+DRIVE_TORQUE = "drive_torque"
+JOINT_TORQUE = "joint_torque"
+POINTING_ERROR = "pointing_error"
+COMPENSATION_TORQUE = "compensation_torque"
+NORMAL_LOAD = "normal_load"
+TEMPERATURE = "temperature"
+FRICTION_TORQUE = "friction_torque"
+LOAD_RATE = "load_rate"
+
+
+class AxisKind(StrEnum):
+    """How the axis of a bench moves."""
+
+    ROTARY = "rotary"
+    LINEAR = "linear"
+
+
+class Quantity(StrEnum):
+    """What a channel is a number of; the words of a rotary axis stand for both kinds."""
+
+    ANGLE = "angle"
+    DEVIATION = "deviation"  # an angle, too, of which a reader is shown thousandths
+    RATE = "rate"
+    TORQUE = "torque"
+    FORCE = "force"  # on either kind of axis
+    CURRENT = "current"
+    TEMPERATURE = "temperature"
+    DEPENDS = "by mode"  # of the task: see `COMMANDS`
+
+
+class Side(StrEnum):
+    """Which part of the bench a channel is about, and so which side of the gear."""
+
+    LOAD = "load"
+    MOTOR = "motor"
+    HULL = "hull"
+    NONE = "none"
+
+
+class KnownBy(StrEnum):
+    """Who can know the values of a channel at all."""
+
+    SENSOR = "sensor"
+    CONTROLLER = "controller"  # works them out, or was told them
+    SIMULATOR = "simulator"  # nobody else: no bench has a sensor for the truth
+
+
+@dataclass(frozen=True)
+class ChannelMeaning:
+    """What a name means, whoever records it.
+
+    Attributes:
+        label: for people, on a rotary axis.
+        meaning: one sentence.
+        linear_label: the label where the axis is linear, if that is another one.
+    """
+
+    name: str
+    quantity: Quantity
+    side: Side
+    known_by: KnownBy
+    label: str
+    meaning: str
+    linear_label: str = ""
+
+
+_LOAD, _MOTOR, _HULL, _NONE = Side
+_SENSOR, _CONTROLLER, _SIMULATOR = KnownBy
+
+VOCABULARY = {
+    meaning.name: meaning
+    for meaning in (
+        ChannelMeaning(
+            COMMAND,
+            Quantity.DEPENDS,
+            _LOAD,
+            _CONTROLLER,
+            "Command",
+            "What the bench was told at that moment: a rate or a torque, as the task's mode says.",
+        ),
+        ChannelMeaning(
+            REFERENCE,
+            Quantity.ANGLE,
+            _LOAD,
+            _CONTROLLER,
+            "Reference of the angle",
+            "Where the load should be relative to the hull, for a loop that follows an angle.",
+            "Reference of the position",
+        ),
+        ChannelMeaning(
+            BASE_RATE,
+            Quantity.RATE,
+            _HULL,
+            _SENSOR,
+            "Rate of the hull",
+            "Rate of the hull in space, about the axis.",
+        ),
+        ChannelMeaning(
+            GYRO_RATE,
+            Quantity.RATE,
+            _LOAD,
+            _SENSOR,
+            "Rate of the load (gyro)",
+            "Rate of the load in space, as its gyro shows it.",
+            "Rate of the load (inertial)",
+        ),
+        ChannelMeaning(
+            RELATIVE_RATE,
+            Quantity.RATE,
+            _LOAD,
+            _SENSOR,
+            "Rate of the load relative to the hull",
+            "Rate of the load relative to the hull: where friction acts.",
+        ),
+        ChannelMeaning(
+            RELATIVE_ANGLE,
+            Quantity.ANGLE,
+            _LOAD,
+            _SENSOR,
+            "Angle of the load relative to the hull",
+            "Angle of the load relative to the hull, as the encoder shows it.",
+            "Position of the load relative to the hull",
+        ),
+        ChannelMeaning(
+            MOTOR_ANGLE,
+            Quantity.ANGLE,
+            _MOTOR,
+            _SENSOR,
+            "Angle of the motor",
+            "Angle of the motor shaft, before the gear.",
+            "Position of the motor",
+        ),
+        ChannelMeaning(
+            MOTOR_RATE,
+            Quantity.RATE,
+            _MOTOR,
+            _SENSOR,
+            "Rate of the motor",
+            "Rate of the motor shaft, before the gear.",
+        ),
+        ChannelMeaning(
+            MOTOR_CURRENT,
+            Quantity.CURRENT,
+            _MOTOR,
+            _SENSOR,
+            "Motor current",
+            "Current through the motor, by its sensor.",
+        ),
+        ChannelMeaning(
+            DRIVE_TORQUE,
+            Quantity.TORQUE,
+            _LOAD,
+            _CONTROLLER,
+            "Drive torque at the load",
+            "Torque of the drive as seen at the load: motor current, torque constant and gear.",
+            "Drive force at the load",
+        ),
+        ChannelMeaning(
+            JOINT_TORQUE,
+            Quantity.TORQUE,
+            _LOAD,
+            _SENSOR,
+            "Torque in the joint",
+            "Torque between gear and load, by a sensor that sits there.",
+            "Force in the joint",
+        ),
+        ChannelMeaning(
+            POINTING_ERROR,
+            Quantity.DEVIATION,
+            _LOAD,
+            _CONTROLLER,
+            "Integrated gyro rate",
+            "Integral of the gyro's rate: how far the load has turned in space.",
+            "Integrated inertial rate",
+        ),
+        ChannelMeaning(
+            COMPENSATION_TORQUE,
+            Quantity.TORQUE,
+            _LOAD,
+            _CONTROLLER,
+            "Compensation torque",
+            "What the friction compensation adds, as seen at the load.",
+            "Compensation force",
+        ),
+        ChannelMeaning(
+            NORMAL_LOAD,
+            Quantity.FORCE,
+            _NONE,
+            _SENSOR,
+            "Normal load",
+            "Force that presses the rubbing surfaces together.",
+        ),
+        ChannelMeaning(
+            TEMPERATURE,
+            Quantity.TEMPERATURE,
+            _NONE,
+            _SENSOR,
+            "Temperature",
+            "Temperature of the bench near its friction; the label says of what.",
+        ),
+        ChannelMeaning(
+            FRICTION_TORQUE,
+            Quantity.TORQUE,
+            _LOAD,
+            _SIMULATOR,
+            "True friction torque",
+            "Friction of the whole axis as seen at the load.",
+            "True friction force",
+        ),
+        ChannelMeaning(
+            LOAD_RATE,
+            Quantity.RATE,
+            _LOAD,
+            _SIMULATOR,
+            "True rate of the load",
+            "Rate of the load in space without what a sensor adds.",
+        ),
+    )
+}
+
+COMMANDS = {
+    "rate": (Quantity.RATE, "Commanded rate", ""),
+    "torque": (Quantity.TORQUE, "Commanded torque", "Commanded force"),
+    "prescribed": (Quantity.RATE, "Prescribed relative rate", ""),
+    "spring": (Quantity.ANGLE, "Angle of the spring's far end", "Position of the spring's far end"),
+}
+"""What the command holds by the mode of the task: quantity, label, label on a linear axis."""
+
+_ROTARY = {
+    Quantity.ANGLE: ("rad", "deg"),
+    Quantity.DEVIATION: ("rad", "mrad"),
+    Quantity.RATE: ("rad/s", "deg/s"),
+    Quantity.TORQUE: ("N m", "N m"),
+    Quantity.FORCE: ("N", "N"),
+    Quantity.CURRENT: ("A", "A"),
+    # As every sensor has it: from K no factor leads there, and factors are all that units have.
+    Quantity.TEMPERATURE: ("degC", "degC"),
+    Quantity.DEPENDS: ("", ""),
+}
+UNITS = {
+    AxisKind.ROTARY: _ROTARY,
+    AxisKind.LINEAR: {
+        **_ROTARY,
+        Quantity.ANGLE: ("m", "mm"),
+        Quantity.DEVIATION: ("m", "um"),
+        Quantity.RATE: ("m/s", "mm/s"),
+        Quantity.TORQUE: ("N", "N"),
+    },
+}
+"""SI unit and the unit a reader is shown, by kind of axis and quantity."""
+
+
+def info(
+    name: str, mode: str = "", *, axis: AxisKind = AxisKind.ROTARY, own_rate: float | None = None
+) -> ChannelInfo:
+    """What a backend announces of a channel of the vocabulary. Raises KeyError for other names.
+
+    Args:
+        mode: of the task; decides what a command is, and nothing else.
+        axis: how the side of the bench moves that the channel is about: a rotary motor may well
+            drive a linear load.
+        own_rate: of a slower channel (Hz): see above.
+    """
+    what = VOCABULARY[name]
+    quantity, label, linear = what.quantity, what.label, what.linear_label
+    if name == COMMAND and mode:
+        quantity, label, linear = COMMANDS[mode]
+    if axis is AxisKind.LINEAR and linear:
+        label = linear
+    unit, display_unit = UNITS[axis][quantity]
+    measured = what.known_by is not KnownBy.SIMULATOR
+    return ChannelInfo(name, unit, label, display_unit, measured, own_rate)
+
+
+def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, ...]:
+    """Which of the required names are not among the available ones, in their order."""
+    return tuple(name for name in required if name not in available)
+
+
+def explained(name: str) -> str:
+    """The name with its meaning, for messages; alone when the vocabulary does not have it."""
+    what = VOCABULARY.get(name)
+    if what is None:
+        return name
+    meaning = what.meaning.removesuffix(".")
+    return f"{name} ({meaning[:1].lower()}{meaning[1:]})"
