@@ -59,6 +59,8 @@ class Experiment:
         trials: the trials of one point of the test's matrix, in the order to execute them. Raises
             ValueError with a message for the user when options and bench do not go together.
         analyse: tables, figures and findings of a whole test. Must cope with failed trials.
+        seeks_instability: it goes to where a loop is unstable, to find out where that is; the plan
+            of any other test with an unstable loop is refused.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Experiment:
     options: type[Options]
     trials: Callable[[Any, Bench], Iterable[TrialRequest]]
     analyse: Callable[[TestData], Result]
+    seeks_instability: bool = False
 
 
 def bench_of(trial: Trial) -> Bench:

@@ -38,6 +38,9 @@ class ExperimentKind(typing.Protocol):
     @property
     def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
 
+    @property
+    def seeks_instability(self) -> bool: ...
+
 
 class OperatorEntry(Options):
     """One `[[test.operator]]`: what a person must do to the bench."""

@@ -88,6 +88,7 @@ class Kind:
     name: str
     options: type[Options]
     trials: Callable[[Any, Bench], Iterator[TrialRequest]]
+    seeks_instability: bool = False
 
 
 KINDS = {
