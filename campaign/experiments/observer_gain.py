@@ -377,4 +377,6 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
+    # Where the gain makes the loop unstable is one of its results.
+    seeks_instability=True,
 )

@@ -6,6 +6,8 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from campaign.physics.bench import Bench
 from campaign.physics.friction_paths import (
     REGIMES,
@@ -65,9 +67,12 @@ def loops_of(bench: Bench, compensation: str, mode: Mode) -> Iterator[tuple[Regi
     """Each regime with its LoopMargins, or with the NoLoopError that says why there is none."""
     for regime in REGIMES:
         try:
-            yield regime, margins_of(open_loop(bench, compensation, mode, regime))
+            with np.errstate(all="ignore"):
+                yield regime, margins_of(open_loop(bench, compensation, mode, regime))
         except NoLoopError as error:
             yield regime, error
+        except (ValueError, ArithmeticError):  # a matrix with infinite numbers has no poles
+            yield regime, NoLoopError("its numbers are beyond computing")
 
 
 def _rank(use: LoopUse) -> tuple[float, int]:

@@ -1,7 +1,7 @@
 """Margins and poles of the loop: against the engine's own small motions, and against closed forms.
 
-The engine knows nothing of `open_loop`: it steps friction models, sensors, delays and controller one
-by one. Small motions of it are what the linear loop must predict.
+The engine knows nothing of `open_loop`: it steps friction models, sensors, delays and controller
+one by one. Small motions of it are what the linear loop must predict.
 """
 
 from __future__ import annotations
@@ -305,7 +305,7 @@ def test_a_sampled_integrator_late_by_a_share_of_a_sample() -> None:
 
 
 def test_the_sliding_loop_by_hand() -> None:
-    """Ideal current loop and no friction: 180/pi Kpv (1 + 30/s) N Kt / (J s) crosses in closed form.
+    """Ideal current loop, no friction: 180/pi Kpv (1 + 30/s) N Kt / (J s), crossing in closed form.
 
     The shipped current loop is 327 Hz wide and costs little of it.
     """

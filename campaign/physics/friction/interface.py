@@ -62,7 +62,7 @@ class SmallSignal:
     Attributes:
         stuck: as the friction of a bench at rest; None: it holds the load rigidly.
         stuck_compensation: as a compensation at rest, where the rate does not answer within the
-            step; None: its torque jumps with the sign of the rate, and nothing linear stands for it.
+            step; None: its torque jumps with the sign of the rate, which is nothing linear.
         sliding_damping: slope of the torque over the rate far above the Stribeck velocity
             (N m s/rad at the interface).
     """
