@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from campaign.physics.bench import Bench
-from campaign.physics.friction_paths import NoLoopError, Regime
+from campaign.physics.friction import friction_models
+from campaign.physics.friction_paths import NoLoopError, Regime, bench_friction
 from campaign.physics.loop_margins import LoopMargins, Response, margins_of
+from campaign.physics.loops_used import loops_used
 from campaign.physics.open_loop import Mode, OpenLoop, open_loop
+from campaign.physics.variation import of_its_day
 from campaign.signals import Polyline, Sine, Zero
 from tests.physics.benches import DEG, INERTIA, KPV, KT, RATIO, Tree, bench, run, stribeck, task
 
@@ -231,6 +235,88 @@ def test_rigid_undeclared_and_jumping_friction_have_no_linear_loop_when_stuck() 
         open_loop(bench(lambda tree: tree.update(friction={})), "none", "rate", "stuck")
     with pytest.raises(NoLoopError, match="closes no loop"):
         open_loop(bench(), "none", "torque", "sliding")
+
+
+def test_a_friction_model_that_declares_nothing_is_known_only_while_it_slides(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    models = friction_models()
+    silent = replace(models["lugre"], small_signal=None)
+    monkeypatch.setattr(
+        "campaign.physics.friction_paths.friction_models", lambda: {**models, "lugre": silent}
+    )
+    with pytest.raises(NoLoopError, match="'lugre' does not declare"):
+        open_loop(bench(), "none", "rate", "stuck")
+    assert margins_of(open_loop(bench(), "none", "rate", "sliding")).stable
+
+
+def test_the_friction_is_that_of_the_day_and_of_its_side_of_the_gear() -> None:
+    """Stuck on day 7 the bristles are those that `of_its_day` gives; N times counts at the load."""
+
+    def day(tree: Tree) -> None:
+        tree["variation"] = {"seed": 3, "day": 7, "bristle_stiffness": 0.3, "viscous_friction": 0.3}
+
+    today = bench_friction(of_its_day(bench(day)), "stuck")
+    assert today.stiffness != pytest.approx(18000 + RATIO * 1000, rel=1e-3)
+    found = open_loop(bench(day), "none", "rate", "stuck")
+    without = of_its_day(bench(day)).model_copy(update={"variation": None})
+    np.testing.assert_array_equal(found.a, open_loop(without, "none", "rate", "stuck").a)
+    plain = bench_friction(bench(), "stuck")
+    assert plain.stiffness == pytest.approx(18000 + RATIO * 1000)
+    assert plain.damping == pytest.approx(800 + RATIO * 0.5)
+    assert plain.viscous == pytest.approx(4 + RATIO * 0.001)
+    motor = bench(lambda tree: tree["friction"]["motor"].update(velocity="motor"))
+    assert bench_friction(motor, "stuck").stiffness == pytest.approx(18000 + RATIO**2 * 1000)
+
+
+EDITS: dict[str, Edit] = {
+    "inertia": lambda t: t["axis"].update(inertia="30 kg m^2"),
+    "delay": lambda t: t["controller"].update(delay="0.7 ms"),
+    "filter": lambda t: t["controller"].update(relative_rate_filter="4 ms"),
+    "gain": lambda t: t["controller"]["rate"].update(proportional="2 A s/deg"),
+    "gyro": lambda t: t["sensors"]["gyro"].update(delay="3 ms"),
+    "encoder": lambda t: t["sensors"]["encoder"].update(delay="4 ms"),
+    "ratio": lambda t: t["gear"].update(ratio=100.0),
+    "motor": lambda t: t["motor"].update(resistance="0.3 ohm"),
+    "bristles": lambda t: t["friction"]["load"].update(bristle_stiffness="9000 N m/rad"),
+    "model": lambda t: t["compensation"]["lugre"].update(gain=0.4),
+    "appendage": elastic,
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_a_loop_is_computed_once_for_equal_values_and_anew_for_others(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Limits, names and torques decide the size of a motion and not the loop; all else does."""
+    computed = []
+
+    def counting(loop: OpenLoop) -> LoopMargins:
+        computed.append(loop)
+        return margins_of(loop)
+
+    monkeypatch.setattr("campaign.physics.loops_used.margins_of", counting)
+
+    def edit(tree: Tree) -> None:
+        sampled(tree)
+        EDITS[name](tree)
+
+    def same(tree: Tree) -> None:
+        sampled(tree)
+        tree["name"] = "another"
+        tree["limits"]["rate"] = "80 deg/s"
+        tree["friction"]["load"]["coulomb_torque"] = "20 N m"
+
+    moving = task(compensation="lugre")
+    benches = [bench(sampled), bench(sampled), bench(same), bench(edit)]
+    uses = loops_used((i, moving, on) for i, on in enumerate(benches, start=1))
+    assert len(computed) == 4  # stuck and sliding, of two different benches
+    assert {use.trial for use in uses} <= {1, 4}
+    assert [use.margins.tightness for use in uses] == sorted(u.margins.tightness for u in uses)
+    only = loops_used([(9, moving, benches[-1])])
+    for use in uses:
+        again = next(one for one in only if one.regime == use.regime)
+        assert use.margins.tightness <= again.margins.tightness
 
 
 def transfer(*poles: float, gain: float = 1.0) -> OpenLoop:
