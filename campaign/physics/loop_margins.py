@@ -28,8 +28,10 @@ FORGOTTEN = 1e-6
 PER_DECADE = 24
 NEARLY_STILL = 1e-2
 """Times the lowest frequency of the grid: there L is what it is at standstill."""
-BESIDE_POLES = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0])
+BESIDE_POLES = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Grid points beside each oscillating pole, in half-widths of its resonance."""
+NARROWEST = 1e-4
+"""Of its frequency; the half-width of a resonance without damping."""
 LOW_PHASE_MARGIN = math.radians(20.0)
 LOW_GAIN_MARGIN = 3.0
 """dB; below either a loop is stable and hardly so."""
@@ -62,12 +64,13 @@ class LoopMargins:
 
     @property
     def growth(self) -> float:
-        """Real part of the fastest growing pole (1/s); negative when the loop is stable."""
+        """Real part of the fastest growing pole (1/s)."""
         return self.poles[0].real if self.poles else -math.inf
 
     @property
     def stable(self) -> bool:
-        return self.growth < 0
+        # What swings for ever is not unstable for a rounding error.
+        return self.growth < STANDING
 
     @property
     def gain_margin_db(self) -> float | None:
@@ -159,7 +162,8 @@ def frequency_grid(poles: Complex, period: float | None) -> Array:
     low = min(low, 1e-3 * high)
     count = math.ceil(PER_DECADE * math.log10(high / low)) + 1
     oscillating = poles[poles.imag > STANDING]
-    near = oscillating.imag[:, None] + np.abs(oscillating.real)[:, None] * BESIDE_POLES
+    widths = np.maximum(np.abs(oscillating.real), NARROWEST * oscillating.imag)
+    near = oscillating.imag[:, None] + widths[:, None] * BESIDE_POLES
     near = near[(near > low) & (near < high)]
     # The last sampled frequency is Nyquist's, where L is real and may lie on the negative axis.
     return np.unique(np.concatenate([np.geomspace(low, high, count), near.ravel(), [high]]))

@@ -32,6 +32,10 @@ HIGHEST = 60.0
 """dB; above, it is only an integrator."""
 
 
+SHORT_PHASE, SHORT_GAIN = 40.0, 12.0
+"""deg and dB; a shorter arrow has its label below, where a falling curve leaves room."""
+
+
 @dataclass(frozen=True)
 class Trace:
     """One open loop over frequency.
@@ -178,8 +182,9 @@ def _draw_margins(above: Axes, below: Axes, trace: Trace, look: Look) -> None:
         above.plot([at], [0.0], marker="o", markersize=4.5, color=look.light, zorder=3)
         _arrow(below, (at, -180.0), (at, phase))
         text = f"{math.degrees(margins.phase_margin):.0f}°\n{at:.3g} Hz"
-        middle = -180.0 + 0.5 * (phase + 180.0)
-        _label(below, text, (at, middle), _free_side(trace.frequency, trace.phase, at, middle))
+        middle = -180.0 + 0.45 * (phase + 180.0)
+        side = _free_side(trace.frequency, trace.phase, at, middle)
+        _label(below, text, (at, middle), side if phase + 180.0 > SHORT_PHASE else "below")
     if margins.gain_crossing is not None and margins.gain_margin_db is not None:
         at, decibel = margins.gain_crossing / TWO_PI, margins.gain_margin_db
         if trace.frequency[0] <= at <= trace.frequency[-1]:
@@ -189,7 +194,8 @@ def _draw_margins(above: Axes, below: Axes, trace: Trace, look: Look) -> None:
             _arrow(above, (at, -decibel), (at, 0.0))
             middle = -0.25 * decibel
             side = _free_side(trace.frequency, trace.level, at, middle)
-            _label(above, f"{decibel:.1f} dB\n{at:.3g} Hz", (at, middle), side)
+            text = f"{decibel:.1f} dB\n{at:.3g} Hz"
+            _label(above, text, (at, middle), side if decibel > SHORT_GAIN else "below")
 
 
 def _free_side(frequency: Array, value: Array, at: float, middle: float) -> str:
@@ -207,15 +213,16 @@ def _arrow(ax: Axes, begin: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def _label(ax: Axes, text: str, at: tuple[float, float], side: str) -> None:
-    """Beside an arrow, on paper of its own so that no curve runs through it."""
+    """Beside an arrow, or below and left of it, on paper of its own that hides no curve."""
+    right = side == "right"
     ax.annotate(
         text,
         at,
-        xytext=(6 if side == "right" else -6, 0),
+        xytext=(6 if right else -6, -20 if side == "below" else 0),
         textcoords="offset points",
-        ha="left" if side == "right" else "right",
+        ha="left" if right else "right",
         va="center",
         fontsize=8,
         bbox={"facecolor": PAPER.light, "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
-        zorder=4,
+        zorder=1.8,  # over the grid, under the curves
     )

@@ -250,6 +250,19 @@ def test_a_friction_model_that_declares_nothing_is_known_only_while_it_slides(
     assert margins_of(open_loop(bench(), "none", "rate", "sliding")).stable
 
 
+def test_a_resonance_without_damping_is_no_rounding_error() -> None:
+    """It swings for ever by itself, whatever the last digit of its pole says."""
+
+    def undamped(tree: Tree) -> None:
+        tree["appendage"] = {"inertia": "1.3 kg m^2", "frequency": "11 Hz", "damping_ratio": 0.0}
+        tree["friction"] = {}
+
+    on = bench(undamped)
+    assert margins_of(open_loop(on, "none", "rate", "sliding")).stable
+    under_torque = margins_of(open_loop(on, "observer", "torque", "sliding"))
+    assert under_torque.stable
+
+
 def test_the_friction_is_that_of_the_day_and_of_its_side_of_the_gear() -> None:
     """Stuck on day 7 the bristles are those that `of_its_day` gives; N times counts at the load."""
 

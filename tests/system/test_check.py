@@ -9,7 +9,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from campaign.cli.check import check_bench
-from campaign.errors import ExitCode, ProtocolError, UsageError
+from campaign.cli.plan import show_plan
+from campaign.cli.prepare import Request
+from campaign.cli.run import run_protocol
+from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.resources import protocols_folder
 
 PLATFORM = protocols_folder() / "benches" / "platform.toml"
@@ -74,3 +77,33 @@ def test_a_bad_file_is_told_by_line(tmp_path: Path) -> None:
         check_bench("platform", tmp_path / "p.pdf", as_json=False)
     with pytest.raises(UsageError, match="cannot be written"):
         check_bench("platform", tmp_path / "no" / "p.svg", as_json=False)
+
+
+def with_gain(gain: str) -> Request:
+    change = f'stabilization-hardware.bench.controller.rate.proportional="{gain}"'
+    return Request("stabilization_hardware", changes=(change,))
+
+
+def test_plan_and_run_refuse_an_unstable_loop(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    request = with_gain("199.692 A s/deg")
+    with pytest.raises(LimitError, match="A s/deg given as A s/rad"):
+        show_plan(request, tmp_path / "results", as_json=False)
+    assert "loop: UNSTABLE" in capsys.readouterr().out  # it is shown all the same
+    with pytest.raises(LimitError, match="the loop is unstable in 1 test"):
+        run_protocol(request, tmp_path / "results", workers=1, report=False)
+    assert not (tmp_path / "results").exists()
+
+
+def test_plan_tells_the_worst_loop_and_warns_of_a_low_margin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show_plan(with_gain("199.692 A s/rad"), tmp_path, as_json=False)
+    fine = capsys.readouterr()
+    assert "  loop: 5.86 Hz crossover, 69.2 deg, 30.9 dB (observer, sliding)" in fine.out
+    assert "low margin" not in fine.err
+    show_plan(with_gain("5300 A s/rad"), tmp_path, as_json=True)
+    low = capsys.readouterr()
+    assert json.loads(low.out)["tests"][0]["loops"][0]["low_margin"] is True
+    assert low.err.startswith("low margin: stabilization-hardware: ")
