@@ -373,19 +373,45 @@ def test_a_gain_that_may_not_fall_is_a_margin_below_one() -> None:
     assert found.low
 
 
-def test_the_worst_of_several_crossings_counts() -> None:
-    """A resonance near the crossover lifts L over 1 again, late and with hardly any phase left."""
-    resonance = np.array([[0.0, 1.0], [-900.0, -0.3]])  # 30 rad/s, zeta 0.005
-    a = np.zeros((3, 3))
-    a[:2, :2] = resonance
-    a[1, 2] = 900.0
-    found = margins_of(OpenLoop(a, np.array([0.0, 0.0, 0.29]), np.array([1.0, 0.0, 0.0]), None))
-    omega = np.array(found.crossovers)
-    value = 0.29 / (1j * omega) * 900.0 / (900.0 - omega**2 + 0.3j * omega)
+def test_both_ends_of_a_gain_that_may_neither_fall_nor_rise_count() -> None:
+    """k / ((s - 1) (s / 10 + 1)^2) needs 1 < k < 16.2, there at sqrt(80) rad/s; the nearer one."""
+    for gain, margin, at in ((1.25, 1 / 1.25, 0.0), (14.0, 16.2 / 14.0, math.sqrt(80.0))):
+        found = margins_of(transfer(1.0, -10.0, -10.0, gain=100.0 * gain))
+        assert found.stable
+        assert found.gain_margin == pytest.approx(margin, rel=1e-4)
+        assert found.gain_crossing == pytest.approx(at, rel=1e-6, abs=0.01)
+
+
+def test_a_turn_the_other_way_is_a_phase_margin_too() -> None:
+    """50 s^2 / ((s + 1)^2 (s / 100 + 1)) leads by almost half a turn where it first crosses 1."""
+    a = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-100.0, -201.0, -102.0]])
+    found = margins_of(OpenLoop(a, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 5000.0]), None))
+    assert found.stable
+    omega = found.crossovers[0]
+    s = 1j * omega
+    assert abs(50 * s**2 / ((s + 1) ** 2 * (s / 100 + 1))) == pytest.approx(1.0, rel=1e-8)
+    lead = math.pi - 2 * math.atan(omega) - math.atan(omega / 100)
+    assert found.crossover == omega
+    assert found.phase_margin == pytest.approx(math.pi - lead, rel=1e-6)
+    # Only a delay that turns it all the way round does harm there; the last crossing is sooner.
+    assert found.delay_margin is not None
+    assert found.delay_margin < math.pi / found.crossovers[-1]
+
+
+def resonance(gain: float) -> OpenLoop:
+    """gain / s behind 30 rad/s with a damping ratio of 0.005, a peak of 1 % of its frequency."""
+    a = np.array([[0.0, 1.0, 0.0], [-900.0, -0.3, 900.0], [0.0, 0.0, 0.0]])
+    return OpenLoop(a, np.array([0.0, 0.0, gain]), np.array([1.0, 0.0, 0.0]), None)
+
+
+def test_a_narrow_resonance_is_not_stepped_over() -> None:
+    """It lifts L over 1 again; and below that it is the gain margin, 0.3 / gain (Routh)."""
+    omega = np.array(margins_of(resonance(0.6)).crossovers)
+    value = 0.6 / (1j * omega) * 900.0 / (900.0 - omega**2 + 0.3j * omega)
+    assert len(omega) == 3
     np.testing.assert_allclose(np.abs(value), 1.0, rtol=1e-7)
-    assert len(omega) == 1 or found.crossover == omega[np.argmin(np.abs(np.angle(-value)))]
-    assert len(found.crossovers) == (3 if 0.29 / 30 / 0.01 > 1 else 1)
-    assert found.gain_margin == pytest.approx(30.0 * 0.01 / 0.29, rel=1e-6)
+    assert margins_of(resonance(0.29)).gain_margin == pytest.approx(0.3 / 0.29, rel=1e-6)
+    assert not margins_of(resonance(0.31)).stable
 
 
 def test_a_sampled_integrator_late_by_a_share_of_a_sample() -> None:
