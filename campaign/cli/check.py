@@ -13,7 +13,7 @@ from campaign.cli.output import print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import Fact, facts_of
-from campaign.physics.friction_paths import Regime
+from campaign.physics.linear_friction import Regime
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import loops_of
 from campaign.physics.open_loop import Mode

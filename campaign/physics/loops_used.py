@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from campaign.physics.bench import Bench
-from campaign.physics.friction_paths import (
+from campaign.physics.linear_friction import (
     REGIMES,
     NoLoopError,
     Regime,

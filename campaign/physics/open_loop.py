@@ -24,7 +24,7 @@ import numpy as np
 
 from campaign.physics.bench import Bench
 from campaign.physics.compensation.interface import Compensator, LinearBlock
-from campaign.physics.friction_paths import (
+from campaign.physics.linear_friction import (
     FrictionPath,
     NoLoopError,
     Regime,

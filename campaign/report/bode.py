@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from campaign.physics.bench import Bench
-from campaign.physics.friction_paths import REGIMES, NoLoopError, Regime
+from campaign.physics.linear_friction import REGIMES, NoLoopError, Regime
 from campaign.physics.loop_margins import LoopMargins, Response, frequency_grid, margins_of
 from campaign.physics.open_loop import open_loop
 from campaign.report.figures import WIDTH, canvas, to_svg

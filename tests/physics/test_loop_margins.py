@@ -16,7 +16,7 @@ import pytest
 
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
-from campaign.physics.friction_paths import NoLoopError, Regime, bench_friction
+from campaign.physics.linear_friction import NoLoopError, Regime, bench_friction
 from campaign.physics.loop_margins import LoopMargins, Response, margins_of
 from campaign.physics.loops_used import loops_used
 from campaign.physics.open_loop import Mode, OpenLoop, open_loop
@@ -243,7 +243,7 @@ def test_a_friction_model_that_declares_nothing_is_known_only_while_it_slides(
     models = friction_models()
     silent = replace(models["lugre"], small_signal=None)
     monkeypatch.setattr(
-        "campaign.physics.friction_paths.friction_models", lambda: {**models, "lugre": silent}
+        "campaign.physics.linear_friction.friction_models", lambda: {**models, "lugre": silent}
     )
     with pytest.raises(NoLoopError, match="'lugre' does not declare"):
         open_loop(bench(), "none", "rate", "stuck")
