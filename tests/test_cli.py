@@ -23,7 +23,18 @@ from campaign.errors import (
 from campaign.resources import protocols_folder
 
 HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "pint", "scipy", "tree_sitter")
-COMMANDS = ("plan", "run", "calibrate", "report", "list", "show", "verify", "kinds", "init")
+COMMANDS = (
+    "plan",
+    "run",
+    "check",
+    "calibrate",
+    "report",
+    "list",
+    "show",
+    "verify",
+    "kinds",
+    "init",
+)
 
 
 @pytest.mark.parametrize("arguments", [[], *([command] for command in COMMANDS)])

@@ -337,6 +337,29 @@ def verify(
 
 
 @app.command()
+def check(
+    bench: Annotated[
+        str,
+        typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="FILE",
+            help="The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show the loops of a bench, their margins, and whether its sizes fit each other."""
+    from campaign.cli.check import check_bench
+
+    raise typer.Exit(check_bench(bench, output, as_json=as_json))
+
+
+@app.command()
 def device(
     bench: Annotated[
         str,

@@ -15,6 +15,7 @@ from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
 from campaign.protocol import PlannedTest
+from campaign.protocol.loop_check import sought_instability
 from campaign.trial import Trial
 
 GLANCE = 0.2
@@ -35,7 +36,8 @@ def allow_motion(
     """Show in short what `trials` will do to a live bench, and ask whether they may.
 
     Args:
-        tests: with the limits they come close to; may be empty.
+        tests: with the limits they come close to; may be empty. Whether a loop may be made
+            unstable is a question of its own, and the first.
 
     Raises UsageError when there is nobody to ask, and NotStartedError when they may not.
     """
@@ -46,11 +48,20 @@ def allow_motion(
             f"the backend {kind.name!r} moves a real bench, and there is no terminal to ask "
             "whether it may; --yes says so"
         )
+    names = {trial.test for trial in trials}
+    unstable = list(sought_instability([test for test in tests if test.name in names]))
+    for line in unstable:
+        print_note(line, "yellow")
+    if unstable and not yes:
+        _must_agree("It will shake, or run into a limit. Type yes if it may: ")
     for line in motion_summary(kind.name, trials, tests):
         print_note(line)
-    if yes:
-        return
-    print_note("Is the bench clear, and may it move? Type yes to begin: ")
+    if not yes:
+        _must_agree("Is the bench clear, and may it move? Type yes to begin: ")
+
+
+def _must_agree(question: str) -> None:
+    print_note(question)
     if sys.stdin.readline().strip().lower() not in ("yes", "y"):
         raise NotStartedError("not started: nothing has moved and nothing was written")
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from types import FrameType
 
 from campaign.cli.output import print_line, print_note
-from campaign.device.bench_file import load_bench
 from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
 from campaign.device.faults import FaultSpec, parse_faults
 from campaign.device.line import PtyStream, TcpLine
@@ -21,6 +20,7 @@ from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
 from campaign.errors import ExitCode, UsageError
 from campaign.interrupts import unwinding
+from campaign.protocol.bench_file import load_bench
 
 ANY_PORT = "127.0.0.1:0"
 

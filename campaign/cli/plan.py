@@ -15,8 +15,16 @@ from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.experiments.interface import lost_without
 from campaign.policy import Policy, Response
-from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
+from campaign.protocol import (
+    Plan,
+    PlannedTest,
+    as_tree,
+    check_limits,
+    check_loops,
+    low_margins,
+)
 from campaign.protocol.limit_check import in_display_units
+from campaign.protocol.loop_check import in_words
 from campaign.trial import Role, Trial
 
 NOTES = 5
@@ -24,7 +32,7 @@ NOTES = 5
 
 
 def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
-    """Show the plan. Raises LimitError, after showing it, when it would break a limit."""
+    """Show the plan. Raises LimitError, after that, when it breaks a limit or is unstable."""
     prepared = prepare(request)
     backend = prepared.open_backend()  # refuses what it cannot execute; it is not connected
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
@@ -34,6 +42,8 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
     else:
         _print(prepared, results, losses)
     check_limits(prepared.plan)
+    check_loops(prepared.plan)
+    print_low_margins(prepared.plan)
 
 
 def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
@@ -65,6 +75,16 @@ def _print(prepared: Prepared, results: Path, losses: Sequence[Mapping[str, str]
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
         print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+
+
+def print_low_margins(plan: Plan) -> None:
+    """A warning for each test that is stable and hardly so."""
+    for line in low_margins(plan):
+        print_note(line, "yellow")
+
+
+def _sought(test: PlannedTest) -> str:
+    return "; the experiment seeks instability" if test.seeks_instability else ""
 
 
 def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
@@ -125,6 +145,8 @@ def _print_details(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, 
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
     for loss in losses:
         print_line(f"  without {loss['channel']}: no {loss['no']}")
+    if test.loops:
+        print_line(f"  loop: {in_words(test.loops[0])}{_sought(test)}")
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

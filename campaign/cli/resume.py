@@ -12,6 +12,7 @@ from campaign.archive.full_plan import read_full_plan
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
 from campaign.cli.output import print_note
+from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, choose_workers, conduct, print_warning
 from campaign.errors import ExitCode, UsageError
@@ -29,7 +30,7 @@ from campaign.execution.resume import (
 )
 from campaign.options import Options
 from campaign.policy import Policy
-from campaign.protocol import PlannedTest, check_limits
+from campaign.protocol import PlannedTest, check_limits, check_loops
 from campaign.trial import Trial
 
 
@@ -54,7 +55,7 @@ def resume_run(
     report: bool,
     port: str | None,
     yes: bool,
-    clear_stop: int | None,
+    clear_stop: int | None = None,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.
 
@@ -147,6 +148,8 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
             f"({len(plan.trials)}){why}\nstart a new run"
         )
     check_limits(plan)
+    check_loops(plan)
+    print_low_margins(plan)
     changes = changes or trial_differences(run.plan, plan.trials)
     return Remade(
         prepared.kind, prepared.options, plan.trials, plan.tests, plan.policy, tuple(changes)

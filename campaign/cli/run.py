@@ -8,11 +8,12 @@ from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, new_run_name
 from campaign.cli.ask import allow_motion
+from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Prepared, Request, prepare
 from campaign.cli.session import Session, choose_workers, conduct
 from campaign.errors import ExitCode
 from campaign.execution import provenance
-from campaign.protocol import as_tree, check_limits
+from campaign.protocol import as_tree, check_limits, check_loops
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ def run_protocol(
     prepared = prepare(request)
     plan = prepared.plan
     check_limits(plan)
+    check_loops(plan)
+    print_low_margins(plan)
     workers = choose_workers(prepared.kind, len(plan.trials), workers)
     backend = prepared.open_backend()
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)

@@ -68,6 +68,8 @@ class Experiment:
             for. A `TrialRequest` says so where its trial requires only some of them.
         can_use: names of further channels, and what there is none of without them, in words that
             go on after "no": `figure of the command`.
+        seeks_instability: it goes to where a loop is unstable, to find out where that is; the plan
+            of any other test with an unstable loop is refused.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Experiment:
     analyse: Callable[[TestData], Result]
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
+    seeks_instability: bool = False
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:

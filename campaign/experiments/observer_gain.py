@@ -390,4 +390,6 @@ EXPERIMENT = Experiment(
         LOAD_RATE: 'what the noise of the gyro does to the load; noise_time = "0 s" does without',
     },
     can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
+    # Where the gain makes the loop unstable is one of its results.
+    seeks_instability=True,
 )

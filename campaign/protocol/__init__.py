@@ -1,9 +1,10 @@
-"""TOML to Protocol to Plan: `load_protocol`, `make_plan`, `check_limits`."""
+"""TOML to Protocol to Plan: `load_protocol`, `make_plan`, `check_limits`, `check_loops`."""
 
 from __future__ import annotations
 
 from campaign.protocol.limit_check import check_limits
 from campaign.protocol.load import load_protocol
+from campaign.protocol.loop_check import check_loops, low_margins
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest, make_plan
 from campaign.protocol.plan_tree import as_tree
 from campaign.protocol.schema import ExperimentKind, Protocol, ProtocolFile, TestEntry
@@ -18,6 +19,8 @@ __all__ = [
     "TestEntry",
     "as_tree",
     "check_limits",
+    "check_loops",
     "load_protocol",
+    "low_margins",
     "make_plan",
 ]

@@ -10,6 +10,7 @@ from typing import Any
 
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.limits import Margin, margins
+from campaign.physics.loops_used import LoopUse, loops_used
 from campaign.policy import Policy
 from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.check_trials import nothing_to_check, with_checks
@@ -48,6 +49,9 @@ class PlannedTest:
         matrix: swept path to its values, normalised (SI).
         numbers: of its trials, in the order of execution.
         closest: for each limit the trial that uses most of it.
+        loops: of each compensation, mode and regime the loop with the least margin, the worst
+            first; none where nothing closes one.
+        seeks_instability: whether its experiment goes to where a loop is unstable.
         duration: bench time (s).
     """
 
@@ -64,6 +68,8 @@ class PlannedTest:
     repeat: int
     numbers: tuple[int, ...]
     closest: tuple[LimitUse, ...]
+    loops: tuple[LoopUse, ...]
+    seeks_instability: bool
     duration: float
 
 
@@ -239,6 +245,11 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         repeat=entry.repeat,
         numbers=tuple(trial.number for trial in expanded.trials),
         closest=tuple(closest.values()),
+        loops=loops_used(
+            (trial.number, trial.task, bench)
+            for trial, bench in zip(expanded.trials, expanded.benches, strict=True)
+        ),
+        seeks_instability=test.experiment.seeks_instability,
         duration=sum(trial.task.duration for trial in expanded.trials),
     )
 

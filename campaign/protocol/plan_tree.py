@@ -8,8 +8,13 @@ from typing import Any
 from pydantic import JsonValue
 
 from campaign.physics.limits import Margin
+from campaign.physics.loop_margins import LoopMargins
+from campaign.physics.loops_used import LoopUse
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest
 from campaign.trial import Trial
+
+POLES = 8
+"""of each loop that are told, the fastest growing first."""
 
 
 def as_tree(plan: Plan) -> dict[str, Any]:
@@ -53,6 +58,8 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "trials": list(test.numbers),
         "duration_s": test.duration,
         "limits": [_use(use) for use in test.closest],
+        "loops": [{"trial": use.trial, **loop_tree(use)} for use in test.loops],
+        "seeks_instability": test.seeks_instability,
     }
 
 
@@ -86,6 +93,35 @@ def _use(use: LimitUse) -> dict[str, JsonValue]:
         "unit": margin.unit,
         "fraction": _finite(margin.fraction),
         "broken": margin.broken,
+    }
+
+
+def loop_tree(use: LoopUse) -> dict[str, JsonValue]:
+    """A loop with its margins; null where there is no such crossing."""
+    return {
+        "compensation": use.compensation,
+        "mode": use.mode,
+        "regime": use.regime,
+        **margins_tree(use.margins),
+    }
+
+
+def margins_tree(margins: LoopMargins) -> dict[str, JsonValue]:
+    """Margins and poles, SI; an unstable loop has no margins."""
+    margin: dict[str, JsonValue] = {
+        "phase_margin_rad": margins.phase_margin,
+        "gain_margin": margins.gain_margin,
+        "gain_crossing_rad_s": margins.gain_crossing,
+        "delay_margin_s": margins.delay_margin,
+    }
+    return {
+        "stable": margins.stable,
+        "low_margin": margins.low,
+        "crossovers_rad_s": list(margins.crossovers),
+        "crossover_rad_s": margins.crossover,
+        **(margin if margins.stable else dict.fromkeys(margin)),
+        "growth_1_s": _finite(margins.growth),
+        "poles_1_s": [[pole.real, pole.imag] for pole in margins.poles[:POLES]],
     }
 
 

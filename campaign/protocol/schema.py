@@ -44,6 +44,9 @@ class ExperimentKind(typing.Protocol):
     @property
     def can_use(self) -> Mapping[str, str]: ...
 
+    @property
+    def seeks_instability(self) -> bool: ...
+
 
 class OperatorEntry(Options):
     """One `[[test.operator]]`: what a person must do to the bench."""

@@ -1,4 +1,5 @@
-"""What happened besides the plan: decisions, steps by hand, attempts, faults, drift of the checks.
+"""What happened besides the plan: decisions, steps by hand, attempts, faults, drift of the checks,
+and loops that were close to instability.
 
 The journal and the trials tell it; nothing is left for the reader of a plain simulated run.
 """
@@ -15,6 +16,7 @@ from campaign.archive.story import Lines, read_lines
 from campaign.report import page, tables
 from campaign.report.drift import drift_figure, drift_table, drifts_of
 from campaign.report.figures import draw
+from campaign.report.low_margins import low_margin_table
 from campaign.result import Column, Figure, Table, Value
 
 
@@ -34,11 +36,12 @@ def besides(run: RunReader, folder: page.Folder) -> Besides:
     """All there is to say, numbered after what `folder` already has."""
     told = read_lines(run.journal.encode())
     drifts, problems = drifts_of(run)
-    found = [_decisions(told), _steps(told), _attempts(told), _faults(run)]
+    loops, loop_problems = low_margin_table(run)
+    found = [_decisions(told), _steps(told), _attempts(told), _faults(run), loops]
     found += [drift_table(drift) for drift in drifts]
     shown = tuple(_shown(table, folder) for table in found if table.rows)
     figures = tuple(_drawn(drift_figure(drift), folder) for drift in drifts)
-    return Besides(figures, shown, tuple(problems))
+    return Besides(figures, shown, (*problems, *loop_problems))
 
 
 def _drawn(figure: Figure, folder: page.Folder) -> page.ShownFigure:

@@ -12,8 +12,8 @@ import pytest
 from campaign.backends.serial import BACKEND, SerialBackend, SerialOptions
 from campaign.backends.sim import BACKEND as SIM
 from campaign.backends.sim import SimOptions
-from campaign.device.bench_file import load_bench
 from campaign.errors import UsageError
+from campaign.protocol.bench_file import load_bench
 from campaign.signals import Polyline, Sine
 from campaign.trial import (
     Ending,

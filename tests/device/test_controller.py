@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.device.bench_file import load_bench
 from campaign.device.controller import Controller
 from campaign.device.faults import parse_faults
 from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
+from campaign.protocol.bench_file import load_bench
 from campaign.signals import Sine
 from campaign.trial import MemoryRecorder, Task, Trial
 from campaign.wire.codes import Fault, NakCode, Outcome, State

@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 
-from campaign.device.bench_file import load_bench
 from campaign.device.faults import parse_faults
 from campaign.device.line import TcpLine
 from campaign.device.machine import Setup
 from campaign.device.server import Server
 from campaign.errors import UsageError
+from campaign.protocol.bench_file import load_bench
 from campaign.signals import Sine
 from campaign.trial import Task, Trial
 from campaign.wire.codes import Fault, Outcome, State

@@ -90,6 +90,7 @@ class Kind:
     trials: Callable[[Any, Bench], Iterator[TrialRequest]]
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
+    seeks_instability: bool = False
 
 
 KINDS = {

@@ -10,7 +10,14 @@ import pytest
 from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.experiments import experiments
 from campaign.experiments.common import with_changes
-from campaign.protocol import as_tree, check_limits, load_protocol, make_plan
+from campaign.protocol import (
+    as_tree,
+    check_limits,
+    check_loops,
+    load_protocol,
+    low_margins,
+    make_plan,
+)
 from campaign.trial import Role, Trial
 
 from .conftest import KINDS, SHIPPED
@@ -179,6 +186,8 @@ def test_every_broken_limit_is_named_with_value_and_bound(desk) -> None:
 def test_shipped_protocols_can_be_executed_within_the_limits(path) -> None:
     plan = make_plan(load_protocol(path, experiments(), shipped=SHIPPED))
     check_limits(plan)
+    check_loops(plan)
+    assert not list(low_margins(plan))
     nothing_published = {"ship_motion"}
     assert path.stem in nothing_published or any(test.reproduces for test in plan.tests)
 
@@ -257,3 +266,81 @@ def test_no_archive_is_larger_than_the_plan_says(desk, tmp_path) -> None:
         recorder.finish(Ending(Outcome.COMPLETED), now, now)
     written = writer.seal(RunStatus.COMPLETE, ended=now).stat().st_size
     assert 0.8 * plan.size < written <= plan.size
+
+
+# The loops.
+
+WRONG = 'stab.bench.controller.rate.proportional="11441.5 A s/rad"'
+STABILIZATION = (
+    '[[test]]\nname = "stab"\nkind = "stabilization"\nbench = "platform.toml"\n'
+    'compensation = "lugre"\n'
+)
+
+
+def shipped_plan(desk, text: str, *overrides: str):
+    desk.write("platform.toml", (SHIPPED / "benches" / "platform.toml").read_text())
+    path = desk.write("own.toml", text)
+    return make_plan(load_protocol(path, experiments(), overrides=overrides, shipped=SHIPPED))
+
+
+def test_a_plan_knows_the_loop_of_every_compensation_and_regime(desk) -> None:
+    (test,) = shipped_plan(desk, STABILIZATION).tests
+    assert {(use.compensation, use.mode, use.regime) for use in test.loops} == {
+        ("lugre", "rate", "stuck"),
+        ("lugre", "rate", "sliding"),
+    }
+    assert all(use.margins.stable and not use.margins.low for use in test.loops)
+    tightness = [use.margins.tightness for use in test.loops]
+    assert tightness == sorted(tightness)
+
+
+def test_a_gain_in_amperes_per_degree_taken_for_radians_is_refused(desk) -> None:
+    """199.692 A s/rad, typed as if it were A s/deg: 57.3 times too much."""
+    plan = shipped_plan(desk, STABILIZATION, WRONG)
+    check_limits(plan)  # no motion that is commanded tells
+    with pytest.raises(LimitError) as caught:
+        check_loops(plan)
+    message = str(caught.value)
+    assert caught.value.exit_code is ExitCode.LIMIT_OR_FAULT
+    assert "stab: UNSTABLE" in message
+    assert "(lugre, " in message
+    assert "in trial-00001" in message
+    assert "platform.toml" in message
+    assert "A s/deg given as A s/rad?" in message
+    assert "campaign check" in message
+
+
+def test_an_experiment_that_seeks_instability_may_have_it(desk) -> None:
+    text = STABILIZATION.replace('kind = "stabilization"', 'kind = "sensitivity"')
+    plan = shipped_plan(desk, text, WRONG)
+    assert not plan.tests[0].loops[0].margins.stable
+    check_loops(plan)
+    tree = as_tree(plan)["tests"][0]
+    assert tree["seeks_instability"] is True
+    assert tree["loops"][0]["stable"] is False
+    assert tree["loops"][0]["phase_margin_rad"] is None
+
+
+def test_a_low_margin_is_told_and_not_refused(desk) -> None:
+    low = 'stab.bench.controller.rate.proportional="5300 A s/rad"'  # 2.5 dB below the limit
+    plan = shipped_plan(desk, STABILIZATION, low)
+    check_loops(plan)
+    (line,) = low_margins(plan)
+    assert "stab" in line
+    assert "20 deg or 3 dB" in line
+    assert not list(low_margins(shipped_plan(desk, STABILIZATION)))
+
+
+def test_what_has_no_motor_has_no_loop(desk) -> None:
+    path = SHIPPED / "friction_behaviour.toml"
+    plan = make_plan(load_protocol(path, experiments(), shipped=SHIPPED))
+    assert all(not test.loops for test in plan.tests)
+
+
+def test_a_swept_gain_is_found_at_the_trial_that_has_it(desk) -> None:
+    text = STABILIZATION + (
+        '[test.matrix]\n"bench.controller.rate.proportional" = ["100 A s/rad", "9000 A s/rad"]\n'
+    )
+    (test,) = shipped_plan(desk, text).tests
+    assert test.loops[0].trial == 2
+    assert not test.loops[0].margins.stable

@@ -12,6 +12,7 @@ from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.journal import Decision, OperatorStep
 from campaign.report.besides import besides
 from campaign.report.drift import drift_table, drifts_of
+from campaign.report.low_margins import low_margin_table
 from campaign.report.page import Folder
 from campaign.trial import Channel, Ending, Fault, Outcome, Recording, Role
 
@@ -73,3 +74,47 @@ def test_the_drift_of_the_checks(made_up: ModuleType, tmp_path: object) -> None:
     assert np.allclose(changes, [0, 1.21 / 1.01 - 1, 1.42 / 1.01 - 1], rtol=1e-6)
     found = besides(run, Folder())
     assert len(found.figures) == len(found.tables) == 1
+
+
+def with_gain(run: RunReader, factor: float) -> RunReader:
+    """The run as if its rate controller's gain had been `factor` times what it was."""
+    from campaign.experiments.interface import bench_of
+
+    trials = []
+    for item in run.trials:
+        bench = bench_of(item.trial).model_dump(mode="json")
+        bench["controller"]["rate"]["proportional"] *= factor
+        trials.append(replace(item, trial=item.trial.model_copy(update={"bench": bench})))
+    return replace(run, trials=tuple(trials))
+
+
+def on_platform(made_up: ModuleType, folder: object) -> RunReader:
+    from campaign.protocol.bench_file import load_bench
+
+    return made_up.made_up_run(folder, bench=load_bench("platform"))
+
+
+def test_loops_with_little_margin_are_told(made_up: ModuleType, tmp_path: object) -> None:
+    """30.8 dB: 26 times the gain leaves 2.5 dB, 57.3 times is unstable, and once is fine."""
+    run = on_platform(made_up, tmp_path)
+    assert not low_margin_table(run)[0].rows
+    table, problems = low_margin_table(with_gain(run, 26.0))
+    assert not problems
+    assert {row["state"] for row in table.rows} == {"low margin"}
+    assert all(2.0 < float(str(row["gain"])) < 3.0 for row in table.rows)
+    folder = Folder()
+    assert besides(with_gain(run, 57.3), folder)
+    rows = folder.files["tables/besides-low-margins.csv"].splitlines()[1:]
+    assert rows
+    assert all("unstable" in row for row in rows)
+
+
+def test_a_bench_that_cannot_be_read_is_a_problem_and_no_more(
+    made_up: ModuleType, tmp_path: object
+) -> None:
+    run = made_up.made_up_run(tmp_path)
+    broken = run.trials[0].trial.model_copy(update={"bench": {"name": "of a later version"}})
+    run = replace(run, trials=(replace(run.trials[0], trial=broken), *run.trials[1:]))
+    table, problems = low_margin_table(run)
+    assert not table.rows
+    assert problems[0].startswith("the loops of ")

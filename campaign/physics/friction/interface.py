@@ -42,6 +42,38 @@ class FrictionOptions(Options):
 
 
 @dataclass(frozen=True)
+class Presliding:
+    """Friction of a stuck interface, linear in small motions: T = stiffness q + damping dq/dt.
+
+    Attributes:
+        stiffness: N m/rad at the interface.
+        damping: N m s/rad at the interface, besides the viscous part.
+    """
+
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class SmallSignal:
+    """How a friction model answers small motions: what the margins of a loop are computed from.
+
+    The viscous part, `FrictionModel.viscous`, comes on top of everything here.
+
+    Attributes:
+        stuck: as the friction of a bench at rest; None: it holds the load rigidly.
+        stuck_compensation: as a compensation at rest, where the rate does not answer within the
+            step; None: its torque jumps with the sign of the rate, which is nothing linear.
+        sliding_damping: slope of the torque over the rate far above the Stribeck velocity
+            (N m s/rad at the interface).
+    """
+
+    stuck: Presliding | None
+    stuck_compensation: Presliding | None
+    sliding_damping: float = 0.0
+
+
+@dataclass(frozen=True)
 class FrictionModel:
     """A friction model.
 
@@ -57,6 +89,8 @@ class FrictionModel:
             part included.
         changeable: the options of its own that scatter and preload may change; None for every
             option of its own with a physical unit.
+        small_signal: its answer to small motions, from validated options; None: not declared, and
+            the loop of a bench with it is known only while it slides.
     """
 
     name: str
@@ -97,3 +131,4 @@ def _quantity_of(field: FieldInfo) -> Quantity | None:
         if get_origin(member) is Annotated and get_args(member)[0] is float:
             return next((m for m in get_args(member) if isinstance(m, Quantity)), None)
     return None
+    small_signal: Callable[[Any], SmallSignal] | None = None

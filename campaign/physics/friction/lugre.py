@@ -14,7 +14,13 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
+from campaign.physics.friction.interface import (
+    Array,
+    FrictionModel,
+    FrictionOptions,
+    Presliding,
+    SmallSignal,
+)
 from campaign.physics.friction.stribeck import (
     CURVE,
     NegativeDirection,
@@ -78,6 +84,12 @@ def _step(
     line[1] = stiffness * change
 
 
+def _small_signal(options: LuGreOptions) -> SmallSignal:
+    """At rest dz/dt = v: a spring and a damper. In fast sliding z = s(v) / sigma0 stays put."""
+    bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
+    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
+
+
 FRICTION = FrictionModel(
     name="lugre",
     summary="dynamic: bristles with presliding, Stribeck effect and friction lag (Eq. 4.2 to 4.4)",
@@ -88,4 +100,5 @@ FRICTION = FrictionModel(
     viscous=mean_viscous,
     steady_state=steady_state,
     changeable=(*CURVE, "bristle_stiffness", "bristle_damping"),
+    small_signal=_small_signal,
 )

@@ -14,7 +14,13 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions
+from campaign.physics.friction.interface import (
+    Array,
+    FrictionModel,
+    FrictionOptions,
+    Presliding,
+    SmallSignal,
+)
 from campaign.units import AngularRate, RotationalDamping, Torque
 
 CURVE = (
@@ -152,6 +158,17 @@ def _step(
     line[1] = 0.0
 
 
+def _small_signal(options: StribeckOptions) -> SmallSignal:
+    """Rigid at rest. A compensation climbs with the slope of tanh, or jumps where that is a sign.
+
+    The slope is the mean of both directions, which differ only where their static torques do.
+    """
+    static = 0.5 * sum(in_direction(options, "static_torque", sign) for sign in (+1.0, -1.0))
+    smooth = options.sign_smoothing
+    slope = Presliding(0.0, static / smooth) if smooth > 0.0 else None
+    return SmallSignal(stuck=None, stuck_compensation=slope)
+
+
 FRICTION = FrictionModel(
     name="stribeck",
     summary="static: Coulomb, Stribeck and viscous friction (Eq. 4.6)",
@@ -162,4 +179,5 @@ FRICTION = FrictionModel(
     viscous=mean_viscous,
     steady_state=steady_state,
     changeable=CURVE,
+    small_signal=_small_signal,
 )

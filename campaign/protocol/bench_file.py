@@ -1,4 +1,4 @@
-"""The bench that a rehearsal controller stands in front of, from its TOML file."""
+"""A bench on its own, from its TOML file or by the name of a shipped one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def load_bench(written: str) -> Bench:
     try:
         source = read_source(file, written)
     except UnreadableError as error:
-        raise UsageError(f"--bench {written}: {error}") from None
+        raise UsageError(f"{written}: {error}") from None
     if not isinstance(source, Source):
         raise ProtocolError(source)
     bench = validate(Bench, source.tree, Within(source))
@@ -38,6 +38,4 @@ def _find(written: str) -> Path:
         return shipped[written]
     close = difflib.get_close_matches(written, shipped, n=1)
     hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(sorted(shipped))}"
-    raise UsageError(
-        f"--bench {written}: no shipped bench of that name; {hint} (or name a .toml file)"
-    )
+    raise UsageError(f"{written}: no shipped bench of that name; {hint} (or name a .toml file)")

@@ -1,0 +1,190 @@
+"""`campaign check`: the loops of a bench, and what else to know of it before anything moves."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from campaign.cli.output import print_line, print_note, print_table
+from campaign.errors import ExitCode, UsageError
+from campaign.physics.bench import Bench
+from campaign.physics.bench_facts import Fact, facts_of
+from campaign.physics.linear_friction import Regime
+from campaign.physics.loop_margins import LoopMargins
+from campaign.physics.loops_used import loops_of
+from campaign.physics.open_loop import Mode
+from campaign.protocol.bench_file import load_bench
+from campaign.protocol.plan_tree import margins_tree
+from campaign.report.text import number
+from campaign.units import convert
+
+TWO_PI = 2.0 * math.pi
+HEADINGS = (
+    "command",
+    "compensation",
+    "friction",
+    "crossover",
+    "phase margin",
+    "gain margin",
+    "delay margin",
+    "fastest pole",
+    "least damped",
+    "verdict",
+)
+
+
+@dataclass(frozen=True)
+class CheckedLoop:
+    """One loop of a bench; without margins `why` says that there is no linear one."""
+
+    compensation: str
+    mode: Mode
+    regime: Regime
+    margins: LoopMargins | None
+    why: str = ""
+
+    @property
+    def verdict(self) -> str:
+        if self.margins is None:
+            return f"no linear loop: {self.why}"
+        if not self.margins.stable:
+            return "UNSTABLE"
+        return "low margin" if self.margins.low else "fine"
+
+
+def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode:
+    """Print loops and facts of a bench and draw its Bode picture.
+
+    Raises UsageError when the picture cannot be written, and what `load_bench` raises.
+    """
+    bench = load_bench(written)
+    picture = output or Path(f"{Path(written).stem}-check.svg")
+    loops, facts = list(loops_checked(bench)), facts_of(bench)
+    _write_picture(bench, picture)
+    if as_json:
+        tree = {"bench": bench.name, **_tree(loops, facts), "picture": str(picture)}
+        print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        _print(bench, loops, facts)
+        print_line(f"Bode picture: {picture}")
+    unstable = [loop for loop in loops if loop.verdict == "UNSTABLE"]
+    if unstable:
+        one = unstable[0]
+        print_note(
+            f"unstable: {one.compensation}, {one.regime}, under a {one.mode} command"
+            f"{f', and {len(unstable) - 1} more' if len(unstable) > 1 else ''}",
+            "red",
+        )
+    return ExitCode.LIMIT_OR_FAULT if unstable else ExitCode.DONE
+
+
+def loops_checked(bench: Bench) -> Iterator[CheckedLoop]:
+    """Every loop there can be: each compensation, stuck and sliding, under either command."""
+    commands: tuple[tuple[Mode, Iterable[str]], ...] = (
+        ("rate", ("none", *bench.compensation)),
+        ("torque", bench.compensation),
+    )
+    for mode, names in commands:
+        for name in names:
+            for regime, found in loops_of(bench, name, mode):
+                if isinstance(found, LoopMargins):
+                    yield CheckedLoop(name, mode, regime, found)
+                else:
+                    yield CheckedLoop(name, mode, regime, None, str(found))
+
+
+def _write_picture(bench: Bench, path: Path) -> None:
+    from campaign.report.bode import bode_png, bode_svg
+
+    suffix = path.suffix.lower()
+    if suffix not in (".svg", ".png"):
+        raise UsageError(f"--output {path}: a picture's name ends in .svg or .png")
+    names = ("none", *bench.compensation)
+    try:
+        if suffix == ".png":
+            path.write_bytes(bode_png(bench, names))
+        else:
+            path.write_text(bode_svg(bench, names), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise UsageError(f"--output {path}: cannot be written: {error.strerror}") from None
+
+
+def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:
+    print_line(f"{bench.name}{f': {bench.description}' if bench.description else ''}")
+    print_line()
+    print_table(HEADINGS, [_loop_row(loop) for loop in loops])
+    print_line()
+    headings = ("what against what", "is", "of", "share", "verdict", "what to do")
+    print_table(headings, [_fact_row(fact) for fact in facts])
+    print_line()
+
+
+def _loop_row(loop: CheckedLoop) -> tuple[str, ...]:
+    margins = loop.margins
+    place = (loop.mode, loop.compensation, loop.regime)
+    if margins is None:
+        return (*place, *(["–"] * 6), loop.verdict)
+    fastest = f"{number(margins.growth, 3)} 1/s" if margins.poles else "–"
+    poles = (fastest, _damping(margins.least_damped))
+    if not margins.stable:
+        return (*place, *(["–"] * 4), *poles, loop.verdict)
+    return (
+        *place,
+        _shown(margins.crossover, 1.0 / TWO_PI, "Hz"),
+        _shown(margins.phase_margin, 180.0 / math.pi, "deg"),
+        _shown(margins.gain_margin_db, 1.0, "dB"),
+        _shown(margins.delay_margin, 1e3, "ms"),
+        *poles,
+        loop.verdict,
+    )
+
+
+def _shown(value: float | None, factor: float, unit: str) -> str:
+    return "–" if value is None else f"{number(round(value * factor, 3), 3)} {unit}"
+
+
+def _damping(pole: complex | None) -> str:
+    """E.g. `ζ 0.029 at 10.9 Hz`."""
+    if pole is None:
+        return "–"
+    return f"ζ {-pole.real / abs(pole):.2g} at {abs(pole) / TWO_PI:.3g} Hz"
+
+
+def _fact_row(fact: Fact) -> tuple[str, ...]:
+    value, against = (
+        f"{number(convert(x, fact.unit, fact.display), 3)} {fact.display}"
+        for x in (fact.value, fact.against)
+    )
+    share = f"{number(100.0 * fact.share, 2)} %"
+    return (fact.subject, value, against, share, fact.verdict, fact.advice)
+
+
+def _tree(loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> dict[str, Any]:
+    return {
+        "loops": [
+            {
+                "compensation": loop.compensation,
+                "mode": loop.mode,
+                "regime": loop.regime,
+                "verdict": loop.verdict,
+                **({} if loop.margins is None else margins_tree(loop.margins)),
+            }
+            for loop in loops
+        ],
+        "facts": [
+            {
+                "subject": fact.subject,
+                "value": fact.value,
+                "against": fact.against,
+                "unit": fact.unit,
+                "share": fact.share,
+                "verdict": fact.verdict,
+                "advice": fact.advice,
+            }
+            for fact in facts
+        ],
+    }

@@ -1,0 +1,229 @@
+"""What somebody new to a bench should know before trusting it: sizes that have to fit each other.
+
+Each fact sets one size against another of the same unit, the smaller the share the better: a count
+against what has to be resolved, friction against what drives, one bandwidth against the next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.physics.limits import worst_friction
+from campaign.physics.loop import at_load
+from campaign.physics.loop_margins import LoopMargins
+from campaign.physics.loops_used import loops_of
+from campaign.physics.variation import of_its_day
+
+SLOW = 1e-9
+"""rad/s; friction at this rate is that of the onset of sliding."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One size against another.
+
+    Attributes:
+        subject: what against what.
+        value, against: in `unit`, SI; their share is small on a good bench.
+        display: the unit that a reader is shown.
+        verdict: `fine`, or a word for what it is instead.
+        advice: what to do; empty when it is fine.
+    """
+
+    subject: str
+    value: float
+    against: float
+    unit: str
+    display: str
+    verdict: str
+    advice: str
+
+    @property
+    def share(self) -> float:
+        return self.value / self.against
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Shares up to which something is fine, and up to which it is usable; words for the rest."""
+
+    fine: float
+    usable: float
+    words: tuple[str, str]
+    advice: str
+
+    def __call__(self, subject: str, value: float, against: float, unit: str, display: str) -> Fact:
+        share = value / against
+        if share <= self.fine:
+            return Fact(subject, value, against, unit, display, "fine", "")
+        word = self.words[0] if share <= self.usable else self.words[1]
+        return Fact(subject, value, against, unit, display, word, self.advice)
+
+
+_COARSE = ("coarse", "too coarse")
+_READING = _Scale(1e-3, 2e-2, _COARSE, "Take a sensor with a finer resolution.")
+_RATE_STEP = _Scale(
+    0.02,
+    0.5,
+    _COARSE,
+    "One count ends a trial, or nearly: raise controller.relative_rate_filter or limits.rate, or "
+    "take a finer sensor.",
+)
+_PRESLIDING = _Scale(
+    0.05,
+    0.2,
+    _COARSE,
+    "Stiffness found in so few counts is guesswork: take a finer sensor, or the motor's.",
+)
+_STRIBECK_GYRO = _Scale(
+    0.05, 0.5, _COARSE, "The Stribeck curve is lost between counts: take a finer gyro."
+)
+_STRIBECK_RATE = _Scale(
+    0.2,
+    1.0,
+    _COARSE,
+    "Compensation sees its rate in steps like the Stribeck velocity: raise "
+    "controller.relative_rate_filter, or take a finer sensor.",
+)
+_TORQUE = _Scale(
+    0.5, 0.9, ("tight", "too small"), "Little is left to move the load: raise the limit."
+)
+_AUTHORITY = _Scale(
+    0.1,
+    0.5,
+    ("weak", "too weak"),
+    "The load stays stuck until the integral has grown: raise controller.rate.proportional.",
+)
+_SAMPLING = _Scale(
+    1 / 20,
+    1 / 8,
+    ("slow", "too slow"),
+    "Sampling costs phase: raise controller.sample_rate, or lower the rate controller's gain.",
+)
+_CURRENT_LOOP = _Scale(
+    1 / 5,
+    1 / 2,
+    ("slow", "too slow"),
+    "The current loop costs phase: raise its gains, or lower the rate controller's.",
+)
+
+
+def facts_of(bench: Bench) -> tuple[Fact, ...]:
+    """All that can be told of this bench, on its day; what it does not have is left out."""
+    today = of_its_day(bench)
+    return (*_sensors(today), *_presliding(today), *_torques(today), *_bandwidths(bench))
+
+
+def current_bandwidth(bench: Bench) -> float:
+    """Frequency (rad/s) at which i / i* falls by 3 dB with the motor held still.
+
+    (Kpc s + Kic) / (L s^2 + (R + Kpc) s + Kic), from |i / i*|^2 = 1/2, quadratic in omega^2.
+    """
+    gains, motor = bench.controller.current, bench.motor
+    p, i = gains.proportional, gains.integral_gain
+    a = motor.inductance**2
+    b = (motor.resistance + p) ** 2 - 2.0 * motor.inductance * i - 2.0 * p**2
+    c = -(i**2)
+    if i == 0.0:  # its gain at rest is p / (R + p), and so is what it falls from
+        return (motor.resistance + p) / motor.inductance
+    return math.sqrt((-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a))
+
+
+def rate_steps(bench: Bench) -> dict[str, float]:
+    """The rate at the load (rad/s) that one count of encoder or resolver looks like in one sample.
+
+    Behind the low-pass of the relative rate. Empty for a controller that sees everything exactly.
+    """
+    gains, sensors = bench.controller, bench.sensors
+    if gains.sample_rate is None:
+        return {}
+    low_pass = gains.relative_rate_filter
+    passed = -math.expm1(-1.0 / (gains.sample_rate * low_pass)) if low_pass > 0 else 1.0
+    counts = {
+        "encoder": sensors.encoder.resolution,
+        "resolver": sensors.resolver.resolution / bench.gear.ratio,
+    }
+    return {name: passed * gains.sample_rate * count for name, count in counts.items() if count > 0}
+
+
+def _sensors(bench: Bench) -> Iterator[Fact]:
+    gyro, current, limits = bench.sensors.gyro, bench.sensors.current, bench.limits
+    slowest = min(_values(bench, "stribeck_velocity"), default=None)
+    if gyro.resolution > 0:
+        subject = "one count of the gyro against the rate limit"
+        yield _READING(subject, gyro.resolution, limits.rate, "rad/s", "deg/s")
+    if current.resolution > 0:
+        subject = "one count of the current sensor against the current limit"
+        yield _READING(subject, current.resolution, limits.current, "A", "A")
+    for name, step in rate_steps(bench).items():
+        subject = f"one count of the {name} in one sample against the rate limit"
+        yield _RATE_STEP(subject, step, limits.rate, "rad/s", "deg/s")
+    if slowest is None:
+        return
+    seen = math.hypot(gyro.resolution, gyro.noise)
+    if seen > 0:
+        subject = "gyro resolution and noise against the Stribeck velocity"
+        yield _STRIBECK_GYRO(subject, seen, slowest, "rad/s", "deg/s")
+    for name, step in rate_steps(bench).items():
+        subject = f"one count of the {name} in one sample against the Stribeck velocity"
+        yield _STRIBECK_RATE(subject, step, slowest, "rad/s", "deg/s")
+
+
+def _presliding(bench: Bench) -> Iterator[Fact]:
+    """One count of the finer angle sensor against Ts / sigma0 of each interface, at the load."""
+    counts = {
+        "encoder": bench.sensors.encoder.resolution,
+        "resolver": bench.sensors.resolver.resolution / bench.gear.ratio,
+    }
+    counts = {name: count for name, count in counts.items() if count > 0}
+    if not counts:
+        return
+    finer = min(counts, key=lambda name: counts[name])
+    for name, options in bench.friction.items():
+        declared = friction_models()[options.model].small_signal
+        stuck = None if declared is None else declared(options).stuck
+        static = getattr(options, "static_torque", None)
+        if stuck is None or stuck.stiffness <= 0 or not static:
+            continue
+        span = static / stuck.stiffness / at_load(options, bench)[1]
+        subject = f"one count of the {finer} against the presliding Ts/σ0 of '{name}'"
+        yield _PRESLIDING(subject, counts[finer], span, "rad", "deg")
+
+
+def _torques(bench: Bench) -> Iterator[Fact]:
+    static = worst_friction(bench, SLOW)
+    if static <= 0:
+        return
+    limits, per_ampere = bench.limits, bench.torque_per_current
+    yield _TORQUE("static friction against the torque limit", static, limits.torque, "N m", "N m")
+    subject = "static friction against the torque at the current limit"
+    yield _TORQUE(subject, static, per_ampere * limits.current, "N m", "N m")
+    error = static / (per_ampere * bench.controller.rate.proportional)
+    subject = "rate error at which the proportional gain alone breaks away, against the rate limit"
+    yield _AUTHORITY(subject, error, limits.rate, "rad/s", "deg/s")
+
+
+def _bandwidths(bench: Bench) -> Iterator[Fact]:
+    """The rate loop's crossover against what has to be faster than it; sliding, uncompensated."""
+    loop = dict(loops_of(bench, "none", "rate"))["sliding"]
+    crossovers = loop.crossovers if isinstance(loop, LoopMargins) else ()
+    if not crossovers:
+        return
+    crossover = max(crossovers) / (2.0 * np.pi)
+    if bench.controller.sample_rate is not None:
+        subject = "crossover of the rate loop against the sample rate"
+        yield _SAMPLING(subject, crossover, bench.controller.sample_rate, "Hz", "Hz")
+    subject = "crossover of the rate loop against the bandwidth of the current loop"
+    yield _CURRENT_LOOP(subject, crossover, current_bandwidth(bench) / (2.0 * np.pi), "Hz", "Hz")
+
+
+def _values(bench: Bench, name: str) -> list[Any]:
+    found = (getattr(options, name, None) for options in bench.friction.values())
+    return [value for value in found if value]

@@ -1,0 +1,113 @@
+"""Friction linearised in one of two regimes, as the load of a bench meets it.
+
+Stuck: every interface in presliding, a spring and a damper. Sliding: every interface far above its
+Stribeck velocity, where only what grows with the rate is left. Between the two friction *falls*
+with the rate; that is what makes stick-slip, and no linear loop stands for it.
+
+Ripple over position counts at its mean of zero, and what differs by direction at the mean of both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from campaign.physics.bench import Bench
+from campaign.physics.compensation.interface import Compensator
+from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionModel, FrictionOptions, Presliding
+from campaign.physics.loop import at_load, viscous_at_load
+
+Regime = Literal["stuck", "sliding"]
+REGIMES: tuple[Regime, ...] = ("stuck", "sliding")
+
+
+class NoLoopError(ValueError):
+    """There is no linear loop in this regime; the message says why, for a reader."""
+
+
+@dataclass(frozen=True)
+class FrictionPath:
+    """Torque at the load over the load's relative motion: stiffness q + (damping + viscous) v.
+
+    Attributes:
+        stiffness: N m/rad.
+        damping, viscous: N m s/rad; apart, because a sampled compensation runs them on different
+            rates.
+        motor_side: whether a sampled compensation reads it from the resolver.
+    """
+
+    stiffness: float
+    damping: float
+    viscous: float
+    motor_side: bool = False
+
+
+def bench_friction(bench: Bench, regime: Regime) -> FrictionPath:
+    """All friction of the bench itself, summed. Raises NoLoopError."""
+    if regime == "stuck" and not bench.friction:
+        raise NoLoopError("the bench has no friction to be stuck in")
+    paths = [
+        _path(options, bench, _in_plant(name, options, regime), 1.0)
+        for name, options in bench.friction.items()
+    ]
+    return FrictionPath(
+        stiffness=sum(path.stiffness for path in paths),
+        damping=sum(path.damping for path in paths),
+        viscous=sum(path.viscous for path in paths),
+    )
+
+
+def compensation_friction(
+    bench: Bench, compensator: Compensator, regime: Regime
+) -> tuple[FrictionPath, ...]:
+    """The friction models that compensation runs, with its gains. Raises NoLoopError."""
+    return tuple(
+        _path(options, bench, _as_compensation(options, regime), gain)
+        for options, gain in compensator.friction
+        if gain != 0.0
+    )
+
+
+def _path(options: FrictionOptions, bench: Bench, own: Presliding, gain: float) -> FrictionPath:
+    torque, rate = at_load(options, bench)
+    scale = gain * torque * rate
+    return FrictionPath(
+        stiffness=scale * own.stiffness,
+        damping=scale * own.damping,
+        viscous=gain * viscous_at_load(options, bench),
+        motor_side=options.side == "motor",
+    )
+
+
+def _in_plant(name: str, options: FrictionOptions, regime: Regime) -> Presliding:
+    model = _model(options)
+    if regime == "sliding":
+        return _sliding(model, options)
+    if model.small_signal is None:
+        raise NoLoopError(f"the friction model '{model.name}' does not declare its presliding")
+    stuck = model.small_signal(options).stuck
+    if stuck is None:
+        raise NoLoopError(f"friction.{name} is dry: stuck, it holds the load rigidly")
+    return stuck
+
+
+def _as_compensation(options: FrictionOptions, regime: Regime) -> Presliding:
+    model = _model(options)
+    if regime == "sliding":
+        return _sliding(model, options)
+    if model.small_signal is None:
+        raise NoLoopError(f"the friction model '{model.name}' does not declare its presliding")
+    stuck = model.small_signal(options).stuck_compensation
+    if stuck is None:
+        raise NoLoopError("the compensation's torque jumps with the sign of the rate")
+    return stuck
+
+
+def _sliding(model: FrictionModel, options: FrictionOptions) -> Presliding:
+    damping = 0.0 if model.small_signal is None else model.small_signal(options).sliding_damping
+    return Presliding(0.0, damping)
+
+
+def _model(options: FrictionOptions) -> FrictionModel:
+    return friction_models()[options.model]  # type: ignore[attr-defined]
