@@ -102,6 +102,7 @@ class FrictionModel:
     viscous: Callable[[Any], float]
     steady_state: Callable[[Any, Array], Array]
     changeable: tuple[str, ...] | None = None
+    small_signal: Callable[[Any], SmallSignal] | None = None
 
     def may_change(self) -> tuple[str, ...]:
         """`changeable`, or what stands for it."""
@@ -131,4 +132,3 @@ def _quantity_of(field: FieldInfo) -> Quantity | None:
         if get_origin(member) is Annotated and get_args(member)[0] is float:
             return next((m for m in get_args(member) if isinstance(m, Quantity)), None)
     return None
-    small_signal: Callable[[Any], SmallSignal] | None = None
