@@ -1,14 +1,14 @@
 /* The reference on a terminal: one command per line on stdin, its answers and then "." on stdout.
  *
- * For the tests, which drive it with the same frames as the host's codec, and for trying things by
+ * It begins with the answers to "new 4096". For the tests, which drive it with the same frames as the host's codec, and for trying things by
  * hand. Numbers are decimal, octets hexadecimal ("-": none), times microseconds.
  *
  *   crc HEX | cobs HEX | uncobs HEX | encode KIND SEQUENCE HEX
  *   decode HEX      feed a stream to a frame decoder of its own; `forget` starts it anew
  *   counts          good, bad_cobs, too_short, too_long, bad_crc, wrong_version
- *   new RECORDS [latched|forgetful]
+ *   new RECORDS [latched COUNT | forgetful]
  *                   a new device whose ring has room for RECORDS; it was never stopped, or is
- *                   latched by stop 3 of `ada`, or has no lasting memory
+ *                   latched by stop COUNT, of `ada`, or has no lasting memory
  *   reset | wipe    power off and on: with what it remembers, or with its memory gone
  *   memory 0|1      whether remembering works
  *   receive TIME HEX | tick TIME
@@ -224,10 +224,10 @@ static void switch_on(void)
                          is_known ? &kept : NULL);
 }
 
-static void renew(unsigned long records, const char *past)
+static void renew(unsigned long records, const char *past, unsigned long count)
 {
     static const struct campaign_latch never = {false, 0, CAMPAIGN_NOT_LATCHED, ""};
-    static const struct campaign_latch by_ada = {true, 3, CAMPAIGN_STOPPED, "ada"};
+    const struct campaign_latch by_ada = {true, (uint32_t)count, CAMPAIGN_STOPPED, "ada"};
     const bool forgetful = past != NULL && strcmp(past, "forgetful") == 0;
     kept = past != NULL && strcmp(past, "latched") == 0 ? by_ada : never;
     is_known = !forgetful;
@@ -293,7 +293,7 @@ static void act(const char *word, const char *a, const char *b, const char *c)
 {
     size_t count;
     if (strcmp(word, "new") == 0) {
-        renew(number(a), b);
+        renew(number(a), b, number(c));
     } else if (strcmp(word, "reset") == 0) {
         switch_on();
     } else if (strcmp(word, "wipe") == 0) {
@@ -328,7 +328,9 @@ static void act(const char *word, const char *a, const char *b, const char *c)
 
 int main(void)
 {
-    renew(MOST_RECORDS, NULL);
+    renew(MOST_RECORDS, NULL, 0);
+    puts(".");
+    fflush(stdout);
     campaign_decoder_init(&decoder);
     while (fgets(line, sizeof line, stdin) != NULL) {
         const char *word = strtok(line, " \n");
