@@ -156,9 +156,9 @@ class Model:
             self.trial, self.records, self.first = message.trial, 0, 0
         if isinstance(message, wire.Stop | wire.Safe):
             self._begin_ending(now)
-        if isinstance(message, wire.Safe) and latches(message.session, self.session):
-            if self.latch.set(message.session, message.host or NOBODY):
-                self._keep()
+        outside = isinstance(message, wire.Safe) and latches(message.session, self.session)
+        if outside and self.latch.set(message.session, message.host or NOBODY):
+            self._keep()
         self._enter(state)
 
     def _keep(self) -> None:

@@ -99,6 +99,7 @@ class Script:
     def compare(self) -> None:
         """Ask, which changes nothing."""
         model, now = self.model, self.console.now
+        self.console.wait(0)  # what is due comes after what is answered
         model.tick(now)
         status, latch, holder = asked(self.console)
         oldest = max(model.first, model.records - RECORDS)
