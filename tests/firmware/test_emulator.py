@@ -82,9 +82,7 @@ class Axis:
             ending, self._ending = self._ending, None
             outcome = wire.Outcome[ending.outcome.name]
             fault = wire.Fault[ending.fault.name] if ending.fault else wire.Fault.NONE
-            end = wire.End(
-                self.ring.trial, self.ring.next, outcome, fault, 0, True, ending.reason
-            )
+            end = wire.End(self.ring.trial, self.ring.next, outcome, fault, 0, True, ending.reason)
             self.ring.add(end)
             self._emit(end)
             self.outcome = ending.outcome
