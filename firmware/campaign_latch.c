@@ -87,6 +87,5 @@ struct campaign_refusal campaign_do_unlatch(struct campaign_device *device, uint
         device->latch = before;
         return campaign_refused(CAMPAIGN_NOT_READY, "it could not be remembered");
     }
-    device->stopped_by = 0;
     return campaign_accepted();
 }

@@ -27,7 +27,8 @@ BENCH = load_bench("platform")
 RAW = st.sampled_from(
     [
         (wire.Kind.HELLO, b"\x02\x02" + bytes(4) + b"\x04host"), (wire.Kind.HELLO, b"\x02"),
-        (wire.Kind.HELLO, b"\x01\x01\x2a\0\0\0\x04host"), (wire.Kind.HELLO, b"\x03\x09\x2b\0\0\0\0"),
+        (wire.Kind.HELLO, b"\x01\x01\x2a\0\0\0\x04host"),
+        (wire.Kind.HELLO, b"\x03\x09\x2b\0\0\0\0"),
         (wire.Kind.SAFE, b"\x2a\0\0\0"), (wire.Kind.SAFE, b"\x2a\0\0"),
         (wire.Kind.SAFE, b"\x2b\0\0\0\x01\xff"), (wire.Kind.UNLATCH, b"\0\0\0\0"),
         (wire.Kind.HEARTBEAT, bytes(12)), (wire.Kind.QUERY, b"?"), (wire.Kind.BYE, bytes(4)),

@@ -246,6 +246,8 @@ def test_bye_of_the_session_lets_go_at_once(console: Console, state: State) -> N
         assert only(wire.Status, found)[0].fault is wire.Fault.HEARTBEAT
         assert not asked(console)[0].drive_on
     assert asked(console)[2] == wire.Holder(False, None, "ada@lab-3")
+    console.send(80, hello())
+    assert not asked(console)[2].held  # nor does a HELLO of that session change that
     assert heartbeat(console).heartbeat == 1  # it may think better of it
     assert asked(console)[2].held
 
