@@ -133,7 +133,7 @@ def test_a_nameless_host_can_be_told_of(console: Console) -> None:
 @pytest.mark.parametrize("length", [119, 120, 121, 122, 123, 250])
 def test_a_long_name_is_clipped_between_characters(console: Console, length: int) -> None:
     console.do("new", 16)
-    name = "µ" * (length // 2) + "x" * (length % 2)
+    name = "x" * (length % 2) + "µ" * (length // 2)
     console.send(1, hello(OURS, name))
     kept = asked(console)[2].host
     assert kept == name.encode()[:120].decode("utf-8", "ignore")
