@@ -20,7 +20,7 @@ from campaign.wire import messages as wire
 from campaign.wire.frames import Frame, encode_frame
 
 from .console import Console
-from .host import CRC, SETS, TRIAL, hello
+from .host import CRC, OTHERS, OURS, SETS, TRIAL, hello
 from .test_scripts import A_TRIAL, COMMAND, LATEST, PAST, RECORDS, TIMEOUT
 
 BENCH = load_bench("platform")
@@ -37,14 +37,24 @@ RAW = st.sampled_from(
         (wire.Kind.RESEND, wire.encode(wire.Resend(0, 0, 2))[1]),
     ]
 )  # fmt: skip
+INTERESTING = st.sampled_from(
+    [wire.Safe(), wire.Safe(OTHERS, "eve"), LATEST, hello(), hello(OTHERS, "eve"), wire.Bye(OURS)]
+)
 STEP = st.one_of(
     st.tuples(st.just("send"), COMMAND, st.sampled_from(["next"] * 8 + ["same", "same", "far"])),
     st.tuples(st.just("raw"), RAW, st.sampled_from(["next", "same"])),
     st.tuples(st.just("try")),
+    st.tuples(st.just("send"), INTERESTING, st.just("next")),
     st.tuples(st.just("wait"), st.sampled_from([1000, TIMEOUT - 1, TIMEOUT + 1])),
     st.tuples(st.just("memory"), st.booleans()),
     st.tuples(st.just("finish"), st.sampled_from(wire.Outcome)),
     st.sampled_from([("reset",), ("reset",), ("wipe",)]),
+)
+GREETED: list[tuple] = [("send", hello(), "next")]
+STEPS = st.builds(
+    list.__add__,
+    st.sampled_from([[], GREETED, GREETED, [*GREETED, ("try",)]]),
+    st.lists(STEP, max_size=25),
 )
 PLACES = itertools.count()
 
@@ -251,9 +261,9 @@ class Boots:
 
 
 @settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-@given(past=PAST, steps=st.lists(STEP, max_size=25))
+@given(past=PAST, steps=STEPS)
 @example(past="", steps=[("send", SETS[0], "next")])  # nobody has said HELLO
 @example(  # a stop since, then the same UNLATCH again
     past="latched 3",

@@ -46,7 +46,7 @@ STEP = st.one_of(
 )
 PAST = st.sampled_from(["", "", "latched 3", "forgetful"])
 SCRIPTS = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
@@ -142,6 +142,9 @@ class Judge:
 
     def judge(self, message: wire.Message | None, done: list[wire.Message | str]) -> None:
         """`done`: what the device did upon `message`, or with none, by itself."""
+        if isinstance(message, wire.Safe | wire.Unlatch):
+            [answered] = [i for i, what in enumerate(done) if isinstance(what, wire.Ack | wire.Nak)]
+            assert not [what for what in done[answered:] if str(what).startswith("remember")]
         if isinstance(message, wire.Safe):
             assert done[0] == "drive off"
             assert isinstance(done[1], wire.Ack) or str(done[1]).startswith("remember 1 ")
