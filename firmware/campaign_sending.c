@@ -1,7 +1,7 @@
 /* What a device says: one function per message. */
 #include "campaign_internal.h"
 
-#include <string.h>
+#include <math.h>
 
 struct campaign_writer campaign_begin(struct campaign_device *device)
 {
@@ -143,4 +143,30 @@ void campaign_device_status(struct campaign_device *device)
     campaign_put_u32(&writer, campaign_bad_frames(&device->decoder.counts));
     campaign_put_f64(&writer, hooks->temperature(hooks->context));
     campaign_send_body(device, CAMPAIGN_STATUS, &writer);
+}
+
+static double seconds_since(const struct campaign_device *device, bool known, uint64_t then)
+{
+    return known ? (double)(device->now - then) / 1e6 : (double)NAN;
+}
+
+void campaign_send_latch(struct campaign_device *device)
+{
+    const struct campaign_latch *latch = &device->latch;
+    struct campaign_writer writer = campaign_begin(device);
+    campaign_put_u8(&writer, latch->latched);
+    campaign_put_u32(&writer, latch->count);
+    campaign_put_u8(&writer, latch->cause);
+    campaign_put_f64(&writer, seconds_since(device, device->stopped_at_known, device->stopped_at));
+    campaign_put_short(&writer, latch->by);
+    campaign_send_body(device, CAMPAIGN_LATCH, &writer);
+}
+
+void campaign_send_holder(struct campaign_device *device)
+{
+    struct campaign_writer writer = campaign_begin(device);
+    campaign_put_u8(&writer, campaign_heard_lately(device));
+    campaign_put_f64(&writer, seconds_since(device, device->heard, device->heartbeat_at));
+    campaign_put_short(&writer, device->host);
+    campaign_send_body(device, CAMPAIGN_HOLDER, &writer);
 }

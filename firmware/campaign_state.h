@@ -12,6 +12,8 @@
 #define CAMPAIGN_LONGEST_NAME 64u
 #define CAMPAIGN_LONGEST_TEXT 512u
 #define CAMPAIGN_LONGEST_SLICE 64u
+/* Octets that are kept of who a host says it is. */
+#define CAMPAIGN_LONGEST_HOST 120u
 /* Records sent at once for one RESEND; the host asks again for the rest. */
 #define CAMPAIGN_RESEND_MOST 32u
 
@@ -51,7 +53,9 @@ enum campaign_nak {
     CAMPAIGN_NO_VERSION = 14,
     CAMPAIGN_WRONG_TRIAL = 15,
     CAMPAIGN_CAUSE_PERSISTS = 16,
-    CAMPAIGN_NO_HEARTBEAT = 17
+    CAMPAIGN_NO_HEARTBEAT = 17,
+    CAMPAIGN_LATCHED = 18,
+    CAMPAIGN_OTHER_STOP = 19
 };
 
 enum campaign_outcome {
@@ -74,6 +78,12 @@ enum campaign_fault {
     CAMPAIGN_DRIVE = 8,
     CAMPAIGN_REFUSED = 9,
     CAMPAIGN_OTHER = 255
+};
+
+enum campaign_latch_cause {
+    CAMPAIGN_NOT_LATCHED,
+    CAMPAIGN_STOPPED,  /* by a SAFE that was not of the device's session */
+    CAMPAIGN_NO_MEMORY /* it has started, and cannot know whether it was stopped */
 };
 
 enum campaign_tag {
@@ -122,6 +132,14 @@ struct campaign_refusal {
     const char *text;
 };
 
+/* What has to outlive a reset: whether the device was stopped from outside. */
+struct campaign_latch {
+    bool latched;
+    uint32_t count; /* of stops so far; whoever clears one names it */
+    enum campaign_latch_cause cause;
+    char by[CAMPAIGN_LONGEST_HOST + 1u]; /* who sent the latest; UTF-8 */
+};
+
 struct campaign_hooks {
     void *context; /* handed to every hook */
     void (*send)(void *context, const campaign_octet *data, size_t count);
@@ -144,6 +162,10 @@ struct campaign_hooks {
     bool (*fault_persists)(void *context);
     /* Degrees Celsius; NaN without a sensor. */
     double (*temperature)(void *context);
+    /* Keep this where a reset does not reach it; true when it is there, not when it will be. Called
+     * with the drive off and before the stop, or its end, is acknowledged. NULL: there is no such
+     * memory. */
+    bool (*remember)(void *context, const struct campaign_latch *latch);
 };
 
 struct campaign_identity {
@@ -181,6 +203,7 @@ struct campaign_device {
 
     bool in_session;
     uint32_t session;
+    char host[CAMPAIGN_LONGEST_HOST + 1u]; /* whose it is */
     unsigned hello_sequence;
     unsigned last_sequence;
     bool answered; /* the last command is one that may be repeated */
@@ -188,8 +211,14 @@ struct campaign_device {
     enum campaign_nak last_answer;
     char last_name[CAMPAIGN_LONGEST_NAME + 1u];
     const char *last_text;
+    char stopped_text[CAMPAIGN_LONGEST_HOST + 16u];
 
-    bool heard;
+    struct campaign_latch latch;
+    uint32_t stopped_by;   /* session of the latest stop, 0 for nobody's */
+    bool stopped_at_known; /* it was since the start */
+    uint64_t stopped_at;
+
+    bool heard; /* HELLO counts once, then heartbeats of the session do */
     uint32_t heartbeat;
     uint64_t heartbeat_at;
 
@@ -206,9 +235,11 @@ struct campaign_device {
     campaign_octet body[CAMPAIGN_MAX_BODY];
 };
 
+/* `latch`: what `remember` was last given, before the reset; all zero in a device that was never
+ * stopped. NULL when that cannot be known: the device then starts latched. */
 void campaign_device_init(struct campaign_device *device, const struct campaign_hooks *hooks,
                           const struct campaign_identity *identity, struct campaign_record *ring,
-                          uint32_t ring_records);
+                          uint32_t ring_records, const struct campaign_latch *latch);
 void campaign_device_receive(struct campaign_device *device, const campaign_octet *data,
                              size_t count, uint64_t now_us);
 /* Watch the heartbeats, finish a trial that is ending. */

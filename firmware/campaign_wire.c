@@ -180,6 +180,23 @@ const campaign_octet *campaign_get_octets(struct campaign_reader *reader, size_t
     return reader->data + (reader->at - count);
 }
 
+const campaign_octet *campaign_get_short(struct campaign_reader *reader, size_t *length)
+{
+    const campaign_octet *text;
+    *length = campaign_get_u8(reader);
+    text = campaign_get_octets(reader, *length);
+    if (text != NULL && campaign_is_utf8(text, *length))
+        return text;
+    reader->failed = true;
+    *length = 0;
+    return NULL;
+}
+
+bool campaign_is_whole(const struct campaign_reader *reader)
+{
+    return !reader->failed && reader->at == reader->size;
+}
+
 /* No overlong forms, no surrogates, nothing beyond U+10FFFF (RFC 3629). */
 bool campaign_is_utf8(const campaign_octet *data, size_t count)
 {
@@ -219,6 +236,32 @@ bool campaign_is_utf8(const campaign_octet *data, size_t count)
     return true;
 }
 
+void campaign_keep_text(char *out, size_t most, const campaign_octet *text, size_t length)
+{
+    size_t kept = 0;
+    if (length > most)
+        length = most;
+    while (length > 0 && !campaign_is_utf8(text, length))
+        length--; /* not through the middle of a character */
+    while (kept < length && (text[kept] & 0xFFu) != 0u) {
+        out[kept] = (char)(text[kept] & 0xFFu);
+        kept++;
+    }
+    out[kept] = '\0';
+}
+
+uint32_t campaign_get_safe(const campaign_octet *body, size_t length, char *host, size_t most)
+{
+    struct campaign_reader reader = {body, length, 0, false};
+    const uint32_t session = length > 0 ? campaign_get_u32(&reader) : 0;
+    size_t count = 0;
+    const campaign_octet *text =
+        reader.at < reader.size ? campaign_get_short(&reader, &count) : NULL;
+    const bool whole = campaign_is_whole(&reader);
+    campaign_keep_text(host, most, text, whole ? count : 0);
+    return whole ? session : 0;
+}
+
 size_t campaign_frame_encode(unsigned kind, unsigned sequence, const campaign_octet *body,
                              size_t length, campaign_octet *out)
 {
@@ -227,7 +270,7 @@ size_t campaign_frame_encode(unsigned kind, unsigned sequence, const campaign_oc
     size_t used;
     if (length > CAMPAIGN_MAX_BODY)
         return 0;
-    campaign_put_u8(&writer, CAMPAIGN_VERSION);
+    campaign_put_u8(&writer, CAMPAIGN_FRAME_VERSION);
     campaign_put_u8(&writer, kind);
     campaign_put_u16(&writer, sequence);
     campaign_put_octets(&writer, body, length);
@@ -267,7 +310,7 @@ static bool take(struct campaign_decoder *decoder, struct campaign_frame *frame)
         counts->bad_crc++;
         return false;
     }
-    if (campaign_get_u8(&reader) != CAMPAIGN_VERSION) {
+    if (campaign_get_u8(&reader) != CAMPAIGN_FRAME_VERSION) {
         counts->wrong_version++;
         return false;
     }

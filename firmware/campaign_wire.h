@@ -12,7 +12,9 @@
 
 typedef uint_least8_t campaign_octet;
 
-#define CAMPAIGN_VERSION 1u
+/* Of frames, for ever; and of the protocol, as HELLO negotiates it. */
+#define CAMPAIGN_FRAME_VERSION 1u
+#define CAMPAIGN_VERSION 2u
 #define CAMPAIGN_MAX_BODY 1024u
 #define CAMPAIGN_HEADER 4u
 #define CAMPAIGN_OVERHEAD (CAMPAIGN_HEADER + 4u)
@@ -33,6 +35,9 @@ enum campaign_kind {
     CAMPAIGN_STOP = 0x08,
     CAMPAIGN_SAFE = 0x09,
     CAMPAIGN_CLEAR = 0x0A,
+    CAMPAIGN_QUERY = 0x0B,
+    CAMPAIGN_UNLATCH = 0x0C,
+    CAMPAIGN_BYE = 0x0D,
     CAMPAIGN_CAPABILITIES = 0x81,
     CAMPAIGN_ACK = 0x82,
     CAMPAIGN_NAK = 0x83,
@@ -41,7 +46,9 @@ enum campaign_kind {
     CAMPAIGN_SAMPLES = 0x86,
     CAMPAIGN_EVENT = 0x87,
     CAMPAIGN_END = 0x88,
-    CAMPAIGN_LOST = 0x89
+    CAMPAIGN_LOST = 0x89,
+    CAMPAIGN_LATCH = 0x8A,
+    CAMPAIGN_HOLDER = 0x8B
 };
 
 /* Continue a CRC-32 (begin with 0) over `count` octets. */
@@ -85,8 +92,18 @@ uint64_t campaign_get_u64(struct campaign_reader *reader);
 /* Fails as well when the number is not finite. */
 double campaign_get_f64(struct campaign_reader *reader);
 const campaign_octet *campaign_get_octets(struct campaign_reader *reader, size_t count);
+/* A text after its length u8. Fails as well, and is NULL, when it is not UTF-8. */
+const campaign_octet *campaign_get_short(struct campaign_reader *reader, size_t *length);
+/* The session that a body of SAFE is of, and the host, as by campaign_keep_text(). Every body is one:
+ * 0 and no host for what is no session, or anything else. */
+uint32_t campaign_get_safe(const campaign_octet *body, size_t length, char *host, size_t most);
+/* Whether all went well and nothing is left. */
+bool campaign_is_whole(const struct campaign_reader *reader);
 /* Whether `count` octets are well-formed UTF-8. */
 bool campaign_is_utf8(const campaign_octet *data, size_t count);
+/* Keep a text, terminated, of `out`, which holds `most` + 1; not cut through a character. A zero in
+ * it ends it. */
+void campaign_keep_text(char *out, size_t most, const campaign_octet *text, size_t length);
 
 struct campaign_frame {
     unsigned kind;

@@ -72,6 +72,15 @@ static bool check_bad(const char *reason, const char *all)
                || (strcmp(reason, "wrong_version") == 0 && counts->wrong_version));
 }
 
+static bool check_safe(const char *body, const char *session, const char *host)
+{
+    static campaign_octet a[MOST], b[MOST];
+    char found[256];
+    const size_t m = octets(body, a), n = octets(host, b);
+    return campaign_get_safe(a, m, found, sizeof found - 1u) == strtoul(session, NULL, 10)
+           && strlen(found) == n && memcmp(found, b, n) == 0;
+}
+
 static bool check(char *word[6])
 {
     static campaign_octet a[MOST];
@@ -81,6 +90,8 @@ static bool check(char *word[6])
         return check_cobs(word[1], word[2]);
     if (strcmp(word[0], "frame") == 0 && word[4] != NULL)
         return check_frame(word[1], word[2], word[3], word[4]);
+    if (strcmp(word[0], "safe") == 0 && word[3] != NULL)
+        return check_safe(word[1], word[2], word[3]);
     if (strcmp(word[0], "bad") == 0 && word[2] != NULL)
         return check_bad(word[1], word[2]);
     return false;

@@ -1,15 +1,22 @@
 /* The reference on a terminal: one command per line on stdin, its answers and then "." on stdout.
  *
- * For the tests, which drive it with the same frames as the host's codec, and for trying things by
+ * It begins with the answers to "new 4096". For the tests, which drive it with the same frames as the host's codec, and for trying things by
  * hand. Numbers are decimal, octets hexadecimal ("-": none), times microseconds.
  *
  *   crc HEX | cobs HEX | uncobs HEX | encode KIND SEQUENCE HEX
  *   decode HEX      feed a stream to a frame decoder of its own; `forget` starts it anew
  *   counts          good, bad_cobs, too_short, too_long, bad_crc, wrong_version
- *   new RECORDS     a new device whose ring has room for RECORDS
+ *   new RECORDS [latched COUNT | forgetful]
+ *                   a new device whose ring has room for RECORDS; it was never stopped, or is
+ *                   latched by stop COUNT, of `ada`, or has no lasting memory
+ *   reset | wipe    power off and on: with what it remembers, or with its memory gone
+ *   memory 0|1      whether remembering works
  *   receive TIME HEX | tick TIME
  *   samples FIRST COUNT HEX | event SECONDS HEX | finish OUTCOME FAULT HEX
  *   rest 0|1 | persists 0|1     what the axis, and the cause of a fault, do
+ *
+ * Besides "sent" the answers are what the device had the application do, in its order: "set",
+ * "drive on", "brake", "drive off", "remember LATCHED COUNT CAUSE WHO" and, after that, "failed".
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,6 +33,11 @@ static struct campaign_record ring[MOST_RECORDS];
 static struct campaign_device device;
 static struct campaign_decoder decoder;
 static bool drive, rest, persists;
+
+/* What outlives a reset. */
+static struct campaign_latch kept;
+static bool is_known, memory_works;
+static unsigned long records_kept;
 
 static void print_octets(const campaign_octet *data, size_t count)
 {
@@ -134,17 +146,20 @@ static const struct campaign_channel *on_channels(void *context, size_t *count, 
 static void on_start(void *context)
 {
     (void)context;
+    puts("drive on");
     drive = true;
 }
 
 static void on_stop(void *context)
 {
     (void)context;
+    puts("brake");
 }
 
 static void on_drive_off(void *context)
 {
     (void)context;
+    puts("drive off");
     drive = false;
 }
 
@@ -172,26 +187,55 @@ static double get_temperature(void *context)
     return 25.0;
 }
 
-static const struct campaign_hooks hooks = {
-    NULL,    on_send,  on_set, on_clear,     on_arm,      on_channels, on_start,
-    on_stop, on_drive_off, is_drive_on, is_at_rest, does_fault_persist, get_temperature,
+static bool on_remember(void *context, const struct campaign_latch *latch)
+{
+    (void)context;
+    printf("remember %d %lu %d ", latch->latched, (unsigned long)latch->count, (int)latch->cause);
+    print_octets((const campaign_octet *)latch->by, strlen(latch->by));
+    putchar('\n');
+    if (!memory_works) {
+        puts("failed");
+        return false;
+    }
+    kept = *latch;
+    is_known = true;
+    return true;
+}
+
+static struct campaign_hooks hooks = {
+    NULL,    on_send,      on_set,      on_clear,   on_arm,             on_channels,     on_start,
+    on_stop, on_drive_off, is_drive_on, is_at_rest, does_fault_persist, get_temperature, on_remember,
 };
 
 static const char *const features[] = {"rate", "torque"};
 static const char *const compensations[] = {"observer"};
 static const struct campaign_limit limits[] = {{"limits.angle", 1.0}, {"limits.rate", 2.0}};
-static const struct campaign_identity identity = {
+static struct campaign_identity identity = {
     7, "console", "reference", features, 2, compensations, 1, limits, 2,
     100000, 2000000, 1000, 1000.0,
 };
 
-static void renew(unsigned long records)
+static void switch_on(void)
 {
-    if (records == 0 || records > MOST_RECORDS)
-        records = MOST_RECORDS;
     drive = persists = false;
     rest = true;
-    campaign_device_init(&device, &hooks, &identity, ring, (uint32_t)records);
+    identity.boot++;
+    campaign_device_init(&device, &hooks, &identity, ring, (uint32_t)records_kept,
+                         is_known ? &kept : NULL);
+}
+
+static void renew(unsigned long records, const char *past, unsigned long count)
+{
+    static const struct campaign_latch never = {false, 0, CAMPAIGN_NOT_LATCHED, ""};
+    const struct campaign_latch by_ada = {true, (uint32_t)count, CAMPAIGN_STOPPED, "ada"};
+    const bool forgetful = past != NULL && strcmp(past, "forgetful") == 0;
+    kept = past != NULL && strcmp(past, "latched") == 0 ? by_ada : never;
+    is_known = !forgetful;
+    memory_works = true;
+    hooks.remember = forgetful ? NULL : on_remember;
+    records_kept = records == 0 || records > MOST_RECORDS ? MOST_RECORDS : records;
+    identity.boot = 6;
+    switch_on();
 }
 
 static void decode(size_t count)
@@ -249,7 +293,14 @@ static void act(const char *word, const char *a, const char *b, const char *c)
 {
     size_t count;
     if (strcmp(word, "new") == 0) {
-        renew(number(a));
+        renew(number(a), b, number(c));
+    } else if (strcmp(word, "reset") == 0) {
+        switch_on();
+    } else if (strcmp(word, "wipe") == 0) {
+        is_known = false;
+        switch_on();
+    } else if (strcmp(word, "memory") == 0) {
+        memory_works = number(a) != 0;
     } else if (strcmp(word, "receive") == 0) {
         count = read_octets(b);
         campaign_device_receive(&device, octets, count, number(a));
@@ -277,7 +328,9 @@ static void act(const char *word, const char *a, const char *b, const char *c)
 
 int main(void)
 {
-    renew(MOST_RECORDS);
+    renew(MOST_RECORDS, NULL, 0);
+    puts(".");
+    fflush(stdout);
     campaign_decoder_init(&decoder);
     while (fgets(line, sizeof line, stdin) != NULL) {
         const char *word = strtok(line, " \n");

@@ -14,7 +14,7 @@ from campaign.wire import messages as wire
 from campaign.wire.frames import MAX_BODY, encode_frame
 
 EXAMPLES: list[tuple[int, wire.Message]] = [
-    (1, wire.Hello(1, 1, 0x12345678, "campaign")),
+    (1, wire.Hello(2, 2, 0x12345678, "campaign")),
     (
         2,
         wire.Set(
@@ -29,16 +29,20 @@ EXAMPLES: list[tuple[int, wire.Message]] = [
     ),
     (3, wire.Arm(0xCBF43926)),
     (4, wire.Start(1)),
-    (0, wire.Heartbeat(1, 1, 17)),
+    (0, wire.Heartbeat(1, 1, 17, 0x12345678)),
     (0, wire.Resend(1, 5, 2)),
     (5, wire.Stop()),
     (6, wire.Release(1)),
     (0, wire.Safe()),
+    (9, wire.Safe(0x12345678, "stop")),
     (7, wire.Clear()),
+    (0, wire.Query()),
+    (10, wire.Unlatch(3, "ada")),
+    (0, wire.Bye(0x12345678)),
     (
         0,
         wire.Capabilities(
-            1, 1, 1, 1, 0xB007, wire.State.IDLE, 0.1, 256, 4096, 1000.0, "servo", "1.0",
+            1, 2, 2, 2, 0xB007, wire.State.IDLE, 0.1, 256, 4096, 1000.0, "servo", "1.0",
             ("rate", "torque"), ("observer",), (wire.Item("limits.angle", 0.75),),
         ),
     ),
@@ -65,8 +69,25 @@ EXAMPLES: list[tuple[int, wire.Message]] = [
     (6, wire.Event(1, 1, 0.002, "the rate that ends the trial was reached")),
     (7, wire.End(1, 2, wire.Outcome.FAULT, wire.Fault.DRIVE, 2, True, "drive fault 17")),
     (8, wire.Lost(1, 0, 3)),
+    (9, wire.Latch(True, 3, wire.LatchCause.STOPPED, 2.5, "stop")),
+    (10, wire.Holder(True, 0.0125, "ada@lab-3 pid 4711, run")),
 ]  # fmt: skip
-"""Sequence number and message: one of every type."""
+"""Sequence number and message: one of every type, and the second form of SAFE."""
+
+SAFE_BODIES = [
+    b"",
+    b"\x78\x56\x34\x12",
+    b"\x78\x56\x34\x12\x04stop",
+    b"\x78\x56\x34\x12\x00",
+    bytes(4),
+    bytes(4) + b"\x04stop",
+    b"\x78\x56\x34",
+    b"\x78\x56\x34\x12\x05stop",
+    b"\x78\x56\x34\x12\x04stop\0",
+    b"\x78\x56\x34\x12\x04st\xffp",
+    b"\x78\x56\x34\x12\x05" + "µm/h".encode(),
+]
+"""Whole and damaged ones: each is a SAFE, if only nobody's."""
 
 
 def vectors() -> list[str]:
@@ -77,6 +98,7 @@ def vectors() -> list[str]:
     lines = ["# What both codecs agree on; octets in hexadecimal, - for none."]
     lines += ["# crc DATA CRC", "# cobs PLAIN ENCODED", "# frame TYPE SEQUENCE BODY FRAME"]
     lines += ["# bad REASON STREAM: no frame in it, and one count of this reason"]
+    lines += ["# safe BODY SESSION HOST: what such a SAFE says; 0 and no host of what is nobody's"]
     for data in (b"", b"123456789", bytes(4), every):
         lines.append(f"crc {_hex(data)} {zlib.crc32(data):08x}")
     lines += [f"cobs {_hex(data)} {_hex(cobs.encode(data))}" for data in plain]
@@ -98,7 +120,15 @@ def vectors() -> list[str]:
         "wrong_version": encode_frame(wire.Kind.STOP, 5, b"", version=2),
     }
     lines += [f"bad {reason} {_hex(stream)}" for reason, stream in bad.items()]
+    lines += [f"safe {_hex(body)} {_understood(body)}" for body in SAFE_BODIES]
     return lines
+
+
+def _understood(body: bytes) -> str:
+    message = wire.decode(wire.Kind.SAFE, body)
+    if not isinstance(message, wire.Safe):
+        raise TypeError("every SAFE is one")
+    return f"{message.session} {_hex(message.host.encode())}"
 
 
 def _hex(data: bytes) -> str:

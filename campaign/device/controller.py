@@ -22,7 +22,7 @@ from campaign.trial import Ending, Fault, Outcome
 from campaign.wire import codes
 from campaign.wire.channel_features import channel_features
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
-from campaign.wire.device import Ack, Capabilities, Holder, Lost, Nak, Status
+from campaign.wire.device import Ack, Capabilities, Holder, Latch, Lost, Nak, Status
 from campaign.wire.fields import clipped
 from campaign.wire.frames import Frame
 from campaign.wire.host import (
@@ -113,7 +113,7 @@ class Controller:
             self._hello(client, frame)
         elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND, Kind.QUERY, Kind.BYE):
             self._unnumbered(client, frame)
-        elif client != self._session.client:
+        elif self._session.client not in (None, client):
             self._refuse(client, frame, Refused(NakCode.BUSY, "", self._held_by()))
         else:
             self._command(client, frame)
@@ -265,7 +265,7 @@ class Controller:
             for answer in (self.status(), self._latch.message(), self._holder()):
                 self._send(client, answer)
         elif isinstance(message, Resend):
-            held = message.trial == ring.trial
+            held = message.trial == ring.trial != 0
             lost = (Lost(message.trial, message.first, message.count),)
             for record in ring.again(message.first, message.count) if held else lost:
                 self._send(client, record)
@@ -280,20 +280,22 @@ class Controller:
             return
         if turn is Turn.REPEATED:
             for answer in self._session.answers:
-                self._send(client, answer)
+                # There may have been a stop since.
+                self._send(client, self._latch.message() if isinstance(answer, Latch) else answer)
             return
         message = self._decoded(client, frame)
-        if message is not None:
-            self._session.answers = self._carried_out(client, frame, message)
+        self._session.answers = (
+            (message,) if isinstance(message, Nak) else self._carried_out(client, frame, message)
+        )
 
-    def _decoded(self, client: int, frame: Frame) -> Message | None:
+    def _decoded(self, client: int, frame: Frame) -> Message:
+        """The message; else the refusal of what is none."""
         try:
             return decode(frame.kind, frame.body)
         except WireError as error:
             known = frame.kind in set(Kind)
             code = NakCode.MALFORMED if known else NakCode.UNKNOWN_MESSAGE
-            self._session.answers = (self._refuse(client, frame, Refused(code, "", str(error))),)
-            return None
+            return self._refuse(client, frame, Refused(code, "", str(error)))
 
     def _carried_out(self, client: int, frame: Frame, message: Message) -> tuple[Message, ...]:
         """Carry out a new command; what was answered."""

@@ -50,8 +50,11 @@ class Ring:
         self.next += 1
 
     def free(self, before: int) -> None:
-        """Give up every record with a number below `before`; the host has it."""
-        while self._records and self.first < before:
+        """Give up every record with a number below `before`; the host has it.
+
+        Nothing when there are not so many yet: no host can have what was not made.
+        """
+        while self._records and self.first < before <= self.next:
             self._records.popleft()
             self.first += 1
 

@@ -17,6 +17,10 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 CONSOLE = (
     "console.c",
     "campaign_state.c",
+    "campaign_commands.c",
+    "campaign_session.c",
+    "campaign_latch.c",
+    "campaign_records.c",
     "campaign_sending.c",
     "campaign_parameters.c",
     "campaign_wire.c",

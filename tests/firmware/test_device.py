@@ -1,8 +1,6 @@
 """The device in C: what it answers, state by state, and what it keeps."""
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from campaign.wire import messages as wire
 from campaign.wire.frames import encode_frame
@@ -10,68 +8,7 @@ from campaign.wire.messages import State
 from campaign.wire.statemachine import after
 
 from .console import Console
-from .model import Model
-
-PARAMETERS: dict[str, wire.Value] = {
-    "task.mode": "rate",
-    "task.duration": 1.5,
-    "rehearsal.seed": -3,
-    "task.values": (0.5, -1e-300, 3.0),
-    "task.hold": True,
-}
-SETS = wire.parameter_messages(PARAMETERS)
-CRC = wire.configuration_crc(wire.encode(message)[1] for message in SETS)
-TRIAL = 7
-
-
-def only(kind: type, found: list[wire.Message]) -> list:
-    return [message for message in found if isinstance(message, kind)]
-
-
-def heartbeat(console: Console, counter: int = 1, following: int = 0) -> wire.Status:
-    [status] = only(wire.Status, console.send(0, wire.Heartbeat(counter, TRIAL, following)))
-    return status
-
-
-def bring_to(console: Console, state: State, records: int = 16) -> None:
-    """A new device, led to `state`; the next command has number 5."""
-    console.do("new", records)
-    console.now = 0
-    console.send(0, wire.Hello(1, 1, 42))
-    heartbeat(console)
-    commands = [SETS[0], wire.Arm(CRC), wire.Start(TRIAL), wire.Stop()]
-    wanted = {State.CONFIGURED: 1, State.ARMED: 2, State.RUNNING: 3, State.ENDED: 4}
-    for number, command in enumerate(commands[: wanted.get(state, 0)], start=1):
-        [ack] = only(wire.Ack, console.send(number, command))
-        assert ack.sequence == number
-    if state is State.SAFE:
-        console.send(0, wire.Safe())
-    if state is State.FAULT:
-        console.do("finish", 3, int(wire.Fault.DRIVE), "-")
-    assert heartbeat(console).state is state
-
-
-def following(state: State) -> int:
-    """The number of the next command after `bring_to`."""
-    order = [State.IDLE, State.CONFIGURED, State.ARMED, State.RUNNING, State.ENDED]
-    return 1 + (order.index(state) if state in order else 0)
-
-
-def take(console: Console, first: int, count: int = 2) -> list[wire.Message]:
-    return console.messages("samples", first, count, bytes(count * 10).hex())
-
-
-def test_hello_is_answered_by_capabilities(console: Console) -> None:
-    console.do("new", 16)
-    [found] = console.send(9, wire.Hello(1, 3, 42, "host"))
-    assert found == wire.Capabilities(
-        9, 1, 1, 1, 7, State.IDLE, 0.1, 16, 1000, 1000.0, "console", "reference",
-        ("rate", "torque"), ("observer",),
-        (wire.Item("limits.angle", 1.0), wire.Item("limits.rate", 2.0)),
-    )  # fmt: skip
-    [found] = console.send(9, wire.Hello(2, 3, 42, "host"))
-    assert isinstance(found, wire.Capabilities)
-    assert found.version == 0
+from .host import CRC, OURS, SETS, TRIAL, bring_to, following, heartbeat, only, take
 
 
 def test_parameters_arrive_as_they_were_sent(console: Console) -> None:
@@ -103,7 +40,7 @@ def test_a_set_with_one_refused_item_sets_none(console: Console) -> None:
 @pytest.mark.parametrize("state", State)
 def test_safe_switches_off_in_every_state(console: Console, state: State) -> None:
     bring_to(console, state)
-    answer = console.send(999, wire.Safe())
+    answer = console.send(999, wire.Safe(OURS))
     [ack] = only(wire.Ack, answer)
     expected = State.FAULT if state is State.FAULT else State.SAFE
     assert (ack.sequence, ack.kind, ack.state) == (999, wire.Kind.SAFE, expected)
@@ -149,7 +86,7 @@ def test_an_axis_that_does_not_come_to_rest_is_not_called_safe(console: Console)
     assert only(wire.End, found) == []
     for counter in range(40):
         console.now += 50_000
-        found = console.send(0, wire.Heartbeat(counter, TRIAL, 0))
+        found = console.send(0, wire.Heartbeat(counter, TRIAL, 0, OURS))
         if only(wire.End, found):
             break
     [end] = only(wire.End, found)
@@ -160,7 +97,7 @@ def test_an_axis_that_does_not_come_to_rest_is_not_called_safe(console: Console)
 def test_a_trial_waits_for_rest_before_it_can_be_cleared(console: Console) -> None:
     bring_to(console, State.RUNNING)
     console.do("rest", 0)
-    console.send(0, wire.Safe())
+    console.send(0, wire.Safe(OURS))
     [nak] = console.send(4, wire.Clear())
     assert nak.code is wire.NakCode.NOT_READY
     console.do("rest", 1)
@@ -200,7 +137,7 @@ def test_a_heartbeat_frees_nothing_of_the_future_or_of_another_trial(console: Co
     bring_to(console, State.RUNNING)
     take(console, 0)
     assert heartbeat(console, following=2).ring_used == 1
-    console.send(0, wire.Heartbeat(2, TRIAL + 1, 1))
+    console.send(0, wire.Heartbeat(2, TRIAL + 1, 1, OURS))
     assert heartbeat(console).ring_used == 1
 
 
@@ -247,69 +184,3 @@ def test_the_device_refuses_what_the_table_refuses(console: Console, state: Stat
         expected = after(state, kind)
         result = answer.state if isinstance(answer, wire.Ack) else answer.code
         assert result is expected, (state, kind)
-
-
-COMMAND = st.sampled_from(
-    [
-        wire.Hello(1, 1, 42), wire.Hello(1, 1, 43), *SETS, SETS[0], wire.Arm(CRC), wire.Arm(CRC),
-        wire.Arm(1), wire.Start(TRIAL), wire.Start(TRIAL), wire.Stop(), wire.Release(TRIAL),
-        wire.Release(8), wire.Clear(), wire.Safe(), wire.Heartbeat(1, TRIAL, 0),
-    ]
-)  # fmt: skip
-STEP = st.one_of(
-    st.tuples(st.just("send"), COMMAND, st.sampled_from(["next"] * 8 + ["same", "far"])),
-    st.tuples(st.just("wait"), st.sampled_from([1000, 99_999, 100_001])),
-    st.tuples(st.just("rest"), st.booleans()),
-    st.tuples(st.just("persists"), st.booleans()),
-    st.tuples(st.just("samples")),
-    st.tuples(st.just("finish"), st.sampled_from(wire.Outcome)),
-)
-
-
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(running=st.booleans(), steps=st.lists(STEP, max_size=25))
-def test_any_script_leads_both_through_the_same_states(
-    console: Console, running: bool, steps: list[tuple]
-) -> None:
-    console.do("new", 16)
-    console.now = 0
-    model, sequence = Model(), 0
-    ready: list[tuple] = [
-        ("send", m, "next") for m in (wire.Hello(1, 1, 42), wire.Heartbeat(1, 1, 0))
-    ]
-    if running:
-        ready += [("send", m, "next") for m in (SETS[0], wire.Arm(CRC), wire.Start(TRIAL))]
-    for step in ready + steps:
-        if step[0] == "send":
-            message = step[1]
-            numbered = wire.encode(message)[0] in wire.COMMANDS
-            if numbered:
-                sequence = (sequence + {"next": 1, "same": 0, "far": 7}[step[2]]) % 2**16
-            expected = model.receive(console.now, sequence, message)
-            answer = console.send(sequence, message)
-            if isinstance(expected, wire.NakCode):
-                assert only(wire.Nak, answer)[0].code is expected
-            elif isinstance(expected, State):
-                assert only(wire.Ack, answer) or only(wire.Capabilities, answer)
-        elif step[0] == "wait":
-            console.wait(step[1])
-            model.tick(console.now)
-        elif step[0] == "samples":
-            assert bool(take(console, 0)) == model.samples()
-        elif step[0] == "finish":
-            console.do("finish", int(step[1]), int(wire.Fault.DRIVE), "-")
-            model.finish(console.now, step[1])
-        else:
-            setattr(model, step[0], step[1])
-            console.do(step[0], int(step[1]))
-        # Asked in a way that changes nothing: RESEND is no heartbeat and no command.
-        lost = console.send(0, wire.Resend(2**32 - 1, 0, 1))
-        assert lost == [wire.Lost(2**32 - 1, 0, 1)] or only(wire.End, lost)
-        model.tick(console.now)
-    status = heartbeat(console)
-    model.receive(console.now, 0, wire.Heartbeat(1, TRIAL, 0))
-    assert (status.state, status.trial, status.next_record) == (
-        model.state, model.trial, model.records,
-    )  # fmt: skip

@@ -11,16 +11,18 @@ import pytest
 from campaign.errors import UsageError
 from campaign.link.connection import Connection, LineLostError
 from campaign.link.port import open_port
-from campaign.wire.codes import Kind
-from campaign.wire.frames import Frame, FrameDecoder
-from campaign.wire.messages import Heartbeat, decode
+from campaign.wire.codes import Fault, Kind, State
+from campaign.wire.frames import Frame, FrameDecoder, encode_frame
+from campaign.wire.messages import Bye, Heartbeat, Safe, Status, decode, encode
+
+SESSION = 0x12345678
 
 
 @pytest.fixture
 def line() -> tuple[Connection, socket.socket]:
     """A connection, and the other end of its port."""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        connection = Connection(f"socket://127.0.0.1:{server.getsockname()[1]}", 115_200)
+        connection = Connection(f"socket://127.0.0.1:{server.getsockname()[1]}", 115_200, SESSION)
         there, _ = server.accept()
     there.settimeout(10.0)
     yield connection, there
@@ -42,6 +44,13 @@ class Heard:
             self._frames += self._decoder.feed(data)
         return self._frames.pop(0)
 
+    def until_the_end(self) -> list[Frame]:
+        """What comes until the line is closed."""
+        frames, self._frames = self._frames, []
+        while data := self._there.recv(4096):
+            frames += self._decoder.feed(data)
+        return frames
+
 
 def test_heartbeats_go_on_by_themselves_and_say_what_is_wanted(line) -> None:
     connection, there = line
@@ -54,6 +63,7 @@ def test_heartbeats_go_on_by_themselves_and_say_what_is_wanted(line) -> None:
         if beat.trial == 5:
             break
     assert beat.next == 77
+    assert beat.session == first.session == SESSION
     assert beat.counter > first.counter
 
 
@@ -71,13 +81,78 @@ def test_bytes_pass_both_ways_unchanged(line) -> None:
         came += there.recv(4096)
 
 
-def test_when_the_parent_goes_it_sends_safe(line) -> None:
+def status(*, drive_on: bool) -> bytes:
+    """What a controller answers to SAFE."""
+    message = Status(State.SAFE, Fault.NONE, True, drive_on, 1, 0.0, 1, 0.0, 0, 0, 0, 0)
+    kind, body = encode(message)
+    return encode_frame(kind, 0, body)
+
+
+def last_words(frames: list[Frame]) -> list[Frame]:
+    """What is no heartbeat."""
+    return [frame for frame in frames if frame.kind != Kind.HEARTBEAT]
+
+
+def leave(connection: Connection) -> None:
+    connection._out.close()  # as when the host is killed
+
+
+def test_when_the_parent_goes_it_sends_its_sessions_safe_until_confirmed_and_then_bye(line) -> None:
+    connection, there = line
+    heard = Heard(there)
+    connection.holds(held=True)
+    heard.next()
+    leave(connection)
+    while (frame := heard.next()).kind == Kind.HEARTBEAT:
+        pass
+    assert decode(frame.kind, frame.body) == Safe(SESSION)  # the holder's: it latches nothing
+    there.sendall(status(drive_on=True))
+    assert decode(Kind.SAFE, heard.next().body) == Safe(SESSION)  # that was no confirmation
+    there.sendall(status(drive_on=False))
+    *safes, bye = heard.until_the_end()
+    assert {frame.kind for frame in last_words(safes)} <= {Kind.SAFE}
+    assert decode(bye.kind, bye.body) == Bye(SESSION)
+    assert connection._relay.wait(10.0) == 0
+
+
+def test_an_orphan_that_nobody_confirms_says_so_after_its_last_words(line) -> None:
+    connection, there = line
+    heard = Heard(there)
+    connection.holds(held=True)
+    heard.next()
+    leave(connection)
+    frames = heard.until_the_end()
+    *safes, bye = last_words(frames)
+    assert len(safes) > 20
+    after = frames[frames.index(safes[0]) :]
+    assert len(after) - len(last_words(after)) <= 1  # a heartbeat that was under way
+    assert {decode(frame.kind, frame.body) for frame in safes} == {Safe(SESSION)}
+    assert bye.kind == Kind.BYE
+    assert connection._relay.wait(10.0) == 5
+
+
+@pytest.mark.parametrize("holds", [(), (False,), (True, False)])
+def test_a_relay_that_does_not_hold_the_controller_leaves_without_a_word(
+    line, holds: tuple[bool, ...]
+) -> None:
+    """Its SAFE would be a stranger's, and stop whoever holds it."""
     connection, there = line
     heard = Heard(there)
     heard.next()
-    connection._out.close()  # as when the host is killed
-    while heard.next().kind != Kind.SAFE:
-        pass
+    for held in holds:
+        connection.holds(held=held)
+    leave(connection)
+    assert last_words(heard.until_the_end()) == []
+    assert connection._relay.wait(10.0) == 0
+
+
+def test_closing_says_the_last_words_and_can_be_told_not_to(line) -> None:
+    connection, there = line
+    heard = Heard(there)
+    heard.next()
+    connection.holds(held=True)
+    connection.close(last_words=False)
+    assert last_words(heard.until_the_end()) == []
 
 
 def test_a_line_that_is_cut_is_an_error_and_no_hang(line) -> None:

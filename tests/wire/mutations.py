@@ -16,21 +16,27 @@ def some_message(source: random.Random) -> wire.Message:
     data = b"".join(struct.pack("<dd", source.gauss(0, 1), 0.0) for _ in range(count))
     return source.choice(
         [
-            wire.Hello(1, 1, u32, "host"),
+            wire.Hello(2, 2, u32 | 1, "host"),
             wire.Set((wire.Item("task.duration", source.random()), wire.Item("a.b", "text"))),
             wire.Set((wire.Item("task.times", wire.ArraySlice(2, 0, (1.0, 2.0))),)),
             wire.Arm(u32),
             wire.Start(u32 | 1),
-            wire.Heartbeat(u32, 1, source.randint(0, 99)),
+            wire.Heartbeat(u32, 1, source.randint(0, 99), u32 & 3),
             wire.Resend(1, source.randint(0, 99), source.randint(1, 99)),
             wire.Release(1),
             wire.Stop(),
             wire.Safe(),
+            wire.Safe(u32, "somebody"),
             wire.Clear(),
+            wire.Query(),
+            wire.Unlatch(u32 & 7, "ada"),
+            wire.Bye(u32 | 1),
             wire.Ack(source.getrandbits(16), wire.Kind.SET, wire.State.CONFIGURED, u32),
             wire.Samples(1, u32, u32, count, data),
             wire.Event(1, 3, source.random(), "something"),
             wire.End(1, 4, wire.Outcome.COMPLETED, wire.Fault.NONE, 9, True),
+            wire.Latch(True, u32, wire.LatchCause.STOPPED, None, "somebody"),
+            wire.Holder(True, 0.0125, "host"),
         ]
     )
 

@@ -54,14 +54,17 @@ def _range(kind: type[wire.Resend] | type[wire.Lost]) -> st.SearchStrategy[wire.
 
 
 HOST = st.one_of(
-    st.builds(wire.Hello, U8, U8, U32, TEXT),
+    st.builds(wire.Hello, U8, U8, POSITIVE, TEXT),
     st.builds(wire.Set, st.lists(ITEM, min_size=1, max_size=4).map(tuple)),
     st.builds(wire.Arm, U32),
     st.builds(wire.Start, POSITIVE),
-    st.builds(wire.Heartbeat, U32, U32, U32),
+    st.builds(wire.Heartbeat, U32, U32, U32, U32),
     _range(wire.Resend),
     st.builds(wire.Release, U32),
-    st.sampled_from([wire.Stop(), wire.Safe(), wire.Clear()]),
+    st.builds(wire.Safe, U32, TEXT),
+    st.builds(wire.Unlatch, U32, TEXT),
+    st.builds(wire.Bye, POSITIVE),
+    st.sampled_from([wire.Stop(), wire.Safe(), wire.Clear(), wire.Query()]),
 )
 DEVICE = st.one_of(
     st.builds(
@@ -81,5 +84,9 @@ DEVICE = st.one_of(
         wire.End, U32, U32, st.sampled_from(wire.Outcome), FAULTS, U32, st.booleans(), TEXT
     ),
     _range(wire.Lost),
+    st.builds(
+        wire.Latch, st.booleans(), U32, st.sampled_from(wire.LatchCause), st.none() | FINITE, TEXT
+    ),
+    st.builds(wire.Holder, st.booleans(), st.none() | FINITE, TEXT),
 )  # fmt: skip
 MESSAGE = HOST | DEVICE

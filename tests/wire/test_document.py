@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from campaign.wire import messages as wire
-from campaign.wire.codes import COMMANDS, Code, Tag
+from campaign.wire.codes import COMMANDS, VERSION, Code, Tag
 from campaign.wire.frames import MAX_BODY, MAX_ENCODED, FrameDecoder, encode_frame
 from campaign.wire.statemachine import after, after_hello, after_silence
 
@@ -53,8 +53,13 @@ def test_the_state_table_is_the_state_machine() -> None:
         assert row[1:] == [cell(after(state, kind)) for state in wire.State], kind
     for same, name in ((True, "HELLO, same session"), (False, "HELLO, another session")):
         [row] = rows(name)
-        expected = [cell(after_hello(state, same)) for state in wire.State]
+        expected = [cell(after_hello(state, same, held=False)) for state in wire.State]
         assert [text.removesuffix(" (busy)") for text in row[1:]] == expected
+    [row] = rows("the same while held")
+    expected = [cell(after_hello(state, same_session=False, held=True)) for state in wire.State]
+    assert [text.removesuffix(" (busy)") for text in row[1:]] == expected
+    for state in wire.State:  # of the other row: held or not makes no difference
+        assert after_hello(state, True, held=True) == after_hello(state, True, held=False)
     [row] = rows("no heartbeat")
     assert row[1:] == [after_silence(state).name for state in wire.State]
 
@@ -66,6 +71,8 @@ def test_the_numbers_of_the_enumerations_are_listed() -> None:
         assert re.search(rf"^\| {int(outcome)} \| {outcome.text}\b", DOCUMENT, re.MULTILINE)
     for fault in wire.Fault:
         assert re.search(rf"\| {int(fault)} \| {fault.text}\b", DOCUMENT)
+    for cause in wire.LatchCause:
+        assert re.search(rf"^\| {int(cause)} {cause.text} \|", DOCUMENT, re.MULTILINE)
     for form in wire.Format:
         assert f"| {int(form)} {form.text} | {form.size} |" in DOCUMENT
     assert [int(tag) for tag in Tag] == [1, 2, 3, 4, 5]
@@ -86,7 +93,9 @@ def test_sizes_and_loads_follow_from_the_layouts() -> None:
         wire.State.IDLE, wire.Fault.NONE, True, False, 1, 0.0, 1, 0.0, 1, 1, 1, 1
     )  # fmt: skip
     assert f"STATUS: {len(encode_frame(*_numbered(status)))} B" in DOCUMENT
-    assert f"heartbeats of {len(encode_frame(*_numbered(wire.Heartbeat(1, 1, 1))))} B" in FLAT
+    beat = wire.Heartbeat(1, 1, 1, 0x12345678)
+    assert f"heartbeats of {len(encode_frame(*_numbered(beat)))} B" in FLAT
+    assert "1.1 kB/s" in FLAT
 
 
 def _numbered(message: wire.Message) -> tuple[int, int, bytes]:
@@ -94,9 +103,9 @@ def _numbered(message: wire.Message) -> tuple[int, int, bytes]:
     return kind, 1, body
 
 
-EXAMPLES = {
-    "HELLO": wire.Hello(1, 1, 0x12345678, "campaign"),
-    "SET": wire.Set(
+EXAMPLES = [
+    wire.Hello(2, 2, 0x12345678, "campaign"),
+    wire.Set(
         (
             wire.Item("task.mode", "rate"),
             wire.Item("task.command.amplitude", 0.5),
@@ -105,26 +114,37 @@ EXAMPLES = {
             wire.Item("task.command.times", wire.ArraySlice(3, 1, (0.0, 2.5))),
         )
     ),
-    "ARM": wire.Arm(0xCBF43926),
-    "START": wire.Start(1),
-    "HEARTBEAT": wire.Heartbeat(1, 1, 17),
-    "RESEND": wire.Resend(1, 5, 2),
-    "SAFE": wire.Safe(),
-    "ACK": wire.Ack(2, wire.Kind.SET, wire.State.CONFIGURED, 0xB007),
-    "NAK": wire.Nak(3, 3, wire.NakCode.LIMIT, wire.State.CONFIGURED, "task.command", "too fast"),
-    "SAMPLES": wire.Samples(1, 0, 0, 2, struct.pack("<dhdh", 0.5, 100, -0.5, -100)),
-    "END": wire.End(1, 2, wire.Outcome.FAULT, wire.Fault.DRIVE, 2, True, "drive fault 17"),
-    "LOST": wire.Lost(1, 0, 3),
-}
-"""What the text above the examples says they are."""
+    wire.Arm(0xCBF43926),
+    wire.Start(1),
+    wire.Heartbeat(1, 1, 17, 0x12345678),
+    wire.Resend(1, 5, 2),
+    wire.Safe(),
+    wire.Safe(0x12345678, "stop"),
+    wire.Unlatch(3, "ada"),
+    wire.Ack(2, wire.Kind.SET, wire.State.CONFIGURED, 0xB007),
+    wire.Nak(3, 3, wire.NakCode.LIMIT, wire.State.CONFIGURED, "task.command", "too fast"),
+    wire.Samples(1, 0, 0, 2, struct.pack("<dhdh", 0.5, 100, -0.5, -100)),
+    wire.End(1, 2, wire.Outcome.FAULT, wire.Fault.DRIVE, 2, True, "drive fault 17"),
+    wire.Lost(1, 0, 3),
+    wire.Latch(True, 3, wire.LatchCause.STOPPED, 2.5, "stop"),
+]
+"""What the text above the examples says they are, in the order of the examples."""
 
 
 def test_the_worked_examples_are_what_they_say() -> None:
     pattern = r"^([A-Z]+), sequence (\d+)\n((?:[0-9a-f]{2}[ \n])+)"
     found = re.findall(pattern, DOCUMENT, re.MULTILINE)
-    assert {name for name, _, _ in found} == set(EXAMPLES)
-    for name, sequence, octets in found:
+    assert len(found) == len(EXAMPLES)
+    for (name, sequence, octets), example in zip(found, EXAMPLES, strict=True):
+        assert name == wire_kinds()[type(example)].name
         [frame] = FrameDecoder().feed(bytes.fromhex(octets))
         assert frame.sequence == int(sequence)
-        assert wire.decode(frame.kind, frame.body) == EXAMPLES[name]
+        assert wire.decode(frame.kind, frame.body) == example
         assert encode_frame(frame.kind, frame.sequence, frame.body) == bytes.fromhex(octets)
+
+
+def test_the_version_is_the_one_that_is_spoken() -> None:
+    assert f"This is version {VERSION} of the protocol" in FLAT
+    last = [row[0] for row in rows(r"\d") if len(row) == 2][-1]
+    assert last == str(VERSION)
+    assert f"offers versions {VERSION} to {VERSION}" in FLAT

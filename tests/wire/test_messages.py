@@ -60,6 +60,15 @@ def test_any_bytes_are_a_message_or_a_wire_error(kind: int, body: bytes) -> None
         (wire.Kind.SET, b"\x01\x01a\x04\x01\x00\xff"),  # not UTF-8
         (wire.Kind.SET, b"\x01\x01a\x05" + struct.pack("<IIBd", 1, 1, 1, 0.0)),  # beyond total
         (wire.Kind.START, struct.pack("<I", 0)),
+        (wire.Kind.HELLO, b"\x02\x02" + bytes(4) + b"\x04host"),  # nobody's session
+        (wire.Kind.BYE, bytes(4)),
+        (wire.Kind.HEARTBEAT, bytes(12)),  # of version 1: of no session
+        (wire.Kind.QUERY, b"?"),
+        (wire.Kind.UNLATCH, struct.pack("<I", 3)),  # by nobody at all
+        (wire.Kind.UNLATCH, struct.pack("<IB", 3, 1) + b"\xff"),
+        (wire.Kind.LATCH, struct.pack("<BIBdB", 2, 3, 1, 0.0, 0)),
+        (wire.Kind.LATCH, struct.pack("<BIBdB", 1, 3, 9, 0.0, 0)),  # no such cause
+        (wire.Kind.LATCH, struct.pack("<BIBdB", 1, 3, 1, math.inf, 0)),
         (wire.Kind.RESEND, struct.pack("<III", 1, 5, 0)),
         (wire.Kind.RESEND, struct.pack("<III", 1, 2**32 - 1, 2)),
         (wire.Kind.SAMPLES, struct.pack("<IIIH", 1, 0, 0, 0)),
@@ -72,8 +81,37 @@ def test_what_is_not_allowed_is_refused(kind: int, body: bytes) -> None:
         wire.decode(kind, body)
 
 
-def test_safe_is_understood_whatever_its_body() -> None:
-    assert wire.decode(wire.Kind.SAFE, b"anything") == wire.Safe()
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (b"", wire.Safe()),
+        (b"\x05\0\0\0", wire.Safe(5)),
+        (b"\x05\0\0\0\x04stop", wire.Safe(5, "stop")),
+        (b"\0\0\0\0\x04stop", wire.Safe(0, "stop")),
+        (b"\x05\0\0", wire.Safe()),
+        (b"\x05\0\0\0\x05stop", wire.Safe()),
+        (b"\x05\0\0\0\x04stop!", wire.Safe()),
+        (b"\x05\0\0\0\x01\xff", wire.Safe()),
+        (b"anything", wire.Safe()),
+    ],
+)
+def test_safe_is_understood_whatever_its_body(body: bytes, message: wire.Safe) -> None:
+    assert wire.decode(wire.Kind.SAFE, body) == message
+
+
+@given(st.binary(max_size=300))
+def test_any_body_of_a_safe_is_one(body: bytes) -> None:
+    assert isinstance(wire.decode(wire.Kind.SAFE, body), wire.Safe)
+
+
+def test_nobodys_safe_is_the_one_of_version_1() -> None:
+    assert wire.encode(wire.Safe()) == (wire.Kind.SAFE, b"")
+
+
+@pytest.mark.parametrize("message", [wire.Hello(2, 2, 0), wire.Bye(0)])
+def test_nobodys_session_cannot_be_said(message: wire.Message) -> None:
+    with pytest.raises(wire.WireError, match="nobody"):
+        wire.encode(message)
 
 
 VALUES = st.one_of(FINITE, INT64, st.booleans(), TEXT, st.lists(FINITE, max_size=200).map(tuple))
@@ -140,7 +178,8 @@ def test_words_are_those_of_the_rest_of_the_program() -> None:
 
 def test_commands_are_what_the_host_sends_and_the_device_acknowledges() -> None:
     host = {kind for kind in wire.Kind if not kind & 0x80}
-    assert host - codes.COMMANDS == {wire.Kind.HEARTBEAT, wire.Kind.RESEND}
+    unnumbered = {wire.Kind.HEARTBEAT, wire.Kind.RESEND, wire.Kind.QUERY, wire.Kind.BYE}
+    assert host - codes.COMMANDS == unnumbered
 
 
 def test_the_protocol_needs_the_standard_library_only() -> None:

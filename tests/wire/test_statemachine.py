@@ -12,6 +12,7 @@ from campaign.wire.statemachine import (
     after_end,
     after_hello,
     after_silence,
+    latches,
 )
 
 
@@ -46,12 +47,33 @@ def test_silence_and_faults_end_motion() -> None:
     assert after_end(State.SAFE, Outcome.INTERRUPTED) is State.SAFE
 
 
-def test_another_host_takes_nothing_over_that_moves_or_is_about_to() -> None:
-    assert after_hello(State.RUNNING, same_session=False) is NakCode.BUSY
-    assert after_hello(State.ARMED, same_session=False) is NakCode.BUSY
-    assert after_hello(State.CONFIGURED, same_session=False) is State.IDLE
+def test_a_latch_can_be_cleared_only_where_nothing_moves_and_that_changes_no_state() -> None:
     for state in State:
-        assert after_hello(state, same_session=True) is state
+        moves = state in (State.ARMED, State.RUNNING)
+        assert after(state, Kind.UNLATCH) is (NakCode.WRONG_STATE if moves else state)
+
+
+def test_another_host_takes_nothing_over_that_moves_or_is_about_to() -> None:
+    for held in (False, True):
+        assert after_hello(State.RUNNING, same_session=False, held=held) is NakCode.BUSY
+        assert after_hello(State.ARMED, same_session=False, held=held) is NakCode.BUSY
+    assert after_hello(State.CONFIGURED, same_session=False, held=False) is State.IDLE
+
+
+@pytest.mark.parametrize("state", State)
+def test_nobody_takes_a_device_from_a_host_that_is_heard(state: State) -> None:
+    assert after_hello(state, same_session=False, held=True) is NakCode.BUSY
+    for held in (False, True):
+        assert after_hello(state, same_session=True, held=held) is state
+
+
+def test_every_safe_but_the_holders_latches() -> None:
+    assert not latches(42, holder=42)
+    assert latches(43, holder=42)
+    assert latches(42, holder=None)
+    assert latches(0, holder=42)
+    assert latches(0, holder=None)
+    assert latches(0, holder=0)  # nobody is no session
 
 
 def test_numbers_follow_each_other_over_the_wrap() -> None:
@@ -63,6 +85,7 @@ def test_numbers_follow_each_other_over_the_wrap() -> None:
     assert numbering.turn(Kind.SET, 65535, b"a") is Turn.REPEATED
     assert numbering.turn(Kind.SET, 65535, b"b") is Turn.OUT_OF_ORDER
     assert numbering.turn(Kind.SAFE, 65535, b"") is Turn.NEW
+    assert numbering.turn(Kind.UNLATCH, 65535, b"") is Turn.OUT_OF_ORDER  # numbered as any other
     assert numbering.turn(Kind.ARM, 0, b"crc.") is Turn.NEW
     assert numbering.turn(Kind.SET, 65535, b"a") is Turn.OUT_OF_ORDER
     numbering.begin(session=1, sequence=65534)  # the first HELLO, heard once more
