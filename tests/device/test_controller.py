@@ -320,7 +320,7 @@ def test_a_reboot_forgets_everything_but_which_trial_comes_next() -> None:
     status = rig.controller.status()
     assert (status.state, status.ring_used, status.trial) == (State.IDLE, 0, 0)
     assert status.boot != boot
-    assert rig.send(Stop()).code is NakCode.BUSY  # no session
+    assert rig.send(Stop()).code is NakCode.OUT_OF_ORDER  # no session
     rig.start()
     rig.go_on(1.2)
     assert rig.end().outcome is Outcome.COMPLETED

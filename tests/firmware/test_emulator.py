@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from campaign import trial
 from campaign.device import controller as rehearsal
 from campaign.device import latch as memory
-from campaign.device.bench_file import load_bench
 from campaign.device.machine import Setup
 from campaign.device.ring import Ring
+from campaign.protocol.bench_file import load_bench
 from campaign.wire import messages as wire
 from campaign.wire.frames import Frame, encode_frame
 
