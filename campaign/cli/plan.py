@@ -14,7 +14,7 @@ from campaign.cli.prepare import Prepared, Request, prepare
 from campaign.execution.display import clock
 from campaign.policy import Policy, Response
 from campaign.protocol import Plan, PlannedTest, as_tree, check_limits
-from campaign.protocol.limit_check import in_display_units
+from campaign.protocol.limit_check import in_display_units, one_count
 from campaign.trial import Role, Trial
 
 NOTES = 5
@@ -110,6 +110,10 @@ def _print_details(plan: Plan, test: PlannedTest) -> None:
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
+    for use in test.coarse:
+        broken = "  BROKEN" if use.margin.broken else ""
+        share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
+        print_line(f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}")
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

@@ -53,6 +53,7 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "trials": list(test.numbers),
         "duration_s": test.duration,
         "limits": [_use(use) for use in test.closest],
+        "coarse": [_use(use) for use in test.coarse],
     }
 
 
@@ -78,6 +79,7 @@ def _use(use: LimitUse) -> dict[str, JsonValue]:
     margin: Margin = use.margin
     return {
         "limit": margin.limit,
+        "sensor": margin.sensor,
         "trial": use.trial,
         "value": _finite(margin.value),
         "bound": margin.bound,
