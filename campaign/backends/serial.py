@@ -253,7 +253,6 @@ class SerialBackend:
             time.sleep(RETRY)
         return False
 
-
     def _seen_safe_beside(self, deadline: float) -> bool:
         """Over the connection of a trial that does not let go of it, and does not read it."""
         connection = self._connection

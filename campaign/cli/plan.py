@@ -113,7 +113,9 @@ def _print_details(plan: Plan, test: PlannedTest) -> None:
     for use in test.coarse:
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
-        print_line(f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}")
+        print_line(
+            f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
+        )
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

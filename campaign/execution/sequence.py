@@ -22,7 +22,6 @@ from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
 from campaign.trial import Ending, Outcome, SafeState, Trial
 
-
 LOOK = 1.0
 """s after which a display is told how far the running trials are."""
 

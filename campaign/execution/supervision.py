@@ -11,7 +11,7 @@ from campaign.backends.interface import Source
 from campaign.trial import Array, ChannelInfo, Trial
 
 Subscriber = Callable[[Trial, tuple[ChannelInfo, ...], Array, Array], None]
-"""Is handed every block that is archived: its trial, the channels, time (n,), samples (channels, n).
+"""Is handed every block that is archived: its trial, the channels, time (n,), block (channels, n).
 
 Called from the trial's own thread, before the backend goes on: it must return at once and change
 nothing. One that raises is not called again in that trial.

@@ -51,7 +51,7 @@ def in_display_units(margin: Margin) -> tuple[str, str]:
 
 
 def one_count(margin: Margin) -> str:
-    """What a single count of a sensor reads as: `one count of the encoder reads as a rate of ...`"""
+    """What a single count of a sensor reads as, in words."""
     value, _ = in_display_units(margin)
     a = "an" if margin.limit == "angle" else "a"
     return f"one count of the {margin.sensor} reads as {a} {margin.limit} of {value}"

@@ -327,7 +327,9 @@ def _ended(
     told = f"{why}, and the trial ended as {found.ending.outcome}: {found.ending.reason}"
     require(found.ending.outcome is outcome, told)
     allowed = under_test.most_blocks
-    require(found.after <= allowed, f"{why}; {found.after} blocks came after; at most {allowed} may")
+    require(
+        found.after <= allowed, f"{why}; {found.after} blocks came after; at most {allowed} may"
+    )
     if under_test.live:
         safe = found.made_safe and found.made_safe[-1] is SafeState.CONFIRMED
         require(safe, f"{why}; make_safe() then did not answer CONFIRMED")

@@ -108,7 +108,9 @@ def got_through(under_test: BackendUnderTest, patience: float) -> SafeState:
             )
             asked.start()
             asked.join(patience)
-            require(answers, f"make_safe() did not return within {patience:g} s while execute() hung")
+            require(
+                answers, f"make_safe() did not return within {patience:g} s while execute() hung"
+            )
         finally:
             stop.set()
             recorder.released.set()

@@ -59,7 +59,8 @@ class Desk:
         self.stop = TrialStop(lambda: False)
         self.blocks: list[int] = []
         supervision = Supervision(
-            source, subscribers=(lambda trial, channels, time, block: self.blocks.append(len(time)),)
+            source,
+            subscribers=(lambda trial, channels, time, block: self.blocks.append(len(time)),),
         )
         self.recorder = SupervisingRecorder(self.trial, self.file, self.stop, supervision)
 
@@ -198,7 +199,13 @@ def test_times_may_be_rounded_otherwise() -> None:
 
 @pytest.mark.parametrize(
     ("samples", "stop_rate", "good"),
-    [(200, None, True), (199, None, True), (198, None, False), (120, None, False), (120, 0.1, True)],
+    [
+        (200, None, True),
+        (199, None, True),
+        (198, None, False),
+        (120, None, False),
+        (120, 0.1, True),
+    ],
 )
 def test_a_completed_trial_has_all_its_samples(
     samples: int, stop_rate: float | None, good: bool
@@ -321,6 +328,15 @@ def test_lost_samples_are_no_divergence_but_no_completed_trial_either() -> None:
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES)
     assert np.isnan(recording["drive_torque"][50:60]).all()
     assert recording.events[0] == Event(0.5, "samples 50 to 59 were lost and are NaN")
+
+
+def test_the_first_verdict_stands() -> None:
+    desk = Desk()
+    desk.recorder.start(CHANNELS)
+    desk.recorder.append(np.zeros(1), np.full((4, 1), 11.0))
+    desk.recorder.silent(9.0)
+    desk.recorder.start(CHANNELS)
+    assert desk.end(COMPLETED)[0].outcome is Outcome.LIMIT
 
 
 def test_nothing_is_archived_once_the_trial_is_concluded() -> None:

@@ -158,9 +158,11 @@ def test_means_are_exact_and_do_not_depend_on_the_blocks(
     cuts = [cut for cut in cuts if cut <= len(counts)]
     found = judge(on, block, cuts=cuts)
     assert (found.sample if found else None) == expected
-    assert found is None or found.value == sum(
-        counts[max(0, found.sample - window + 1) : found.sample + 1]
-    ) / 8 / window  # to the bit
+    assert (
+        found is None
+        or found.value
+        == sum(counts[max(0, found.sample - window + 1) : found.sample + 1]) / 8 / window
+    )  # to the bit
 
 
 @settings(max_examples=200)
