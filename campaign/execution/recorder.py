@@ -145,8 +145,9 @@ class SupervisingRecorder:
 
     def silent(self, seconds: float) -> None:
         """Nothing came for so long: the trial is over, whatever becomes of its backend."""
-        first = self.heard is None
-        what = "no samples came" if first else "no samples came any more"
+        what = "no samples came" if self.heard is None else "no samples came any more"
+        if self._writing.locked():
+            what = "the archive took no samples"
         reason = f"{what} for {seconds:.3g} s, and the trial had not ended"
         self._give(self._new("silence", Outcome.FAULT, reason, Fault.LOST_CONNECTION))
 

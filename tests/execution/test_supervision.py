@@ -29,7 +29,7 @@ from campaign.trial import (
     SafeState,
     Trial,
 )
-from tests.execution.fakes import COMPLETED, MemoryArchive, make_trials
+from tests.execution.fakes import COMPLETED, MemoryArchive, MemoryTrial, make_trials
 
 ANGLE = ChannelInfo("relative_angle", "rad", "Angle", "deg")
 INTERRUPTED = Ending(Outcome.INTERRUPTED, "stopped")
@@ -289,6 +289,25 @@ def test_errors_of_the_backends_thread_are_those_of_the_run(lab: Callable[..., L
     assert bench.archive.endings[1].reason == "the port closed"
     with pytest.raises(ArchiveError, match="no space left"):
         lab(once(full)).run()
+
+
+def test_a_disk_that_hangs_leaves_no_bench_running(
+    lab: Callable[..., Lab], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("campaign.execution.recorder.ARCHIVE_PATIENCE", 0.1)
+    bench = lab(once(lambda live, recorder, stop: hand_over(recorder, 0, 10) or COMPLETED))
+    begin = bench.archive.begin
+
+    def begin_on_a_slow_disk(trial: Trial) -> MemoryTrial:
+        file = begin(trial)
+        file.append = lambda time, block: bench.backend.released.wait(LONG)  # type: ignore[assignment]
+        return file
+
+    bench.archive.begin = begin_on_a_slow_disk  # type: ignore[method-assign]
+    with pytest.raises(ArchiveError, match="takes no samples"):
+        bench.run(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1))
+    assert bench.backend.log == ["begins", "made safe", "made safe"]
+    assert bench.archive.endings == {}
 
 
 # Time
