@@ -43,6 +43,9 @@ LONGEST_WAIT = 0.5
 POLL = 0.02
 """s that a look at the line waits at most."""
 SAFE_INTERVAL = 0.03
+ASLEEP = 1.0
+"""s between two looks at the line that say that this program itself did not run (SIGSTOP, a
+suspended machine): what was not heard meanwhile is nobody's silence."""
 HOST = "campaign"
 GIVEN_UP = "given up: the bench is being made safe"
 
@@ -90,7 +93,7 @@ class Session:
         self._sequence = random.SystemRandom().randrange(2**16)
         self._answers: dict[int, Ack | Nak | Capabilities] = {}
         self._channels: dict[int, dict[int, Channels]] = {}
-        self._heard = time.monotonic()
+        self._heard = self._looked = time.monotonic()
         self._name = name
         self.capabilities: Capabilities | None = None
         self.status: Status | None = None
@@ -225,6 +228,9 @@ class Session:
         except LineLostError as error:
             raise SilenceError(f"the connection was lost: {error}") from None
         now = time.monotonic()
+        slept, self._looked = now - self._looked > ASLEEP + timeout, now
+        if slept:
+            self._heard = now
         if not data:
             if now - self._heard > self._silence:
                 raise SilenceError(f"the controller has not been heard for {self._silence:g} s")
