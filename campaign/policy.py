@@ -51,7 +51,7 @@ class Rest(Options):
 Occasion = Literal[
     "default", "limit", "diverged",
     "lost-connection", "lost-samples", "heartbeat", "reset", "over-temperature", "limit-switch",
-    "sensor", "drive", "refused", "other",
+    "sensor", "drive", "refused", "recording", "other",
 ]  # fmt: skip
 """A fault, a limit of the bench met in motion, a divergence, or `default` for all unnamed ones."""
 

@@ -173,6 +173,7 @@ class Fault(StrEnum):
     SENSOR = "sensor"  # a sensor is stuck or out of its range
     DRIVE = "drive"  # the drive reports a fault of its own
     REFUSED = "refused"  # the bench would not arm
+    RECORDING = "recording"  # what the backend recorded is not what it promised
     OTHER = "other"
 
 

@@ -17,14 +17,18 @@
  *
  * Besides "sent" the answers are what the device had the application do, in its order: "set",
  * "drive on", "brake", "drive off", "remember LATCHED COUNT CAUSE WHO" and, after that, "failed".
+ *   limits HEX      f64 angle, rate, rate_time, torque, current, sample rate: watch a new trial
+ *   measured HEX    f64 angle, rate, torque, current of each sample: the verdicts until the last
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "campaign_limits.h"
 #include "campaign_state.h"
 
 #define MOST_RECORDS 4096u
+#define MOST_RATES 4096u
 #define LONGEST_LINE (1u << 21)
 
 static char line[LONGEST_LINE];
@@ -326,6 +330,54 @@ static void act(const char *word, const char *a, const char *b, const char *c)
     }
 }
 
+/* As it comes from a sensor: infinite and undefined as well, which no message may be. */
+static double measured_f64(struct campaign_reader *reader)
+{
+    const uint64_t bits = campaign_get_u64(reader);
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* The watch over limits, which is no part of the device; false when it is neither command. */
+static bool watch_limits(const char *word, const char *a)
+{
+    static double rates[MOST_RATES];
+    static struct campaign_limit_watch watch;
+    static unsigned long taken;
+    if (strcmp(word, "limits") == 0) {
+        struct campaign_reader reader = {octets, read_octets(a), 0, false};
+        struct campaign_limits given;
+        given.angle = measured_f64(&reader);
+        given.rate = measured_f64(&reader);
+        given.rate_time = measured_f64(&reader);
+        given.torque = measured_f64(&reader);
+        given.current = measured_f64(&reader);
+        const double sample_rate = measured_f64(&reader);
+        taken = 0;
+        printf("samples %lu\n", (unsigned long)campaign_limits_init(&watch, &given, sample_rate,
+                                                                    rates, MOST_RATES));
+        return true;
+    }
+    if (strcmp(word, "measured") != 0)
+        return false;
+    const size_t count = read_octets(a) / 32u;
+    struct campaign_reader reader = {octets, count * 32u, 0, false};
+    for (size_t i = 0; i < count; i++, taken++) {
+        struct campaign_measured measured;
+        measured.angle = measured_f64(&reader);
+        measured.rate = measured_f64(&reader);
+        measured.torque = measured_f64(&reader);
+        measured.current = measured_f64(&reader);
+        const enum campaign_verdict verdict = campaign_limits_check(&watch, &measured);
+        if (verdict != CAMPAIGN_WITHIN) {
+            printf("ends %lu %d\n", taken, (int)verdict);
+            break;
+        }
+    }
+    return true;
+}
+
 int main(void)
 {
     renew(MOST_RECORDS, NULL, 0);
@@ -337,7 +389,7 @@ int main(void)
         const char *a = strtok(NULL, " \n");
         const char *b = strtok(NULL, " \n");
         const char *c = strtok(NULL, " \n");
-        if (word != NULL && !codec(word, a, b, c))
+        if (word != NULL && !codec(word, a, b, c) && !watch_limits(word, a))
             act(word, a, b, c);
         puts(".");
         fflush(stdout);

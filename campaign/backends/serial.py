@@ -46,6 +46,8 @@ RETRY = 0.2
 """s between two attempts to reach a controller that has gone."""
 ANSWER = 1.0
 """s that a controller found again may take to answer while it is being made safe."""
+LETTING_GO = 1.0
+"""s in which a trial in another thread lets go of the line, unless it hangs elsewhere."""
 REST = 2.0
 """s in which a controller that has ended a trial is seen at rest."""
 
@@ -149,15 +151,21 @@ class SerialBackend:
                     self._motion.stop()
 
     def make_safe(self) -> SafeState:
-        """SAFE until the controller says that it is, over a new connection when there is none."""
+        """SAFE until the controller says that it is, over a new connection when there is none.
+
+        A trial that hangs in another thread, on a full disk perhaps, keeps the line: it is then
+        spoken on over its head.
+        """
         self._urgent.set()  # a trial that still runs in another thread lets go of the line
         deadline = time.monotonic() + self._options.safe_time
-        seen = False
+        seen = held = False
         try:
-            with self._busy:
-                while not seen and time.monotonic() < deadline:
-                    seen = self._seen_safe(deadline)
+            while not seen and time.monotonic() < deadline:
+                held = held or self._busy.acquire(timeout=LETTING_GO)
+                seen = self._seen_safe(deadline) if held else self._seen_safe_beside(deadline)
         finally:
+            if held:
+                self._busy.release()
             self._urgent.clear()
         if self._motion is not None and self._motion.make_safe() is not SafeState.CONFIRMED:
             seen = False
@@ -305,6 +313,17 @@ class SerialBackend:
             return session.safe(deadline)
         finally:
             connection.close()  # the next trial says HELLO, and can be given up
+
+    def _seen_safe_beside(self, deadline: float) -> bool:
+        """Over the connection of a trial that does not let go of it, and does not read it."""
+        connection = self._connection
+        if connection is None:
+            return False  # it is being looked for, which ends soon
+        beside = Session(connection, self._options.silence, self._number, self._host)
+        try:
+            return beside.safe(min(deadline, time.monotonic() + REST))
+        except LinkFaultError:
+            return False
 
 
 def _info(channel: Channel) -> ChannelInfo:

@@ -21,7 +21,8 @@ from campaign.channels import (
     info,
 )
 from campaign.options import Options
-from campaign.physics.bench import Bench, LimitsOptions
+from campaign.physics.bench import Bench
+from campaign.physics.limit_watch import LimitWatch
 from campaign.trial import (
     Array,
     Ending,
@@ -32,7 +33,7 @@ from campaign.trial import (
     Task,
     Trial,
 )
-from campaign.units import Time, convert
+from campaign.units import Time
 
 CHANNELS = tuple(
     info(name)
@@ -101,6 +102,7 @@ class SimBackend:
         from campaign.physics.simulate import simulate
 
         bench, task = _bench(trial), trial.task
+        watch = LimitWatch(bench.limits, task.sample_rate, [info.name for info in CHANNELS])
         recorder.start((COMMANDS[task.mode], *CHANNELS[1:]))
         for time, out in simulate(bench, task, trial.seed, self._options.longest_step):
             gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
@@ -122,7 +124,7 @@ class SimBackend:
             )
             # By the gyro: the angle sensor, differenced, is too coarse for slow motion.
             reached = _first_beyond(gyro - block[1], task.stop_rate)
-            end, ending = _first_violation(bench.limits, time[:reached], block[:, :reached])
+            end, ending = _first_violation(watch, time[:reached], block[:, :reached])
             recorder.append(time[:end], block[:, :end])
             if ending is not None:
                 late = ending.outcome is Outcome.LIMIT  # its own sample is the last one kept
@@ -161,39 +163,21 @@ def _first_beyond(samples: Array, bound: float | None) -> int:
     return int(np.argmax(beyond)) if beyond.any() else len(samples)
 
 
-def _first_violation(limits: LimitsOptions, time: Array, block: Array) -> tuple[int, Ending | None]:
+def _first_violation(watch: LimitWatch, time: Array, block: Array) -> tuple[int, Ending | None]:
     """How many samples are good, and why the trial ends there (None: it goes on).
 
     Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
     Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
     """
-    names = {channel.name: row for channel, row in zip(CHANNELS, block, strict=True)}
-    whole = len(time)
     bad = ~np.isfinite(block).all(axis=0)
-    first = int(np.argmax(bad)) if bad.any() else whole
-    ending = None
-    if first < whole:
-        ending = Ending(
-            Outcome.DIVERGED, f"the simulation diverged at {time[first]:.4g} s: no finite value"
-        )
-    watched = (
-        ("angle", RELATIVE_ANGLE, limits.angle, "rad", "deg"),
-        ("rate", RELATIVE_RATE, limits.rate, "rad/s", "deg/s"),
-        ("torque", DRIVE_TORQUE, limits.torque, "N m", "N m"),
-        ("current", MOTOR_CURRENT, limits.current, "A", "A"),
-    )
-    for limit, channel, bound, unit, display in watched:
-        beyond = np.abs(names[channel][:first]) > bound
-        if beyond.any():
-            first = int(np.argmax(beyond))
-            value = convert(float(names[channel][first]), unit, display)
-            ending = Ending(
-                Outcome.LIMIT,
-                f"{channel} reached {value:.6g} {display} at {time[first]:.4g} s; "
-                f"the {limit} limit is {convert(bound, unit, display):.6g} {display}",
-            )
-    # The offending sample is kept: it is the evidence.
-    return (min(first + 1, whole) if ending and ending.outcome is Outcome.LIMIT else first), ending
+    first = int(np.argmax(bad)) if bad.any() else len(time)
+    violation = watch.look(time[:first], block[:, :first])
+    if violation is not None:  # the offending sample is kept: it is the evidence
+        return violation.index + 1, Ending(Outcome.LIMIT, violation.text)
+    if first < len(time):
+        reason = f"the simulation diverged at {time[first]:.4g} s: no finite value"
+        return first, Ending(Outcome.DIVERGED, reason)
+    return len(time), None
 
 
 def _open(options: Options) -> SimBackend:

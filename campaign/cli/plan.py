@@ -23,7 +23,7 @@ from campaign.protocol import (
     check_loops,
     low_margins,
 )
-from campaign.protocol.limit_check import in_display_units
+from campaign.protocol.limit_check import in_display_units, one_count
 from campaign.protocol.loop_check import in_words
 from campaign.trial import Role, Trial
 
@@ -147,6 +147,12 @@ def _print_details(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, 
         print_line(f"  without {loss['channel']}: no {loss['no']}")
     if test.loops:
         print_line(f"  loop: {in_words(test.loops[0])}{_sought(test)}")
+    for use in test.coarse:
+        broken = "  BROKEN" if use.margin.broken else ""
+        share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
+        print_line(
+            f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
+        )
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

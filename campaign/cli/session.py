@@ -31,6 +31,7 @@ from campaign.execution.safety import (
     safe_when_broken_off,
 )
 from campaign.execution.stop import StopSwitch
+from campaign.execution.supervision import Supervision
 from campaign.policy import Policy
 from campaign.trial import Outcome, Trial
 
@@ -139,6 +140,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             stop=stop,
             policy=session.policy,
             attendance=attendance_of(session.kind, display, yes=session.yes),
+            supervision=Supervision(session.kind.source, session.kind.live),
             finished=session.finished,
         )
 

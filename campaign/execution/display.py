@@ -99,7 +99,7 @@ class LiveDisplay:
         self._live.update(
             self._task,
             description=CLOSING if progress.closing else current_test(progress),
-            completed=progress.total - progress.left,
+            completed=progress.total - progress.left + progress.under_way,
             counts=counts(progress),
             time_left=time_left(progress),
         )

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from campaign.trial import Ending, Outcome, Trial
+from campaign.trial import Array, ChannelInfo, Ending, Outcome, Trial
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,12 @@ class Progress:
         running: trials being executed, in plan order.
         started: when the run began, on `time.monotonic` (s).
         elapsed: wall-clock time since then (s).
-        bench_time: of the trials that have ended (s).
-        bench_time_left: of all the others (s).
+        bench_time: of the trials that have ended, and so far of those that run (s).
+        bench_time_left: of all the others, and the rest of those (s).
         ended: the trial that has just ended, and how.
         remark: what the run has just decided, for people.
         closing: whether all trials have ended and the archive is being closed.
+        under_way: how much of the running trials is done, in trials.
     """
 
     total: int
@@ -38,6 +39,7 @@ class Progress:
     ended: tuple[Trial, Ending] | None = None
     remark: str = ""
     closing: bool = False
+    under_way: float = 0.0
 
     @property
     def left(self) -> int:
@@ -46,7 +48,7 @@ class Progress:
 
     @property
     def time_left(self) -> float | None:
-        """Wall-clock time to the end (s) at the pace so far; None before a trial has ended."""
+        """Wall-clock time to the end (s) at the pace so far; None before there is one."""
         if self.bench_time <= 0:
             return None
         return self.elapsed * self.bench_time_left / self.bench_time
@@ -56,7 +58,7 @@ Display = Callable[[Progress], None]
 
 
 class Ledger:
-    """Counts what a run has done and tells its display. Used from one thread only.
+    """Counts what a run has done and tells its display. Used from one thread, but for `reached`.
 
     A trial counts once, by how its last attempt ended. `finished` are trials of an earlier session:
     they count as done, and say nothing about today's pace.
@@ -70,6 +72,8 @@ class Ledger:
         self._bench_time = 0.0
         self._display = display
         self._running: dict[int, Trial] = {}
+        self._reached: dict[int, float] = {}
+        self._told = 0.0
         self._outcomes: dict[Outcome, int] = dict(Counter(finished.values()))
         self._started = time.monotonic()
 
@@ -86,11 +90,25 @@ class Ledger:
     def begin(self, trial: Trial) -> None:
         """A trial is about to be executed."""
         self._running[trial.number] = trial
+        self._reached[trial.number] = 0.0
         self._tell(None)
+
+    def reached(
+        self, trial: Trial, channels: tuple[ChannelInfo, ...], time: Array, block: Array
+    ) -> None:
+        """A `Subscriber`: samples of a running trial have come. From any thread."""
+        if len(time):
+            self._reached[trial.number] = min(float(time[-1]), trial.task.duration)
+
+    def look(self) -> None:
+        """Tell how far the running trials are, when they are any further."""
+        if self._running and self._of_running() > self._told:
+            self._tell(None)
 
     def end(self, trial: Trial, ending: Ending) -> None:
         """A trial has ended and is archived."""
         self._running.pop(trial.number, None)
+        self._reached.pop(trial.number, None)
         self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
         self._bench_time += trial.task.duration
         self._bench_time_left -= trial.task.duration
@@ -99,6 +117,7 @@ class Ledger:
     def repeat(self, trial: Trial, ending: Ending) -> None:
         """An attempt has ended, and the trial will be executed again."""
         self._running.pop(trial.number, None)
+        self._reached.pop(trial.number, None)
         self._tell((trial, ending))
 
     def remark(self, text: str) -> None:
@@ -113,6 +132,7 @@ class Ledger:
         self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
     ) -> None:
         done = self._outcomes.get(Outcome.COMPLETED, 0)
+        self._told = running = self._of_running()
         self._display(
             Progress(
                 total=self._total,
@@ -121,10 +141,18 @@ class Ledger:
                 running=tuple(self._running[number] for number in sorted(self._running)),
                 started=self._started,
                 elapsed=time.monotonic() - self._started,
-                bench_time=self._bench_time,
-                bench_time_left=max(0.0, self._bench_time_left),
+                bench_time=self._bench_time + running,
+                bench_time_left=max(0.0, self._bench_time_left - running),
                 ended=ended,
                 remark=remark,
                 closing=closing,
+                under_way=sum(
+                    self._reached.get(number, 0.0) / trial.task.duration
+                    for number, trial in self._running.items()
+                ),
             )
         )
+
+    def _of_running(self) -> float:
+        """Bench time (s) that the running trials have behind them."""
+        return sum(self._reached.get(number, 0.0) for number in self._running)

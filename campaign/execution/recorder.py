@@ -1,32 +1,422 @@
-"""Between every backend and the archive: what a trial's samples have to pass."""
+"""Between every backend and the archive: what a trial's samples have to pass.
+
+The first sample that breaks what a trial promises is kept, as evidence; nothing that comes after it
+is. The trial's own stop flag is set, so that its backend ends it, and how the trial ended is
+decided here, whatever the backend says. What was recorded before, here or elsewhere, cannot be
+stopped: there the same is only said.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+from pydantic import JsonValue, ValidationError
+
+from campaign.backends.interface import Source
+from campaign.errors import ArchiveError
+from campaign.execution.pace import Pace
+from campaign.execution.supervision import Subscriber, Supervision, TrialStop
 from campaign.execution.writer import TrialWriter
-from campaign.trial import Array, ChannelInfo, Event, lost_samples
+from campaign.physics.bench import LimitsOptions
+from campaign.physics.limit_watch import WATCHED, LimitWatch
+from campaign.trial import (
+    Array,
+    ChannelInfo,
+    Ending,
+    Event,
+    Fault,
+    Outcome,
+    Trial,
+    lost_samples,
+)
+
+STEP = 0.5
+"""Of a sample: further from its place, it could be another one."""
+ARCHIVE_PATIENCE = 30.0
+"""s that the archive may take to take a block, once the trial is over."""
+_OWN = (Outcome.LIMIT, Outcome.DIVERGED, Outcome.FAULT)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Why a trial is ended, or in a recording what is said of it.
+
+    Attributes:
+        kind: `limit`, `undefined`, `time`, `channels`, `shape`, `length`, `lost` or `silence`.
+        time: of the sample at which it was found (s).
+    """
+
+    kind: str
+    outcome: Outcome
+    reason: str
+    time: float
+    fault: Fault | None = None
 
 
 class SupervisingRecorder:
-    """The Recorder that a backend is given for one trial."""
+    """The Recorder that a backend is given for one trial.
 
-    def __init__(self, file: TrialWriter) -> None:
+    Attributes:
+        verdict: why the trial has to end; None while it is good.
+        heard: when (of the supervision's clock) samples last came; None before the first.
+        unwatched: limits of the bench that no recorded channel tells of.
+    """
+
+    def __init__(
+        self,
+        trial: Trial,
+        file: TrialWriter,
+        stop: TrialStop,
+        supervision: Supervision,
+    ) -> None:
+        self.verdict: Verdict | None = None
+        self.heard: float | None = None
+        self.unwatched: tuple[str, ...] = ()
+        self._trial = trial
         self._file = file
-        self._channels = 0
+        self._stop = stop
+        self._supervision = supervision
+        self._ends_trials = supervision.source is not Source.RECORDING
+        self._subscribers: list[Subscriber] = list(supervision.subscribers)
+        self._channels: tuple[ChannelInfo, ...] | None = None
+        self._watch: LimitWatch | None = None
         self._samples = 0
+        self._lost = 0
+        self._said: dict[str, Verdict] = {}
+        self._events: list[Event] = []
+        self._pace = Pace()
+        self._more = False  # samples came after the verdict
+        self._closed = False
+        # One for the verdict, which a watchdog gives while the file may be stuck on a disk.
+        self._judging = threading.Lock()
+        self._writing = threading.Lock()
+
+    # What the backend calls
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
-        self._channels = len(channels)
-        self._file.start(channels)
+        with self._writing:
+            if self._closed:
+                return
+            if self._channels is not None:
+                self._refuse("channels", "the channels were announced a second time")
+                return
+            names = [info.name for info in channels]
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if not names or twice:
+                what = f"two channels are called {twice!r}" if twice else "no channel was announced"
+                self._refuse("channels", what)
+                return
+            self._channels = channels
+            self._watch = self._make_watch(names)
+            self._file.start(channels)
+            missing = [name for name in _required(self._trial) if name not in names]
+            if missing:
+                self._find(
+                    "channels",
+                    f"{', '.join(missing)}: not recorded, but {self._trial.kind} needs it; "
+                    f"announced are {', '.join(names)}",
+                )
 
     def append(self, time: Array, block: Array) -> None:
-        self._file.append(time, block)
-        self._samples += len(time)
+        self._hand_over(time, block)
 
     def lost(self, time: Array) -> None:
-        self._file.event(lost_samples(self._samples, time))
-        self.append(time, np.full((self._channels, len(time)), np.nan))
+        """Samples that the backend names as lost: NaN, an event, and no `undefined`."""
+        time = np.asarray(time, dtype=np.float64)
+        if not len(time):
+            return
+        with self._writing:
+            if self._is_over():
+                return
+            self._file.event(lost_samples(self._samples, time))
+        self._lost += len(time)
+        self._hand_over(time, None)
 
     def event(self, event: Event) -> None:
-        self._file.event(event)
+        with self._writing:
+            if not self._closed:
+                self._events.append(event)
+                self._file.event(event)
+
+    # What the runner calls
+
+    def silent(self, seconds: float) -> None:
+        """Nothing came for so long: the trial is over, whatever becomes of its backend."""
+        what = "no samples came" if self.heard is None else "no samples came any more"
+        if self._writing.locked():
+            what = "the archive took no samples"
+        reason = f"{what} for {seconds:.3g} s, and the trial had not ended"
+        self._give(self._new("silence", Outcome.FAULT, reason, Fault.LOST_CONNECTION))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all samples of the trial have come."""
+        task = self._trial.task
+        return self._samples >= task.duration * task.sample_rate - 1
+
+    def conclude(self, ending: Ending, *, forced: bool = False) -> Ending:
+        """How the trial ended, once the backend has said so; nothing is recorded from here on.
+
+        `forced`: it only ended because its bench was made safe over its head. Raises ArchiveError
+        when the archive has not come back from taking a block.
+        """
+        if not self._writing.acquire(timeout=ARCHIVE_PATIENCE):
+            raise ArchiveError(
+                f"{self._trial.name}: the archive takes no samples; is its disk still there?"
+            )
+        try:
+            if not self._closed:
+                ending = self._concluded(ending, forced)
+                self._closed = True
+        finally:
+            self._writing.release()
+        return ending
+
+    # Judging
+
+    def _hand_over(self, time: Array, block: Array | None) -> None:
+        self.heard = self._supervision.clock()
+        with self._writing:
+            if self._is_over():
+                self._more = self._more or not self._closed
+                return
+            if self._channels is None:
+                self._refuse("channels", "samples came before the channels were announced")
+                return
+            shaped = self._shaped(time, block)
+            if shaped is None:
+                return
+            time, samples = shaped
+            if not len(time):
+                return
+            self._pace.handed_over(self.heard, float(time[0]), float(time[-1]))
+            good = self._judge(time, samples, was_lost=block is None)
+            time, samples = time[:good], samples[:, :good]
+            self._file.append(time, samples)
+            self._samples += good
+            self._tell(time, samples)
+        self.heard = self._supervision.clock()  # the disk's time is not the bench's
+
+    def _is_over(self) -> bool:
+        return self.verdict is not None or self._closed
+
+    def _shaped(self, time: Array, block: Array | None) -> tuple[Array, Array] | None:
+        """As float64, time (n,) and block (channels, n); None when they are anything else."""
+        wanted = len(self._channels or ())
+        try:
+            time = np.asarray(time, dtype=np.float64)
+            if block is None:
+                block = np.full((wanted, len(time)), np.nan)
+            block = np.asarray(block, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            self._refuse("shape", f"a block is no array of numbers: {error}")
+            return None
+        if time.ndim != 1 or block.shape != (wanted, len(time)):
+            self._refuse(
+                "shape",
+                f"a block has the shape {block.shape} and its time {time.shape}; {wanted} channels "
+                f"of n samples each were announced: ({wanted}, n) and (n,)",
+            )
+            return None
+        return time, block
+
+    def _judge(self, time: Array, block: Array, *, was_lost: bool) -> int:
+        """How many samples are archived: all, or those up to the one that ends the trial."""
+        good = len(time)
+        found: list[tuple[int, Verdict]] = []
+        if (wrong := self._wrong_time(time)) is not None:
+            found.append(wrong)
+            good = wrong[0]
+        if was_lost:
+            if self._watch is not None:
+                self._watch.skip(len(time))
+        else:
+            undefined = ~np.isfinite(block).all(axis=0)
+            if undefined.any():
+                index = int(np.argmax(undefined))
+                names = [info.name for info in self._channels or ()]
+                row = int(np.argmax(~np.isfinite(block[:, index])))
+                reason = f"{names[row]} is {block[row, index]} at {time[index]:.4g} s"
+                found.append(
+                    (index, self._new("undefined", Outcome.DIVERGED, reason, time=time[index]))
+                )
+                good = min(good, index)
+            if self._watch is not None and "limit" not in self._said:
+                end = good if self._ends_trials else len(time)
+                violation = self._watch.look(time[:end], block[:, :end])
+                if violation is not None:
+                    at = time[violation.index]
+                    verdict = self._new("limit", Outcome.LIMIT, violation.text, time=at)
+                    found.append((violation.index, verdict))
+        if not found:
+            return len(time)
+        if not self._ends_trials:
+            for _, verdict in found:
+                self._say(verdict)
+            return len(time)
+        index, verdict = min(found, key=lambda each: each[0])
+        self._give(verdict)
+        return index + 1 if np.isfinite(time[index]) else index
+
+    def _wrong_time(self, time: Array) -> tuple[int, Verdict] | None:
+        """The first sample that is not where its number puts it, or comes after the last one."""
+        task = self._trial.task
+        numbers = self._samples + np.arange(len(time))
+        wrong = ~(np.abs(time * task.sample_rate - numbers) < STEP)  # NaN is wrong, too
+        beyond = numbers > task.duration * task.sample_rate + 1
+        if not (wrong.any() or beyond.any()):
+            return None
+        index = int(np.argmax(wrong | beyond))
+        number, due = int(numbers[index]), numbers[index] / task.sample_rate
+        if wrong[index]:
+            reason = f"sample {number} is at {time[index]:.6g} s instead of {due:.6g} s"
+            if number and index == 0:
+                reason += ", where the block before it ended"
+        else:
+            reason = f"the recording goes on after the {task.duration:g} s of the trial"
+        return index, self._new("time", Outcome.FAULT, reason, Fault.RECORDING, time=due)
+
+    def _make_watch(self, names: Sequence[str]) -> LimitWatch | None:
+        tree = self._trial.bench.get("limits")
+        if tree is None:
+            return None
+        try:
+            limits = LimitsOptions.model_validate(tree, context={"si": True})
+        except ValidationError:  # of a program that knows other limits
+            self.unwatched = tuple(each.limit for each in WATCHED)
+            return None
+        watch = LimitWatch(limits, self._trial.task.sample_rate, names)
+        self.unwatched = watch.unwatched
+        return watch
+
+    # Verdicts
+
+    def _new(
+        self,
+        kind: str,
+        outcome: Outcome,
+        reason: str,
+        fault: Fault | None = None,
+        time: float | None = None,
+    ) -> Verdict:
+        at = self._samples / self._trial.task.sample_rate if time is None else float(time)
+        return Verdict(kind, outcome, reason, at, fault)
+
+    def _find(self, kind: str, reason: str) -> None:
+        """What the backend recorded is not what it promised."""
+        verdict = self._new(kind, Outcome.FAULT, reason, Fault.RECORDING)
+        if self._ends_trials:
+            self._give(verdict)
+        else:
+            self._say(verdict)
+
+    def _refuse(self, kind: str, reason: str) -> None:
+        """What cannot be archived ends a recording as well."""
+        self._give(self._new(kind, Outcome.FAULT, reason, Fault.RECORDING))
+
+    def _give(self, verdict: Verdict) -> None:
+        with self._judging:
+            if self.verdict is None and not self._closed:
+                self.verdict = verdict
+        self._stop.trip()
+
+    def _say(self, verdict: Verdict) -> None:
+        self._said.setdefault(verdict.kind, verdict)
+
+    def _tell(self, time: Array, block: Array) -> None:
+        for subscriber in tuple(self._subscribers):
+            try:
+                subscriber(self._trial, self._channels or (), time, block)
+            except Exception:  # noqa: BLE001 - whoever looks on cannot harm the trial
+                self._subscribers.remove(subscriber)
+
+    # The end
+
+    def _concluded(self, ending: Ending, forced: bool) -> Ending:
+        if self.verdict is None and ending.outcome is Outcome.COMPLETED:
+            self._judge_whole()
+        ending = self._with_verdict(ending, forced) if self.verdict is not None else ending
+        said = {} if self._ends_trials else self._judged(ending)
+        telemetry: dict[str, JsonValue] = {}
+        if self._supervision.live and self._samples:
+            telemetry |= self._timeliness()
+        if self.unwatched and self._samples:
+            telemetry["unwatched_limits"] = list(self.unwatched)
+        if said:
+            telemetry["judged"] = said
+        if telemetry:
+            ending = replace(ending, telemetry={**ending.telemetry, **telemetry})
+        return ending
+
+    def _judge_whole(self) -> None:
+        """A trial that is said to be whole."""
+        task = self._trial.task
+        if self._lost and self._ends_trials:
+            reason = f"{self._lost} samples were lost and are marked"
+            self._give(self._new("lost", Outcome.FAULT, reason, Fault.LOST_SAMPLES))
+        elif self._channels is None:
+            self._find("channels", "completed, but nothing was recorded")
+        elif task.stop_rate is None and not self.is_complete:
+            wanted = task.duration * task.sample_rate
+            self._find(
+                "length",
+                f"completed, but with {self._samples} samples instead of {wanted:.0f}: nothing "
+                f"after {self._samples / task.sample_rate:.6g} s of {task.duration:.6g} s",
+            )
+
+    def _with_verdict(self, ending: Ending, forced: bool) -> Ending:
+        """The verdict, unless the backend itself ended the trial for good reason where it did."""
+        verdict = self.verdict
+        if verdict is None or (ending.outcome in _OWN and not self._more and not forced):
+            return ending
+        reason = verdict.reason
+        if ending.outcome is not Outcome.INTERRUPTED and ending.reason != reason:
+            backend = f"{ending.outcome}, {ending.reason}" if ending.reason else str(ending.outcome)
+            reason += f" (the backend: {backend})"
+        self._file.event(Event(verdict.time, verdict.reason))
+        return replace(ending, outcome=verdict.outcome, reason=reason, fault=verdict.fault)
+
+    def _judged(self, ending: Ending) -> dict[str, JsonValue]:
+        """What is said of a recording that was made before, but for what it says itself."""
+        told = [ending.reason, *(event.text for event in self._events)]
+        known = {"undefined"} if _tells_of_gaps(ending, told) else set[str]()
+        if ending.outcome is not Outcome.COMPLETED:  # its last sample is the evidence of that
+            known |= {kind for kind, each in self._said.items() if self._is_last(each)}
+        said: dict[str, JsonValue] = {}
+        for kind, verdict in self._said.items():
+            if kind in known or verdict.reason in told:
+                continue
+            said[kind] = verdict.reason
+            self._file.event(Event(verdict.time, verdict.reason))
+        return said
+
+    def _is_last(self, verdict: Verdict) -> bool:
+        return verdict.time * self._trial.task.sample_rate > self._samples - 1 - STEP
+
+    def _timeliness(self) -> dict[str, JsonValue]:
+        pace = self._pace
+        told: dict[str, JsonValue] = {"longest_gap_s": round(pace.longest, 4)}
+        if pace.is_of_the_wall_clock:
+            told["oldest_sample_s"] = round(pace.oldest, 4)
+            if pace.longest > self._supervision.patience.late:
+                text = f"{LATE} {pace.longest:.2g} s after those before"
+                self._file.event(Event(pace.at, text))
+        return told
+
+
+LATE = "samples were handed over"
+"""How the event begins that tells of samples which came late."""
+
+
+def _required(trial: Trial) -> tuple[str, ...]:
+    return trial.requires
+
+
+def _tells_of_gaps(ending: Ending, told: Sequence[str]) -> bool:
+    """Whether a recording says itself that samples of it are undefined."""
+    if ending.outcome is Outcome.DIVERGED or ending.fault is Fault.LOST_SAMPLES:
+        return True
+    return any("were lost and are NaN" in text for text in told)

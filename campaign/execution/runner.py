@@ -8,7 +8,10 @@ last, and the archive says what happened.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
 from types import MappingProxyType
 
 from campaign.archive.header import RunStatus
@@ -20,10 +23,12 @@ from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
 from campaign.execution.sequence import TrialSequence
 from campaign.execution.stop import StopSwitch
+from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
 from campaign.trial import Outcome, PanicStop, Trial
 
+SIMULATED = Supervision()
 _NOTHING: Mapping[int, Outcome] = MappingProxyType({})
 
 
@@ -37,6 +42,7 @@ def run_plan(
     stop: StopSwitch,
     policy: Policy | None = None,
     attendance: Attendance = UNATTENDED,
+    supervision: Supervision = SIMULATED,
     finished: Mapping[int, Outcome] = _NOTHING,
 ) -> RunOutcome:
     """Execute `trials` in order on a connected backend and seal the archive.
@@ -44,10 +50,11 @@ def run_plan(
     Args:
         trials: the whole plan.
         workers: trials executed at once; more than one only where the backend is parallel.
-        display: told whenever a trial begins or ends, from this thread.
+        display: told whenever a trial begins or ends and now and then, from this thread.
         stop: asked before every trial, and by the backend during one.
         policy: what to do about trials that fail, and when to rest; absent: skip, and never.
         attendance: who is asked, and whether pauses are waited for.
+        supervision: how each trial is watched, and by whom besides.
         finished: trials of the plan that are not to be executed again, by number.
 
     Raises:
@@ -59,12 +66,13 @@ def run_plan(
     ledger = Ledger(trials, display, finished)
     ended = Ended(kept=writer.folder)
     waiting = [trial for trial in trials if trial.number not in finished]
+    supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(
-        waiting, backend, writer, ledger, ended, stop, policy or Policy(), attendance
+        waiting, backend, writer, ledger, ended, stop, policy or Policy(), attendance, supervision
     )
     with unsafe_first(ended):
-        with safe_afterwards(backend, ended):
-            sequence.execute(workers)
+        with safe_afterwards(backend, ended), _threads(workers) as executor:
+            sequence.execute(executor, workers)
         sequence.outside.look()  # it may have come after the last trial
         outside = sequence.outside.stop
         status, reason = _verdict(ledger, ended, stop, outside)
@@ -73,6 +81,18 @@ def run_plan(
         if ended.bug:
             raise ended.bug
     return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, ended.kept)
+
+
+@contextmanager
+def _threads(workers: int) -> Iterator[Executor]:
+    """Threads for trials. What raises lets them end; who insists, waits for none."""
+    pool = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="trial")
+    try:
+        yield pool
+    except BaseException as error:
+        pool.shutdown(wait=not isinstance(error, KeyboardInterrupt), cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 def _verdict(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import Executed, execute_once
@@ -18,9 +18,13 @@ from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
 from campaign.execution.stop import StopSwitch
+from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
 from campaign.trial import Ending, Outcome, PanicStop, SafeState, Trial
+
+LOOK = 1.0
+"""s after which a display is told how far the running trials are."""
 
 
 class TrialSequence:
@@ -40,6 +44,7 @@ class TrialSequence:
         stop: StopSwitch,
         policy: Policy,
         attendance: Attendance,
+        supervision: Supervision,
     ) -> None:
         self._queue = deque(trials)
         self._running: dict[Future[Executed], Trial] = {}
@@ -53,31 +58,34 @@ class TrialSequence:
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
+        self._supervision = supervision
+        self._unwatched: set[str] = set()
 
-    def execute(self, workers: int) -> None:
+    def execute(self, executor: Executor, workers: int) -> None:
         """Keep `workers` trials going. Raises what the archive raises, and KeyboardInterrupt."""
-        pool = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="trial")
         try:
             while True:
                 while len(self._running) < workers and (trial := self._next()) is not None:
                     self._ledger.begin(trial)
-                    future = pool.submit(
-                        execute_once, trial, self._backend, self._writer, self._halted
+                    future = executor.submit(
+                        execute_once,
+                        trial,
+                        self._backend,
+                        self._writer,
+                        self._halted,
+                        self._supervision,
                     )
                     self._running[future] = trial
                 if not self._running:
                     break
-                finished, _ = wait(self._running, return_when=FIRST_COMPLETED)
+                finished, _ = wait(self._running, LOOK, return_when=FIRST_COMPLETED)
+                if not finished:
+                    self._ledger.look()
                 for future in sorted(finished, key=lambda future: self._running[future].number):
                     self._settle(self._running.pop(future), future.result())
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
         except BaseException:
             self._fail("the run cannot go on")  # lets the other trials end
-            pool.shutdown(wait=True, cancel_futures=True)
             raise
-        pool.shutdown(wait=True)
 
     def _halted(self) -> bool:
         return self._stop() or bool(self._ended.fault)
@@ -121,6 +129,7 @@ class TrialSequence:
         """What follows from a trial's end: is the bench safe, is it tried again, does it go on."""
         ending = executed.ending
         self._rests.worked(trial.task.duration)
+        self._say_unwatched(trial, executed)
         if executed.gave_up:
             self._ended.bug = self._ended.bug or executed.bug
             self._fail(ending.reason)
@@ -131,6 +140,12 @@ class TrialSequence:
             self._make_safe(trial)
         if self._is_final(trial, ending):
             self._ledger.end(trial, ending)
+
+    def _say_unwatched(self, trial: Trial, executed: Executed) -> None:
+        if executed.unwatched and trial.test not in self._unwatched:
+            self._unwatched.add(trial.test)
+            limits = ", ".join(executed.unwatched)
+            self._ledger.remark(f"{trial.test}: no channel tells of these limits: {limits}")
 
     def _make_safe(self, trial: Trial) -> None:
         """Nothing moves again after an unconfirmed trial before the bench was seen at rest."""

@@ -55,6 +55,9 @@ POLL = 0.02
 SAFE_INTERVAL = 0.03
 ASKING = 0.5
 """s for an answer to a question about the latch."""
+ASLEEP = 1.0
+"""s between two looks at the line that say that this program itself did not run (SIGSTOP, a
+suspended machine): what was not heard meanwhile is nobody's silence."""
 LETTING_GO = 0.5
 """s that a controller may think it is held by a host that has just left."""
 GIVEN_UP = "given up: the bench is being made safe"
@@ -106,7 +109,7 @@ class Session:
         self._sequence = random.SystemRandom().randrange(2**16)
         self._answers: dict[int, Ack | Nak | Capabilities] = {}
         self._channels: dict[int, dict[int, Channels]] = {}
-        self._heard = time.monotonic()
+        self._heard = self._looked = time.monotonic()
         self._number, self._host = number, host
         self.capabilities: Capabilities | None = None
         self.status: Status | None = None
@@ -290,6 +293,9 @@ class Session:
         except LineLostError as error:
             raise SilenceError(f"the connection was lost: {error}") from None
         now = time.monotonic()
+        slept, self._looked = now - self._looked > ASLEEP + timeout, now
+        if slept:
+            self._heard = now
         if not data:
             if now - self._heard > self._silence:
                 raise SilenceError(f"the controller has not been heard for {self._silence:g} s")

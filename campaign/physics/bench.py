@@ -237,6 +237,9 @@ class LimitsOptions(Options):
     """Largest angle of the load relative to the hull, either way from zero."""
     rate: AngularRate = Field(gt=0)
     """Largest rate of the load relative to the hull."""
+    rate_time: Time = Field(default=0.01, gt=0, le=1.0)
+    """Over how long the measured rate is averaged before it is held against its limit; never so
+    long that the axis could go further than 2 % of the angle limit."""
     acceleration: AngularAcceleration = Field(gt=0)
     """Largest commanded acceleration, of the load or of the hull."""
     torque: Torque = Field(gt=0)

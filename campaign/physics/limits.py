@@ -39,13 +39,15 @@ _SPEEDS = np.concatenate([-_SPEEDS[::-1], _SPEEDS])
 class Margin:
     """One limit and what a task comes to, both in `unit` (SI).
 
-    `value` is infinite for the acceleration of a rate command that jumps.
+    `value` is infinite for the acceleration of a rate command that jumps. `sensor`: the one whose
+    single count reads as `value`; empty where it is the task that comes to it.
     """
 
     limit: Limit
     value: float
     bound: float
     unit: str
+    sensor: str = ""
 
     @property
     def fraction(self) -> float:

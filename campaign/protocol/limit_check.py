@@ -15,17 +15,30 @@ NAMED_TRIALS = 3
 DISPLAY = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
 
 
+REMEDIES = {
+    "rate": (
+        "a longer limits.rate_time (it is cut to 1 % of limits.angle over limits.rate), a longer "
+        "controller.relative_rate_filter, a sample_rate as high as the controller's, or a finer "
+        "sensors.encoder makes it smaller"
+    ),
+    "angle": "the limit is narrower than the sensor can tell",
+    "torque": "the limit is narrower than the sensor can tell",
+    "current": "the limit is narrower than the sensor can tell",
+}
+"""What to do about a limit that the resolution of a sensor alone would break."""
+
+
 def check_limits(plan: Plan) -> None:
     """Raise LimitError when a trial would break a limit: each test, limit, value and bound."""
-    groups: dict[tuple[str, str], list[LimitUse]] = {}
+    groups: dict[tuple[str, str, str], list[LimitUse]] = {}
     for use in plan.breaches:
         test = plan.trials[use.trial - 1].test
-        groups.setdefault((test, use.margin.limit), []).append(use)
+        groups.setdefault((test, use.margin.limit, use.margin.sensor), []).append(use)
     if not groups:
         return
     trials = len({use.trial for use in plan.breaches})
     lines = [f"nothing was moved: {trials} of {len(plan.trials)} trials would break a limit"]
-    lines += [_line(plan, test, uses) for (test, _), uses in groups.items()]
+    lines += [_line(plan, test, uses) for (test, _, _), uses in groups.items()]
     raise LimitError("\n".join(lines))
 
 
@@ -37,6 +50,13 @@ def in_display_units(margin: Margin) -> tuple[str, str]:
     return shown, f"{bound:.4g} {unit}"
 
 
+def one_count(margin: Margin) -> str:
+    """What a single count of a sensor reads as, in words."""
+    value, _ = in_display_units(margin)
+    a = "an" if margin.limit == "angle" else "a"
+    return f"one count of the {margin.sensor} reads as {a} {margin.limit} of {value}"
+
+
 def _line(plan: Plan, test: str, uses: Sequence[LimitUse]) -> str:
     worst = max(uses, key=lambda use: use.margin.fraction)
     value, bound = in_display_units(worst.margin)
@@ -44,6 +64,10 @@ def _line(plan: Plan, test: str, uses: Sequence[LimitUse]) -> str:
     names = [f"{plan.trials[use.trial - 1].name} ({_label(plan, use, test)})" for use in named]
     more = f" and {len(uses) - len(named)} more" if len(uses) > len(named) else ""
     limit = worst.margin.limit
+    if worst.margin.sensor:
+        what = f"{one_count(worst.margin)}, limit {bound}; {REMEDIES[limit]}"
+        names = [plan.trials[use.trial - 1].name for use in named]
+        return f"  {test}: {what}: {', '.join(names)}{more}"
     return f"  {test}: {limit} up to {value}, limit {bound}: {', '.join(names)}{more}"
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.limits import Margin, margins
 from campaign.physics.loops_used import LoopUse, loops_used
+from campaign.physics.resolution import CLOSE, resolution_margins
 from campaign.policy import Policy
 from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.check_trials import nothing_to_check, with_checks
@@ -52,6 +53,7 @@ class PlannedTest:
         loops: of each compensation, mode and regime the loop with the least margin, the worst
             first; none where nothing closes one.
         seeks_instability: whether its experiment goes to where a loop is unstable.
+        coarse: for each limit of which one count of a sensor is a large part, such a trial.
         duration: bench time (s).
     """
 
@@ -71,6 +73,7 @@ class PlannedTest:
     loops: tuple[LoopUse, ...]
     seeks_instability: bool
     duration: float
+    coarse: tuple[LimitUse, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -215,16 +218,13 @@ def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
         key = (id(bench), trial.task)
         if key not in known:
-            known[key] = margins(bench, trial.task)
+            known[key] = (*margins(bench, trial.task), *resolution_margins(bench, trial.task))
         yield from ((trial, margin) for margin in known[key])
 
 
 def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: int) -> PlannedTest:
-    closest: dict[str, LimitUse] = {}
-    for use in uses:
-        best = closest.get(use.margin.limit)
-        if best is None or use.margin.fraction > best.margin.fraction:
-            closest[use.margin.limit] = use
+    closest = _worst(use for use in uses if not use.margin.sensor)
+    coarse = _worst(use for use in uses if use.margin.sensor and use.margin.fraction > CLOSE)
     first = next(iter(points_of(test)))
     matrix: dict[str, dict[str, Any]] = {axis.path: {} for axis in test.axes}
     for trial in expanded.trials:
@@ -244,14 +244,25 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         seed=seed_of(test, master),
         repeat=entry.repeat,
         numbers=tuple(trial.number for trial in expanded.trials),
-        closest=tuple(closest.values()),
+        closest=closest,
         loops=loops_used(
             (trial.number, trial.task, bench)
             for trial, bench in zip(expanded.trials, expanded.benches, strict=True)
         ),
         seeks_instability=test.experiment.seeks_instability,
         duration=sum(trial.task.duration for trial in expanded.trials),
+        coarse=coarse,
     )
+
+
+def _worst(uses: Iterable[LimitUse]) -> tuple[LimitUse, ...]:
+    """For each limit the trial that uses most of it."""
+    found: dict[str, LimitUse] = {}
+    for use in uses:
+        best = found.get(use.margin.limit)
+        if best is None or use.margin.fraction > best.margin.fraction:
+            found[use.margin.limit] = use
+    return tuple(found.values())
 
 
 def _normalised(test: Test, master: int) -> Tree:

@@ -60,6 +60,7 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "limits": [_use(use) for use in test.closest],
         "loops": [{"trial": use.trial, **loop_tree(use)} for use in test.loops],
         "seeks_instability": test.seeks_instability,
+        "coarse": [_use(use) for use in test.coarse],
     }
 
 
@@ -87,6 +88,7 @@ def _use(use: LimitUse) -> dict[str, JsonValue]:
     margin: Margin = use.margin
     return {
         "limit": margin.limit,
+        "sensor": margin.sensor,
         "trial": use.trial,
         "value": _finite(margin.value),
         "bound": margin.bound,

@@ -11,10 +11,23 @@ from campaign.backends.interface import Backend
 from campaign.errors import BackendError
 from campaign.testing.archiving import archived_as_recorded
 from campaign.testing.strict_recorder import StrictRecorder
+from campaign.testing.supervised import Disturb, got_through, supervised, with_narrow_limit
 from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
-from campaign.trial import Ending, Outcome, Recording, SafeState, Trial, canonical_json
+from campaign.trial import (
+    Array,
+    Ending,
+    Outcome,
+    Recording,
+    SafeState,
+    Trial,
+    canonical_json,
+)
 from campaign.units import factor
 
+LATEST = 0.2
+"""s; older a sample of a live backend may not become before it is handed over."""
+PATIENCE = 30.0
+"""s of the wall clock for what has to come back."""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,62}\Z")
 
 
@@ -34,7 +47,14 @@ def backend_checks() -> dict[str, Check]:
         ends_a_failing_trial_as_a_fault,
         stops_in_mid_trial,
         stops_before_the_first_sample,
+        stops_no_other_trial,
         makes_safe_as_often_as_asked,
+        passes_the_supervision,
+        is_ended_at_a_limit_and_made_safe,
+        is_ended_at_an_undefined_sample,
+        is_ended_when_its_time_stands_still,
+        hands_samples_over_in_time,
+        is_made_safe_while_it_hangs,
         executes_twice,
         lets_go_when_left,
         lets_exceptions_pass,
@@ -189,6 +209,68 @@ def makes_safe_as_often_as_asked(under_test: BackendUnderTest) -> None:
         require(confirmed, f"make_safe() {when} a trial answered {state!r}, not CONFIRMED")
 
 
+def stops_no_other_trial(under_test: BackendUnderTest) -> None:
+    """Each trial has a stop flag of its own: one that was stopped stops none after it."""
+    with under_test.open() as backend:
+        first = backend.execute(under_test.possible, StrictRecorder(), lambda: True)
+        second = backend.execute(under_test.possible, StrictRecorder(), lambda: False)
+    as_asked = (first.outcome, second.outcome) == (Outcome.INTERRUPTED, Outcome.COMPLETED)
+    told = f"a trial that was stopped, and one that was not, ended as {first.outcome}"
+    require(as_asked, f"{told} and {second.outcome}")
+
+
+def passes_the_supervision(under_test: BackendUnderTest) -> None:
+    """A run finds nothing wrong with it: channels, time, values, limits, length."""
+    found = supervised(under_test)
+    told = f"a run would end the possible trial as {found.ending.outcome}: {found.ending.reason}"
+    require(found.ending.outcome is Outcome.COMPLETED, told)
+
+
+def is_ended_at_a_limit_and_made_safe(under_test: BackendUnderTest) -> None:
+    """It stops once the supervision has found a limit exceeded, and its bench is made safe."""
+    recording, _ = _recorded(under_test)
+    watched, channel = with_narrow_limit(under_test, recording)
+    _ended(under_test, Outcome.LIMIT, f"{channel} exceeded its limit", watched=watched)
+
+
+def is_ended_at_an_undefined_sample(under_test: BackendUnderTest) -> None:
+    """It stops once the supervision has found a sample undefined, and its bench is made safe."""
+
+    def undefined(time: Array, block: Array) -> tuple[Array, Array]:
+        return time, np.full_like(block, np.nan)
+
+    _ended(under_test, Outcome.DIVERGED, "a sample was undefined", disturb=undefined)
+
+
+def is_ended_when_its_time_stands_still(under_test: BackendUnderTest) -> None:
+    """It stops once the supervision has found its time standing, and its bench is made safe."""
+
+    def standing(time: Array, block: Array) -> tuple[Array, Array]:
+        return np.zeros_like(time), block
+
+    _ended(under_test, Outcome.FAULT, "its time stood still", disturb=standing)
+
+
+def hands_samples_over_in_time(under_test: BackendUnderTest) -> None:
+    """Live: as they are taken, at most 0.2 s of them at a time, but for a hiccup of the host."""
+    if not under_test.live:
+        return
+    recorder, _ = _executed(under_test)
+    require(recorder.sizes, "nothing was recorded")
+    spans = np.array(recorder.sizes) / under_test.possible.task.sample_rate
+    usual = float(np.median(spans))
+    require(usual <= LATEST, f"samples come {usual:.3g} s at a time; at most {LATEST:g} s may")
+
+
+def is_made_safe_while_it_hangs(under_test: BackendUnderTest) -> None:
+    """Live: `make_safe` from another thread gets through while `execute` does not come back."""
+    if not under_test.live:
+        return
+    state = got_through(under_test, PATIENCE)
+    confirmed = state is SafeState.CONFIRMED
+    require(confirmed, f"make_safe() while execute() hung answered {state!r}, not CONFIRMED")
+
+
 def executes_twice(under_test: BackendUnderTest) -> None:
     """A second trial starts at time 0 and is as long as the first, with the same channels."""
     with under_test.open() as backend:
@@ -244,6 +326,27 @@ def _on(backend: Backend, trial: Trial) -> tuple[StrictRecorder, Ending]:
     recorder = StrictRecorder()
     ending = backend.execute(trial, recorder, lambda: False)
     return recorder, ending
+
+
+def _ended(
+    under_test: BackendUnderTest,
+    outcome: Outcome,
+    why: str,
+    *,
+    watched: Trial | None = None,
+    disturb: Disturb = lambda time, block: (time, block),
+) -> None:
+    """Execute under a supervision that ends the trial, as `outcome`."""
+    found = supervised(under_test, watched=watched, disturb=disturb)
+    told = f"{why}, and the trial ended as {found.ending.outcome}: {found.ending.reason}"
+    require(found.ending.outcome is outcome, told)
+    allowed = under_test.most_blocks
+    require(
+        found.after <= allowed, f"{why}; {found.after} blocks came after; at most {allowed} may"
+    )
+    if under_test.live:
+        safe = found.made_safe and found.made_safe[-1] is SafeState.CONFIRMED
+        require(safe, f"{why}; make_safe() then did not answer CONFIRMED")
 
 
 def _interrupted(

@@ -19,6 +19,7 @@ class StrictRecorder:
         order: slips in the order of calls.
         shapes: slips in the shape, type or time of blocks and events.
         blocks: how many were appended.
+        sizes: how many samples each of them had.
     """
 
     def __init__(self, on_block: Callable[[int], None] = lambda count: None) -> None:
@@ -27,6 +28,7 @@ class StrictRecorder:
         self.shapes: list[str] = []
         self.channels: tuple[ChannelInfo, ...] = ()
         self.blocks = 0
+        self.sizes: list[int] = []
         self._started = False
         self._on_block = on_block
         self._memory = MemoryRecorder()
@@ -48,6 +50,7 @@ class StrictRecorder:
         if slip:
             self.shapes.append(f"block {self.blocks}: {slip}")
         else:
+            self.sizes.append(len(time))
             # A backend may fill the same array again; what was handed over must not change.
             self._memory.append(time.copy(), block.copy())
         self._on_block(self.blocks)

@@ -25,6 +25,8 @@ class BackendUnderTest:
         names: what the refusal has to name: the field, such as `base_acceleration`.
         most_blocks: how many blocks of samples may still come once a stop was asked for.
         failing: makes a backend whose bench fails during `possible`; None when that cannot be had.
+        live: whether it moves something in the time of the wall clock, as its `BackendKind` says;
+            `possible` then has to take as long as it says.
     """
 
     open: Callable[[], Backend]
@@ -33,6 +35,7 @@ class BackendUnderTest:
     names: str
     most_blocks: int = 3
     failing: Callable[[], Backend] | None = None
+    live: bool = False
 
 
 Check = Callable[[BackendUnderTest], None]

@@ -56,7 +56,8 @@ class FakeBackend:
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         self.log.append(trial.name)
         recorder.start((RATE,))
-        recorder.append(np.array([0.0, 0.1]), np.array([[1.0, 2.0]]))
+        time = np.arange(round(trial.task.duration * 10)) / 10
+        recorder.append(time, np.ones((1, len(time))))
         behave = self.behaviour.get(trial.number, lambda stopped: COMPLETED)
         return behave(stopped)
 

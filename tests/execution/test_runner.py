@@ -58,7 +58,7 @@ def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
     assert outcome.status is RunStatus.COMPLETE
     assert outcome.exit_code is ExitCode.DONE
     assert bench.archive.sealed == ("complete", "", SafeState.CONFIRMED)
-    assert bench.archive.samples == {1: 2, 2: 2, 3: 2}
+    assert bench.archive.samples == {1: 20, 2: 20, 3: 20}
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ CONSOLE = (
     "campaign_sending.c",
     "campaign_parameters.c",
     "campaign_wire.c",
+    "campaign_limits.c",
 )
 SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 

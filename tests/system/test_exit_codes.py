@@ -34,8 +34,7 @@ def run(
     report_error: BaseException | None = None,
 ) -> ExitCode:
     """The exit code of a run that by itself ends with `code`."""
-    answers = {"execute": Ending(Outcome.COMPLETED), **WAYS[code]}
-    for method, answer in answers.items():
+    for method, answer in WAYS[code].items():  # else it does what it does
         monkeypatch.setattr(SimBackend, method, lambda *arguments, _a=answer: _a)
 
     def report_run(*arguments: object, **more: object) -> Path:

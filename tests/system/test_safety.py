@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import open_run
+from campaign.execution.recorder import LATE
 from campaign.link.port import open_port
 from campaign.link.safe import SafeWatch, is_safe, query_frame
 from campaign.trial import Outcome
@@ -93,7 +94,8 @@ def test_the_archive_of_a_rehearsal_is_that_of_the_simulation(tmp_path: Path) ->
         theirs, ours = true.recording(), mine.recording()
         assert mine.trial == true.trial
         assert ours.time.tobytes() == theirs.time.tobytes()
-        assert ours.events == theirs.events
+        prompt = tuple(event for event in ours.events if not event.text.startswith(LATE))
+        assert prompt == theirs.events  # whatever else this machine had to do
         assert tuple(ours.channels) == tuple(theirs.channels)
         for name, channel in theirs.channels.items():
             got = ours.channels[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,7 +24,7 @@ from campaign.trial import (
 )
 
 RATE = 100.0
-BLOCK = 50
+BLOCK = 20
 CHANNELS = (
     ChannelInfo("gyro_rate", "rad/s", "Rate of the load", "deg/s"),
     ChannelInfo("motor_current", "A", "Motor current", "A"),
@@ -63,6 +64,10 @@ class Quirks:
     keeps_the_line: bool = False
     hides_exceptions: bool = False
     raises: Exception | None = None
+    block_size: int = BLOCK
+    first_flag_only: bool = False
+    gets_through: bool = True
+    live: bool = True
 
 
 class Fake:
@@ -72,6 +77,8 @@ class Fake:
         self._quirks = quirks
         self._line = line  # whoever holds it is in it
         self._executed = self._asked = 0
+        self._busy = threading.Lock()
+        self._stopped: Callable[[], bool] | None = None
 
     def __enter__(self) -> Fake:
         if self._line:
@@ -91,18 +98,24 @@ class Fake:
         return self._quirks.names(tuple(info.name for info in self._quirks.channels))
 
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        with self._busy:
+            return self._execute(trial, recorder, stopped)
+
+    def _execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
         quirks = self._quirks
         if quirks.raises is not None:
             raise quirks.raises
         self._executed += 1
+        self._stopped = self._stopped if self._stopped and quirks.first_flag_only else stopped
+        stopped = self._stopped
         samples = 0 if quirks.once and self._executed > 1 else quirks.samples
         for _ in range(quirks.announced if quirks.announced_first else 0):
             recorder.start(quirks.channels)
         recorder.event(quirks.event)
-        for first in range(0, samples, BLOCK):
+        for first in range(0, samples, quirks.block_size):
             if quirks.heeds_stop and stopped():
                 return quirks.stopped_ending
-            time = np.arange(first, min(first + BLOCK, samples)) / RATE
+            time = np.arange(first, min(first + quirks.block_size, samples)) / RATE
             block = np.stack([np.sin(time + row) for row in range(len(quirks.channels))])
             recorder.append(quirks.time(time), quirks.block(block))
             if not quirks.announced_first and not first:
@@ -111,6 +124,9 @@ class Fake:
 
     def make_safe(self) -> SafeState:
         self._asked += 1
+        if not self._quirks.gets_through:
+            with self._busy:
+                return SafeState.CONFIRMED
         return self._quirks.safe(self._asked)
 
 
@@ -123,6 +139,7 @@ def under_test(**quirks: Any) -> BackendUnderTest:
         possible=trial(),
         impossible=trial(mode="spring"),
         names="task.mode",
+        live=Quirks(**quirks).live,
         failing=lambda: Fake(failing, []),
     )
 

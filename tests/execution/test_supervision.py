@@ -1,0 +1,399 @@
+"""A live backend that falls silent, hangs, or does not end a trial that is over."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from campaign.archive.header import RunStatus
+from campaign.backends.interface import Source
+from campaign.errors import ArchiveError, BackendError, ExitCode
+from campaign.execution.outcome import RunOutcome
+from campaign.execution.pace import Pace
+from campaign.execution.progress import Progress
+from campaign.execution.recorder import LATE, SupervisingRecorder
+from campaign.execution.runner import run_plan
+from campaign.execution.stop import StopSwitch
+from campaign.execution.supervision import Patience, SilenceWatch, Supervision, TrialStop
+from campaign.trial import (
+    ChannelInfo,
+    Ending,
+    Fault,
+    MemoryRecorder,
+    Outcome,
+    Recorder,
+    SafeState,
+    Trial,
+)
+from tests.execution.fakes import COMPLETED, MemoryArchive, MemoryTrial, make_trials
+
+ANGLE = ChannelInfo("relative_angle", "rad", "Angle", "deg")
+INTERRUPTED = Ending(Outcome.INTERRUPTED, "stopped")
+LONG = 60.0
+"""s; whoever waits for that has failed."""
+PATIENT = Patience(
+    first=LONG, silence=LONG, closing=LONG, grace=LONG, giving_up=LONG, tick=0.01, asleep=LONG
+)
+LIMITS = {"limits": {"angle": 1.0, "rate": 1.0, "acceleration": 1.0, "torque": 1.0, "current": 1.0,
+                     "duration": 9.0}}  # fmt: skip
+
+
+@dataclass
+class Live:
+    """Does `behave` in a trial; remembers what happened in which order."""
+
+    behave: Callable[[Live, Recorder, Callable[[], bool]], Ending]
+    state: SafeState = SafeState.CONFIRMED
+    log: list[str] = field(default_factory=list)
+    made_safe: threading.Event = field(default_factory=threading.Event)
+    released: threading.Event = field(default_factory=threading.Event)
+
+    def refuses(self, trial: Trial) -> str | None:
+        return None
+
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        return None
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        self.log.append("begins")
+        recorder.start((ANGLE,))
+        try:
+            return self.behave(self, recorder, stop)
+        finally:
+            self.log.append("returns")
+
+    def make_safe(self) -> SafeState:
+        self.log.append("made safe")
+        self.made_safe.set()
+        return self.state
+
+
+def hand_over(recorder: Recorder, first: int, last: int, angle: float = 0.0) -> None:
+    recorder.append(np.arange(first, last) / 10, np.full((1, last - first), angle))
+
+
+class Lab:
+    def __init__(
+        self, behave: Callable[[Live, Recorder, Callable[[], bool]], Ending], trials: int = 2
+    ) -> None:
+        self.backend = Live(behave)
+        self.archive = MemoryArchive()
+        self.stop = StopSwitch()
+        self.progress: list[Progress] = []
+        self.trials = [t.model_copy(update={"bench": LIMITS}) for t in make_trials(trials)]
+
+    def run(self, patience: Patience = PATIENT, *, live: bool = True) -> RunOutcome:
+        return run_plan(
+            self.trials,
+            self.backend,  # type: ignore[arg-type]
+            self.archive,
+            workers=1,
+            display=self.progress.append,
+            stop=self.stop,
+            supervision=Supervision(Source.HARDWARE, live, patience),
+        )
+
+
+@pytest.fixture
+def lab() -> Iterator[Callable[..., Lab]]:
+    made: list[Lab] = []
+
+    def make(*arguments: object, **more: object) -> Lab:
+        made.append(Lab(*arguments, **more))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.backend.released.set()
+
+
+def once(behave: Callable[..., Ending]) -> Callable[..., Ending]:
+    """In the first trial; the others are good."""
+    done: list[bool] = []
+
+    def either(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        if not done:
+            done.append(True)
+            return behave(live, recorder, stop)
+        hand_over(recorder, 0, 20)
+        return COMPLETED
+
+    return either
+
+
+def test_a_good_live_trial_is_left_alone(lab: Callable[..., Lab]) -> None:
+    bench = lab(once(lambda live, recorder, stop: hand_over(recorder, 0, 20) or COMPLETED), 1)
+    assert bench.run().status is RunStatus.COMPLETE
+    assert bench.backend.log == ["begins", "returns", "made safe"]
+    assert bench.archive.endings[1].telemetry["longest_gap_s"] == 0.0
+
+
+def test_a_bench_that_falls_silent_is_made_safe_while_its_backend_hangs(
+    lab: Callable[..., Lab],
+) -> None:
+    def hangs(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 10)
+        assert live.made_safe.wait(LONG)
+        assert stop()
+        hand_over(recorder, 10, 20)  # too late
+        return Ending(Outcome.FAULT, "its own view", fault=Fault.DRIVE)
+
+    bench = lab(once(hangs))
+    bench.run(replace(PATIENT, silence=0.1))
+    assert bench.backend.log[:4] == ["begins", "made safe", "returns", "made safe"]
+    ending = bench.archive.endings[1]
+    assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_CONNECTION)
+    assert "no samples came any more for 0.1" in ending.reason
+    assert ending.safe_state is SafeState.CONFIRMED
+    assert bench.archive.samples[1] == 10
+    assert bench.archive.endings[2].outcome is Outcome.COMPLETED  # and the run went on
+
+
+def test_a_backend_that_does_not_come_back_ends_the_run_in_order(lab: Callable[..., Lab]) -> None:
+    def never(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        assert live.released.wait(LONG)
+        hand_over(recorder, 0, 20)
+        return COMPLETED
+
+    bench = lab(once(never), 3)
+    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.1))
+    assert bench.backend.log == ["begins", "made safe", "made safe"]
+    assert list(bench.archive.endings) == [1]
+    ending = bench.archive.endings[1]
+    assert ending.fault is Fault.LOST_CONNECTION
+    assert "no samples came for" in ending.reason
+    assert "did not come back" in ending.reason
+    assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
+    bench.backend.released.set()
+    while bench.backend.log[-1] != "returns":
+        pass
+    assert bench.archive.samples == {1: 0}
+
+
+def test_an_unsafe_bench_under_a_stuck_backend_has_its_exit_code(lab: Callable[..., Lab]) -> None:
+    def never(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        assert live.released.wait(LONG)
+        return COMPLETED
+
+    bench = lab(once(never))
+    bench.backend.state = SafeState.NOT_CONFIRMED
+    assert bench.run(replace(PATIENT, first=0.1, giving_up=0.1)).exit_code is ExitCode.NOT_SAFE
+    assert bench.archive.endings[1].safe_state is SafeState.NOT_CONFIRMED
+
+
+def test_a_limit_is_followed_by_make_safe_whatever_the_backend_says(
+    lab: Callable[..., Lab],
+) -> None:
+    def exceeds(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 10, 2.0)
+        assert stop()
+        return COMPLETED
+
+    bench = lab(once(exceeds))
+    run = bench.run()
+    assert bench.backend.log[:4] == ["begins", "returns", "made safe", "begins"]
+    assert bench.archive.endings[1].outcome is Outcome.LIMIT
+    assert bench.archive.samples[1] == 1
+    assert run.exit_code is ExitCode.LIMIT_OR_FAULT
+
+
+def test_a_limit_that_the_backend_does_not_heed_is_enforced(lab: Callable[..., Lab]) -> None:
+    def goes_on(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 10, 2.0)
+        assert live.made_safe.wait(LONG)
+        return COMPLETED
+
+    bench = lab(once(goes_on))
+    bench.run(replace(PATIENT, grace=0.05))
+    assert bench.backend.log[:4] == ["begins", "made safe", "returns", "made safe"]
+    assert bench.archive.endings[1].outcome is Outcome.LIMIT
+
+
+def test_a_backend_that_heeds_its_stop_has_its_grace(lab: Callable[..., Lab]) -> None:
+    def brakes(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 10, 2.0)
+        assert not live.made_safe.wait(0.2)
+        return INTERRUPTED
+
+    bench = lab(once(brakes))
+    bench.run()
+    assert bench.backend.log[:3] == ["begins", "returns", "made safe"]
+
+
+def test_arming_and_coming_to_rest_may_take_longer_than_silence(lab: Callable[..., Lab]) -> None:
+    def slow(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        assert not live.made_safe.wait(0.3)
+        hand_over(recorder, 0, 20)
+        assert not live.made_safe.wait(0.3)
+        return COMPLETED
+
+    bench = lab(once(slow), 1)
+    assert bench.run(replace(PATIENT, silence=0.02)).status is RunStatus.COMPLETE
+
+
+def test_a_stop_by_somebody_gives_the_backend_time_to_brake(lab: Callable[..., Lab]) -> None:
+    def brakes(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        hand_over(recorder, 0, 10)
+        assert not live.made_safe.wait(0.3)
+        return INTERRUPTED
+
+    bench = lab(once(brakes))
+    assert bench.run(replace(PATIENT, silence=0.02)).status is RunStatus.INTERRUPTED
+    assert bench.archive.endings[1] == replace(
+        INTERRUPTED, telemetry=bench.archive.endings[1].telemetry
+    )
+
+
+def test_a_stuck_backend_is_given_up_after_one_ctrl_c(lab: Callable[..., Lab]) -> None:
+    def never(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        assert live.released.wait(LONG)
+        return INTERRUPTED
+
+    bench = lab(once(never))
+    run = bench.run(replace(PATIENT, closing=0.1, giving_up=0.1))
+    assert run.status is RunStatus.INTERRUPTED
+    assert bench.archive.endings[1].fault is Fault.LOST_CONNECTION
+
+
+def test_every_trial_has_its_own_stop_flag(lab: Callable[..., Lab]) -> None:
+    flags = []
+
+    def exceeds(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        flags.append(stop)
+        hand_over(recorder, 0, 20, 2.0 if len(flags) == 2 else 0.0)
+        return COMPLETED
+
+    bench = lab(exceeds, 3)
+    bench.run()
+    assert [flag() for flag in flags] == [False, True, False]
+    assert [e.outcome for e in bench.archive.endings.values()] == [
+        Outcome.COMPLETED, Outcome.LIMIT, Outcome.COMPLETED,
+    ]  # fmt: skip
+
+
+def test_errors_of_the_backends_thread_are_those_of_the_run(lab: Callable[..., Lab]) -> None:
+    def gone(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        raise BackendError("the port closed")
+
+    def full(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        raise ArchiveError("no space left")
+
+    bench = lab(once(gone))
+    assert bench.run().status is RunStatus.FAULT
+    assert bench.archive.endings[1].reason == "the port closed"
+    with pytest.raises(ArchiveError, match="no space left"):
+        lab(once(full)).run()
+
+
+def test_a_disk_that_hangs_leaves_no_bench_running(
+    lab: Callable[..., Lab], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("campaign.execution.recorder.ARCHIVE_PATIENCE", 0.1)
+    bench = lab(once(lambda live, recorder, stop: hand_over(recorder, 0, 10) or COMPLETED))
+    begin = bench.archive.begin
+
+    def begin_on_a_slow_disk(trial: Trial) -> MemoryTrial:
+        file = begin(trial)
+        file.append = lambda time, block: bench.backend.released.wait(LONG)  # type: ignore[assignment]
+        return file
+
+    bench.archive.begin = begin_on_a_slow_disk  # type: ignore[method-assign]
+    with pytest.raises(ArchiveError, match="takes no samples"):
+        bench.run(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1))
+    assert bench.backend.log == ["begins", "made safe", "made safe"]
+    assert bench.archive.endings == {}
+
+
+# Time
+
+
+def test_silence_is_counted_from_what_was_heard_last() -> None:
+    watch = SilenceWatch(1.0, 100.0)
+    assert watch.look(100.5, None) == 0.5
+    assert watch.look(101.0, 100.75) == 0.25
+    assert watch.look(101.5, 100.75) == 0.75
+
+
+def test_the_sleep_of_this_program_is_nobodys_silence() -> None:
+    """It was stopped for a minute: what came meanwhile waits to be taken."""
+    watch = SilenceWatch(1.0, 100.0)
+    assert watch.look(100.5, 100.5) == 0.0
+    assert watch.look(160.5, 100.5) == 0.0
+    assert watch.look(161.0, 100.5) == 0.5
+    assert watch.look(162.0, 100.5) == 1.5  # and silence then counts
+
+
+def pace(*hand_overs: tuple[float, float, float]) -> Pace:
+    found = Pace()
+    for each in hand_overs:
+        found.handed_over(*each)
+    return found
+
+
+def test_the_longest_time_between_two_hand_overs() -> None:
+    found = pace((10.0, 0.0, 0.1), (10.1, 0.1, 0.2), (10.6, 0.2, 0.7), (10.7, 0.7, 0.8))
+    assert (found.longest, found.at) == (0.5, 0.2)
+    assert found.is_of_the_wall_clock
+    assert found.oldest == pytest.approx(0.0)
+
+
+def test_a_sample_is_as_old_as_it_comes_later_than_the_timeliest_one() -> None:
+    times = np.arange(1, 100) / 10
+    found = pace(*((t + (0.15 if t > 5 else 0.0), t - 0.1, t) for t in times))
+    assert found.oldest == pytest.approx(0.15)
+    assert found.is_of_the_wall_clock
+
+
+def test_at_another_speed_nothing_is_late() -> None:
+    times = np.arange(1, 100) / 10
+    assert not pace(*((t / 20, t - 0.1, t) for t in times)).is_of_the_wall_clock
+    assert not pace(*((t * 4, t - 0.1, t) for t in times)).is_of_the_wall_clock
+
+
+@pytest.mark.parametrize(("gap", "events"), [(0.19, 0), (0.21, 1)])
+def test_samples_that_come_late_are_said_and_do_not_end_the_trial(gap: float, events: int) -> None:
+    now = [0.0]
+    supervision = Supervision(Source.HARDWARE, live=True, clock=lambda: now[0])
+    [trial] = make_trials(1)
+    file, stop = MemoryRecorder(), TrialStop(lambda: False)
+    recorder = SupervisingRecorder(trial, file, stop, supervision)
+    recorder.start((ANGLE,))
+    for sample in range(20):
+        now[0] = sample / 10 + (gap - 0.1 if sample == 7 else 0.0)
+        hand_over(recorder, sample, sample + 1)
+    assert not stop()
+    ending = recorder.conclude(COMPLETED)
+    assert ending.outcome is Outcome.COMPLETED
+    assert ending.telemetry["longest_gap_s"] == pytest.approx(gap)
+    found = file.recording(ending).events
+    assert [event.text.startswith(LATE) for event in found] == [True] * events
+    assert all(event.time == 0.7 for event in found)
+
+
+def test_a_long_trial_tells_how_far_it_is(
+    lab: Callable[..., Lab], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("campaign.execution.sequence.LOOK", 0.01)
+    bench: Lab
+
+    def half(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 11)
+        while len(bench.progress) < 2:
+            assert not live.made_safe.wait(0.01)
+        hand_over(recorder, 11, 20)
+        return COMPLETED
+
+    bench = lab(once(half), 1)
+    bench.run()
+    first, within = bench.progress[:2]
+    assert first.time_left is None
+    assert within.running
+    assert (within.bench_time, within.bench_time_left) == (1.0, 1.0)
+    assert within.time_left == pytest.approx(within.elapsed)
+    assert (bench.progress[-1].bench_time, bench.progress[-1].bench_time_left) == (2.0, 0.0)

@@ -1,0 +1,158 @@
+"""A plug-in that records what it likes, hangs, or falls silent, from the command line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunReader, open_run
+from campaign.trial import Fault, Outcome, SafeState
+from campaign.wire.messages import State
+from tests.link.controllers import controller
+from tests.system.test_safety import status_of
+from tests.system.user import command, environment, write
+
+WILD = """
+import threading, time
+import numpy as np
+from campaign.backends.interface import BackendKind, Source
+from campaign.options import Options
+from campaign.trial import ChannelInfo, Ending, Outcome, SafeState
+
+CHANNELS = (
+    ChannelInfo("relative_rate", "rad/s", "Rate", "deg/s"),
+    ChannelInfo("motor_current", "A", "Current", "A"),
+    ChannelInfo("drive_torque", "N m", "Torque", "N m"),
+)
+
+class WildOptions(Options):
+    how: str = "wild"
+    \"\"\"What it does.\"\"\"
+
+class Wild:
+    def __init__(self, options):
+        self.how = options.how
+    def __enter__(self):
+        return self
+    def __exit__(self, *exception):
+        return None
+    def refuses(self, trial):
+        return None
+    def channels(self, trial):
+        return frozenset(c.name for c in CHANNELS)
+    def execute(self, trial, recorder, stop):
+        recorder.start(CHANNELS)
+        count = int(trial.task.duration * trial.task.sample_rate)
+        values = np.array([[100.0], [5000.0], [1e6]]) * (self.how == "wild")
+        for first in range(0, count, 20):
+            n = np.arange(first, min(first + 20, count))
+            recorder.append(n / trial.task.sample_rate, values * np.ones(len(n)))
+            if self.how == "stuck":
+                threading.Event().wait()
+        return Ending(Outcome.COMPLETED)
+    def make_safe(self):
+        return SafeState.CONFIRMED
+
+BACKEND = BackendKind("wild", "a wild one", WildOptions, Wild, Source.HARDWARE, live=True)
+"""
+
+MOVE = """\
+[[test]]
+name = "home"
+kind = "move"
+bench = "simulink"
+angle = "10 deg"
+seed = 1
+"""
+
+
+def run_wild(folder: Path, how: str) -> tuple[int, str, RunReader]:
+    package = folder / "packages"
+    about = package / "wild-1.0.dist-info"
+    about.mkdir(parents=True)
+    (package / "wild.py").write_text(WILD)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: wild\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[campaign.backends]\nwild = wild:BACKEND\n")
+    write(folder, MOVE)
+    settings = environment()
+    paths = [str(package), settings.get("PYTHONPATH", ""), *sys.path[:1]]
+    done = subprocess.run(
+        command(
+            "run", "protocol.toml", "--backend", "wild", "--set", f"backend.how={how}", "--yes"
+        ),
+        cwd=folder,
+        env={**settings, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.stdout, done.stderr
+    return done.returncode, done.stderr, open_run(folder / done.stdout.splitlines()[-1])
+
+
+def test_what_a_plug_in_records_beyond_every_limit_is_no_completed_trial(tmp_path: Path) -> None:
+    """It did end `complete`, exit code 0."""
+    code, said, run = run_wild(tmp_path, "wild")
+    assert code == 3, said
+    [trial] = run.trials
+    assert trial.ending.outcome is Outcome.LIMIT
+    assert trial.ending.safe_state is SafeState.CONFIRMED
+    assert "relative_rate reached" in trial.ending.reason
+    assert "(the backend: completed)" in trial.ending.reason
+    assert len(trial.recording().time) == 1
+    assert "home: no channel tells of these limits: angle" in said
+    assert trial.ending.telemetry["unwatched_limits"] == ["angle"]
+
+
+@pytest.mark.slow
+def test_a_plug_in_that_never_returns_leaves_a_sealed_run(tmp_path: Path) -> None:
+    began = time.monotonic()
+    code, said, run = run_wild(tmp_path, "stuck")
+    assert time.monotonic() - began > 10  # 5 s of silence, 5 s to come back
+    assert code == 3, said
+    assert run.status == "fault"
+    [trial] = run.trials
+    assert trial.ending.fault is Fault.LOST_CONNECTION
+    assert trial.ending.safe_state is SafeState.CONFIRMED
+    assert "did not come back" in trial.ending.reason
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_host_that_sleeps_does_not_take_that_for_the_silence_of_the_bench(tmp_path: Path) -> None:
+    """Longer than the silence that ends a trial; the controller keeps what it has measured."""
+    write(tmp_path, MOVE)
+    with controller(bench="simulink") as port, subprocess.Popen(
+        command(
+            "run", "protocol.toml", "--backend", "serial", "--port", port, "--yes",
+            "--set", "home.angle=60 deg",
+        ),
+        cwd=tmp_path, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL, text=True,
+    ) as process:  # fmt: skip
+        try:
+            deadline = time.monotonic() + 60
+            while status_of(port).state is not State.RUNNING:
+                assert process.poll() is None, process.stderr.read()
+                assert time.monotonic() < deadline
+            time.sleep(1.0)
+            os.kill(process.pid, signal.SIGSTOP)
+            time.sleep(6.5)
+            os.kill(process.pid, signal.SIGCONT)
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 0, err
+    [trial] = open_run(tmp_path / out.splitlines()[-1]).trials
+    recording = trial.recording()
+    assert trial.ending.outcome is Outcome.COMPLETED
+    assert float(str(trial.ending.telemetry["longest_gap_s"])) > 6
+    assert np.isfinite(recording["gyro_rate"]).all()
