@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import JsonValue, ValidationError
 
 from campaign.backends.interface import Source
+from campaign.channels import missing
 from campaign.errors import ArchiveError
 from campaign.execution.pace import Pace
 from campaign.execution.supervision import Subscriber, Supervision, TrialStop
@@ -112,11 +113,11 @@ class SupervisingRecorder:
             self._channels = channels
             self._watch = self._make_watch(names)
             self._file.start(channels)
-            missing = [name for name in _required(self._trial) if name not in names]
-            if missing:
+            lacking = missing(self._trial.requires, names)
+            if lacking:
                 self._find(
                     "channels",
-                    f"{', '.join(missing)}: not recorded, but {self._trial.kind} needs it; "
+                    f"{', '.join(lacking)}: not recorded, but {self._trial.kind} needs it; "
                     f"announced are {', '.join(names)}",
                 )
 
@@ -409,10 +410,6 @@ class SupervisingRecorder:
 
 LATE = "samples were handed over"
 """How the event begins that tells of samples which came late."""
-
-
-def _required(trial: Trial) -> tuple[str, ...]:
-    return trial.requires
 
 
 def _tells_of_gaps(ending: Ending, told: Sequence[str]) -> bool:

@@ -275,18 +275,16 @@ def test_samples_before_any_announcement() -> None:
 
 
 def test_a_channel_that_is_needed_and_missing_ends_the_trial_before_it_moves() -> None:
-    class Demanding(Trial):
-        requires: tuple[str, ...] = ()
-
-    plain = make_trial().model_dump()
-    desk = Desk(Demanding(**plain, requires=("motor_current", "gyro_rate", "command")))
+    plain = make_trial()
+    wanted = ("motor_current", "gyro_rate", "command")
+    desk = Desk(plain.model_copy(update={"requires": wanted}))
     desk.recorder.start(CHANNELS)
     assert desk.stop()
     ending, recording = desk.end(STOPPED)
     assert ending.fault is Fault.RECORDING
     assert "gyro_rate, command: not recorded, but move needs it" in ending.reason
     assert len(recording.time) == 0
-    assert Desk(Demanding(**plain, requires=("motor_current",))).feed()[0] == COMPLETED
+    assert Desk(plain.model_copy(update={"requires": wanted[:1]})).feed()[0] == COMPLETED
 
 
 OWN = Ending(Outcome.FAULT, "it tripped", SafeState.NOT_CONFIRMED, Fault.DRIVE)

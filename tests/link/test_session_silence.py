@@ -34,14 +34,14 @@ def look_for_ever(session: Session) -> None:
 
 
 def test_a_controller_that_says_nothing_is_lost_after_its_time(clock: list[float]) -> None:
-    session = Session(Line(clock), 3.0)  # type: ignore[arg-type]
+    session = Session(Line(clock), 3.0, 1, "test")  # type: ignore[arg-type]
     with pytest.raises(SilenceError, match="not been heard for 3 s"):
         look_for_ever(session)
     assert clock[0] == pytest.approx(103.0, abs=0.05)
 
 
 def test_a_program_that_was_stopped_gives_it_that_time_anew(clock: list[float]) -> None:
-    session = Session(Line(clock, 0.02, 60.0), 3.0)  # type: ignore[arg-type]
+    session = Session(Line(clock, 0.02, 60.0), 3.0, 1, "test")  # type: ignore[arg-type]
     with pytest.raises(SilenceError):
         look_for_ever(session)
     assert clock[0] == pytest.approx(163.02, abs=0.05)
