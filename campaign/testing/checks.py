@@ -10,6 +10,7 @@ import numpy as np
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError
 from campaign.testing.archiving import archived_as_recorded
+from campaign.testing.outside import keeps_a_stop_from_outside
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.supervised import Disturb, got_through, supervised, with_narrow_limit
 from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
@@ -55,6 +56,7 @@ def backend_checks() -> dict[str, Check]:
         is_ended_when_its_time_stands_still,
         hands_samples_over_in_time,
         is_made_safe_while_it_hangs,
+        keeps_a_stop_from_outside,
         executes_twice,
         lets_go_when_left,
         lets_exceptions_pass,

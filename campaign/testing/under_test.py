@@ -27,6 +27,8 @@ class BackendUnderTest:
         failing: makes a backend whose bench fails during `possible`; None when that cannot be had.
         live: whether it moves something in the time of the wall clock, as its `BackendKind` says;
             `possible` then has to take as long as it says.
+        stop_outside: stops the bench as a person beside the program would, e.g. by
+            `campaign stop`, and returns once that is confirmed; of a `StoppedOutside` only.
     """
 
     open: Callable[[], Backend]
@@ -36,6 +38,7 @@ class BackendUnderTest:
     most_blocks: int = 3
     failing: Callable[[], Backend] | None = None
     live: bool = False
+    stop_outside: Callable[[], None] | None = None
 
 
 Check = Callable[[BackendUnderTest], None]

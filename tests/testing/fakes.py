@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.errors import BackendError
 from campaign.testing import BackendUnderTest
 from campaign.trial import (
     ChannelInfo,
@@ -17,6 +18,7 @@ from campaign.trial import (
     Event,
     Fault,
     Outcome,
+    PanicStop,
     Recorder,
     SafeState,
     Task,
@@ -67,6 +69,12 @@ class Quirks:
     block_size: int = BLOCK
     first_flag_only: bool = False
     gets_through: bool = True
+    stopped_by: str = "ada"
+    tells: bool = True
+    clears_anything: bool = False
+    stays_off: bool = False
+    safe_clears: bool = False
+    heeds_latch: bool = True
     live: bool = True
 
 
@@ -130,7 +138,60 @@ class Fake:
         return self._quirks.safe(self._asked)
 
 
+@dataclass
+class Latch:
+    """What a bench that can be stopped from outside remembers."""
+
+    count: int = 0
+    latched: bool = False
+
+    def stop(self) -> None:
+        self.count, self.latched = self.count + 1, True
+
+
+class StoppableFake(Fake):
+    """A Fake that somebody else can stop."""
+
+    def __init__(self, quirks: Quirks, line: list[object], latch: Latch) -> None:
+        super().__init__(quirks, line)
+        self._latch = latch
+
+    def introduce(self, run: str) -> None: ...
+
+    def panic_stop(self) -> PanicStop | None:
+        stop = PanicStop(self._latch.count, self._quirks.stopped_by)
+        return stop if self._latch.latched and self._quirks.tells else None
+
+    def clear_stop(self, count: int) -> None:
+        if count != self._latch.count and not self._quirks.clears_anything:
+            raise BackendError("another stop")
+        self._latch.latched = self._quirks.stays_off
+
+    def make_safe(self) -> SafeState:
+        self._latch.latched = self._latch.latched and not self._quirks.safe_clears
+        return super().make_safe()
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        latch = self._latch
+        if latch.latched and self._quirks.heeds_latch:
+            return self._quirks.stopped_ending
+        return super().execute(
+            trial, recorder, lambda: stopped() or (latch.latched and self._quirks.heeds_latch)
+        )
+
+
+def stoppable(**quirks: Any) -> BackendUnderTest:
+    latch, line = Latch(), list[object]()
+    return replace(
+        under_test(**quirks),
+        open=lambda: StoppableFake(Quirks(**quirks), line, latch),
+        stop_outside=latch.stop,
+    )
+
+
 def under_test(**quirks: Any) -> BackendUnderTest:
+    if quirks.pop("stoppable", False):
+        return stoppable(**quirks)
     line: list[object] = []
     failing = Quirks(ending=quirks.pop("failing", Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE)))
     failing.raises = quirks.pop("failing_raises", None)

@@ -193,6 +193,17 @@ BROKEN: list[tuple[str, dict[str, Any], str]] = [
     ("hands_samples_over_in_time", {"block_size": 50}, "come 0.5 s at a time"),
     ("is_made_safe_while_it_hangs", {"gets_through": False}, "did not return within"),
     ("is_made_safe_while_it_hangs", {"safe": lambda n: NOT_SAFE}, "hung answered"),
+    *(
+        ("keeps_a_stop_from_outside", {"stoppable": True, **quirks}, message)
+        for quirks, message in (
+            ({"heeds_latch": False}, "stopped from outside ended as completed"),
+            ({"tells": False}, r"panic_stop\(\) answered None"),
+            ({"stopped_by": ""}, "on a stopped bench"),
+            ({"safe_clears": True}, r"panic_stop\(\) answered None"),
+            ({"clears_anything": True}, "cleared another stop than the latest"),
+            ({"stays_off": True}, "is stopped after the stop was cleared"),
+        )
+    ),
     ("executes_twice", {"once": True}, "500 samples first, then 0"),
     ("lets_go_when_left", {"keeps_the_line": True}, "the line is taken"),
     ("lets_exceptions_pass", {"hides_exceptions": True}, "hides the exceptions"),

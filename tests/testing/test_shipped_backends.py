@@ -13,6 +13,8 @@ from campaign.backends.replay import ReplayOptions
 from campaign.backends.serial import BACKEND as SERIAL
 from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend, SimOptions
+from campaign.cli.stop import stop_bench
+from campaign.errors import ExitCode
 from campaign.signals import Sine
 from campaign.testing import BackendUnderTest, StrictRecorder, backend_checks
 from campaign.trial import Ending, Event, Fault, Outcome, Recording, Task, Trial
@@ -44,7 +46,11 @@ SWUNG = asking(TRIAL, base_acceleration=SWING)
 def possible(trial: Trial, name: str) -> Trial:
     """For a check of stopping: longer than what the controller sends ahead of the host's word."""
     long = {"duration": 60.0, "window": (0.0, 60.0)}
-    return asking(trial, **long) if name.startswith("stops_") else trial
+    return asking(trial, **long) if name.startswith(("stops_", "keeps_a_stop")) else trial
+
+
+def panic_stop(port: str) -> None:
+    assert stop_bench(port, 2_000_000, 30.0) is ExitCode.DONE
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +84,7 @@ def test_serial_passes(name: str, port: str, hot_port: str, slow_port: str) -> N
             names="task.base_acceleration",
             failing=lambda: SERIAL.open(SerialOptions(port=hot_port)),
             live=True,
+            stop_outside=lambda: panic_stop(port),
         )
     )
 
@@ -92,6 +99,7 @@ def test_serial_with_an_emulated_hull_passes(name: str, port: str) -> None:
             impossible=asking(SWUNG, disturbance=SWING),
             names="task.disturbance",
             live=True,
+            stop_outside=lambda: panic_stop(port),
         )
     )
 
