@@ -42,6 +42,8 @@ compensation = ["none", "lugre"]
 LONG = PROTOCOL.replace("cycles = 1\n", "cycles = 100\n", 1)
 ON = ("--backend", "serial", "--set", "backend.motion=emulated")
 
+PATIENT = ("--heartbeat-timeout", "20")
+"""A controller that does not mind a busy machine, where heartbeats are late."""
 SOON = ("--set", "backend.safe_time=2 s", "--set", "backend.silence=1 s")
 
 
@@ -116,7 +118,7 @@ def test_a_plan_is_refused_without_a_port(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_ends_in_the_safe_state(tmp_path: Path) -> None:
-    with controller() as port, running(tmp_path, port) as process:
+    with controller(*PATIENT) as port, running(tmp_path, port) as process:
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
         assert process.returncode == 130, err
@@ -130,7 +132,7 @@ def test_ctrl_c_ends_in_the_safe_state(tmp_path: Path) -> None:
 
 
 def test_a_killed_host_leaves_a_safe_bench(tmp_path: Path) -> None:
-    with controller() as port, running(tmp_path, port) as process:
+    with controller(*PATIENT) as port, running(tmp_path, port) as process:
         process.kill()
         process.wait()
         deadline = time.monotonic() + 10
@@ -139,7 +141,7 @@ def test_a_killed_host_leaves_a_safe_bench(tmp_path: Path) -> None:
 
 
 def test_the_panic_stop_works_while_the_host_hangs(tmp_path: Path) -> None:
-    with controller() as port, running(tmp_path, port) as process:
+    with controller(*PATIENT) as port, running(tmp_path, port) as process:
         os.kill(process.pid, signal.SIGSTOP)
         assert campaign(tmp_path, "stop", "--port", port).out == "safe state confirmed\n"
         assert status_of(port).state is State.SAFE
