@@ -19,6 +19,7 @@ from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import loops_of
+from campaign.physics.resolution import rate_of_one_count
 from campaign.physics.variation import of_its_day
 
 SLOW = 1e-9
@@ -73,8 +74,8 @@ _RATE_STEP = _Scale(
     0.02,
     0.5,
     _COARSE,
-    "One count ends a trial, or nearly: raise controller.relative_rate_filter or limits.rate, or "
-    "take a finer sensor.",
+    "One count ends a trial, or nearly: raise limits.rate_time, "
+    "controller.relative_rate_filter or limits.rate, or take a finer sensor.",
 )
 _PRESLIDING = _Scale(
     0.05,
@@ -162,8 +163,10 @@ def _sensors(bench: Bench) -> Iterator[Fact]:
     if current.resolution > 0:
         subject = "one count of the current sensor against the current limit"
         yield _READING(subject, current.resolution, limits.current, "A", "A")
-    for name, step in rate_steps(bench).items():
-        subject = f"one count of the {name} in one sample against the rate limit"
+    rate = bench.controller.sample_rate
+    if rate is not None and bench.sensors.encoder.resolution > 0:
+        step = rate_of_one_count(bench, rate, rate)
+        subject = "one count of the encoder over limits.rate_time against the rate limit"
         yield _RATE_STEP(subject, step, limits.rate, "rad/s", "deg/s")
     if slowest is None:
         return

@@ -40,7 +40,8 @@ def resolution_margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     sensors, limits = bench.sensors, bench.limits
     current = sensors.current.resolution
     torque = current * bench.torque_per_current
-    encoder, rate = sensors.encoder.resolution, rate_of_one_count(bench, task, control_rate)
+    encoder = sensors.encoder.resolution
+    rate = rate_of_one_count(bench, task.sample_rate, control_rate)
     found = (
         Margin("angle", encoder, limits.angle, "rad", "encoder"),
         Margin("rate", rate, limits.rate, "rad/s", "encoder"),
@@ -50,11 +51,14 @@ def resolution_margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     return tuple(margin for margin in found if margin.value > 0)
 
 
-def rate_of_one_count(bench: Bench, task: Task, control_rate: float) -> float:
-    """Largest mean of the recorded relative rate (rad/s) that one count of the encoder makes."""
+def rate_of_one_count(bench: Bench, sample_rate: float, control_rate: float) -> float:
+    """Largest mean of the relative rate (rad/s) that one count of the encoder makes.
+
+    `sample_rate` of the recording and `control_rate` in Hz; the mean is over the judging time.
+    """
     low_pass = bench.controller.relative_rate_filter
     pole = math.exp(-1.0 / (control_rate * low_pass)) if low_pass > 0 else 0.0
-    every = max(1, round(control_rate / task.sample_rate))
-    count = judged_samples(bench.limits, task.sample_rate)
+    every = max(1, round(control_rate / sample_rate))
+    count = judged_samples(bench.limits, sample_rate)
     share = (1 - pole) * (1 - pole ** (count * every)) / (1 - pole**every)
     return bench.sensors.encoder.resolution * control_rate / count * share

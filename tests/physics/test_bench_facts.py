@@ -27,14 +27,22 @@ def fact(facts: tuple[Fact, ...], *words: str) -> Fact:
     return found
 
 
-def test_one_count_in_one_sample_can_be_more_than_the_rate_limit() -> None:
-    facts = facts_of(bench(small_servo))
-    count = fact(facts, "encoder in one sample", "rate limit")
+def test_one_count_judged_sample_by_sample_can_be_more_than_the_rate_limit() -> None:
+    def at_once(tree: Tree) -> None:
+        small_servo(tree)
+        tree["limits"]["rate_time"] = "0.5 ms"
+
+    count = fact(facts_of(bench(at_once)), "encoder over limits.rate_time", "rate limit")
     assert count.value == pytest.approx(math.radians(360 / 4096 * 2000))
     assert count.share == pytest.approx(175.78 / 150, rel=1e-4)
     assert count.verdict == "too coarse"
-    assert "relative_rate_filter" in count.advice
-    assert fact(facts, "resolver in one sample", "rate limit").verdict == "fine"
+    assert "rate_time" in count.advice
+
+
+def test_over_the_judging_time_it_is_a_fraction_of_that() -> None:
+    """10 ms at most, and not more than 1 % of 90 deg at 150 deg/s: 6 ms, 12 samples."""
+    count = fact(facts_of(bench(small_servo)), "encoder over limits.rate_time", "rate limit")
+    assert count.value == pytest.approx(math.radians(360 / 4096 * 2000 / 12))
 
 
 def test_a_low_pass_takes_its_share_of_a_count() -> None:

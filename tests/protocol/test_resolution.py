@@ -78,7 +78,7 @@ def test_against_a_count_that_is_filtered_and_averaged(
         np.convolve(rates[first::every], np.full(count, 1 / count))[: 8000 // every].max()
         for first in range(every)
     ]
-    assert rate_of_one_count(on, what, 2000.0) == pytest.approx(max(means), rel=1e-9)
+    assert rate_of_one_count(on, what.sample_rate, 2000.0) == pytest.approx(max(means), rel=1e-9)
 
 
 def test_the_other_sensors_are_held_against_their_limits() -> None:
