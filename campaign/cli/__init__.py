@@ -1,6 +1,6 @@
 """The commands: they parse, call and print. Everything heavy is imported inside them."""
 
-from campaign.cli.app import app
+from campaign.cli.bench_commands import app
 from campaign.cli.main import main
 
 __all__ = ["app", "main"]

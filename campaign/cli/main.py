@@ -7,7 +7,7 @@ import sys
 import threading
 import traceback
 
-from campaign.cli.app import app
+from campaign.cli.bench_commands import app  # with all commands
 from campaign.cli.output import print_note
 from campaign.errors import CampaignError, ExitCode, ProtocolError
 

@@ -1,0 +1,153 @@
+"""What can be typed at a bench: look at it, stand in for its controller, stop it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from campaign.cli.app import app
+
+__all__ = ["app"]
+
+ControllerOption = Annotated[
+    str, typer.Option("--port", metavar="PORT", help="Where the controller is.")
+]
+BaudOption = Annotated[
+    int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
+]
+
+
+@app.command()
+def check(
+    bench: Annotated[
+        str,
+        typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="FILE",
+            help="The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show the loops of a bench, their margins, and whether its sizes fit each other."""
+    from campaign.cli.check import check_bench
+
+    raise typer.Exit(check_bench(bench, output, as_json=as_json))
+
+
+@app.command()
+def device(
+    bench: Annotated[
+        str,
+        typer.Option(
+            "--bench",
+            metavar="BENCH",
+            help="The bench behind the controller: a TOML file, or a shipped bench's name.",
+        ),
+    ],
+    pty: Annotated[bool, typer.Option("--pty", help="Serve a pseudo-terminal.")] = False,
+    tcp: Annotated[
+        str | None,
+        typer.Option(
+            "--tcp",
+            metavar="HOST:PORT",
+            help="Serve TCP there, port 0 for any; without --pty and --tcp 127.0.0.1:0.",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        str,
+        typer.Option("--speed", metavar="X", help="Times the wall clock, or max."),
+    ] = "1",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="NAME[=VALUE][@trial=N][@time=S]",
+            help="What shall go wrong, e.g. drop=1e-4 or reboot@trial=2; may be given again.",
+        ),
+    ] = None,
+    fault_seed: Annotated[
+        int, typer.Option("--fault-seed", metavar="N", min=0, help="Of what fails by chance.")
+    ] = 0,
+    heartbeat_timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--heartbeat-timeout",
+            metavar="S",
+            min=0.01,
+            max=60.0,
+            help="Silence after which it switches off; 0.1 s, at --speed max 3 s if absent.",
+            show_default=False,
+        ),
+    ] = None,
+    latch: Annotated[
+        str | None,
+        typer.Option(
+            "--latch",
+            metavar="FILE",
+            help="Where it remembers that it was stopped; a new file if absent; none: nowhere.",
+            show_default=False,
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            "--log", metavar="FILE", help="Note drive, stops and hosts there.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Be a servo controller with a simulated bench, to rehearse against; Ctrl-C ends it."""
+    from campaign.cli.device import run_device
+
+    raise typer.Exit(
+        run_device(
+            bench,
+            tcp=tcp,
+            pty=pty,
+            speed=speed,
+            heartbeat_timeout=heartbeat_timeout,
+            faults=faults or (),
+            fault_seed=fault_seed,
+            latch=latch,
+            log=log,
+        )
+    )
+
+
+@app.command()
+def stop(
+    port: ControllerOption,
+    baud: BaudOption = 2_000_000,
+    patience: Annotated[
+        float,
+        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
+    ] = 10.0,
+) -> None:
+    """Panic stop: drive off, and off it stays; works whoever has the port, and while that hangs."""
+    from campaign.cli.stop import stop_bench
+
+    raise typer.Exit(stop_bench(port, baud, patience))
+
+
+@app.command()
+def status(
+    port: ControllerOption,
+    baud: BaudOption = 2_000_000,
+    patience: Annotated[
+        float,
+        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
+    ] = 3.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show how a controller is, who holds it, and whether somebody has stopped it."""
+    from campaign.cli.status import show_status
+
+    raise typer.Exit(show_status(port, baud, patience, as_json=as_json))
