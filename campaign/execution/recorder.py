@@ -9,20 +9,27 @@ stopped: there the same is only said.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from pydantic import JsonValue, ValidationError
+from pydantic import JsonValue
 
 from campaign.backends.interface import Source
 from campaign.channels import missing
 from campaign.errors import ArchiveError
+from campaign.execution.judging import (
+    STEP,
+    Verdict,
+    make_watch,
+    shaped,
+    tells_of_gaps,
+    undefined,
+    wrong_time,
+)
 from campaign.execution.pace import Pace
 from campaign.execution.supervision import Subscriber, Supervision, TrialStop
 from campaign.execution.writer import TrialWriter
-from campaign.physics.bench import LimitsOptions
-from campaign.physics.limit_watch import WATCHED, LimitWatch
+from campaign.physics.limit_watch import LimitWatch
 from campaign.trial import (
     Array,
     ChannelInfo,
@@ -34,27 +41,9 @@ from campaign.trial import (
     lost_samples,
 )
 
-STEP = 0.5
-"""Of a sample: further from its place, it could be another one."""
 ARCHIVE_PATIENCE = 30.0
 """s that the archive may take to take a block, once the trial is over."""
 _OWN = (Outcome.LIMIT, Outcome.DIVERGED, Outcome.FAULT)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Why a trial is ended, or in a recording what is said of it.
-
-    Attributes:
-        kind: `limit`, `undefined`, `time`, `channels`, `shape`, `length`, `lost` or `silence`.
-        time: of the sample at which it was found (s).
-    """
-
-    kind: str
-    outcome: Outcome
-    reason: str
-    time: float
-    fault: Fault | None = None
 
 
 class SupervisingRecorder:
@@ -111,7 +100,7 @@ class SupervisingRecorder:
                 self._refuse("channels", what)
                 return
             self._channels = channels
-            self._watch = self._make_watch(names)
+            self._watch, self.unwatched = make_watch(self._trial, names)
             self._file.start(channels)
             lacking = missing(self._trial.requires, names)
             if lacking:
@@ -150,7 +139,7 @@ class SupervisingRecorder:
         if self._writing.locked():
             what = "the archive took no samples"
         reason = f"{what} for {seconds:.3g} s, and the trial had not ended"
-        self._give(self._new("silence", Outcome.FAULT, reason, Fault.LOST_CONNECTION))
+        self._give(self._new("silence", reason, Fault.LOST_CONNECTION))
 
     @property
     def is_complete(self) -> bool:
@@ -187,10 +176,11 @@ class SupervisingRecorder:
             if self._channels is None:
                 self._refuse("channels", "samples came before the channels were announced")
                 return
-            shaped = self._shaped(time, block)
-            if shaped is None:
+            try:
+                time, samples = shaped(time, block, len(self._channels))
+            except ValueError as error:
+                self._refuse("shape", str(error))
                 return
-            time, samples = shaped
             if not len(time):
                 return
             self._pace.handed_over(self.heard, float(time[0]), float(time[-1]))
@@ -204,53 +194,25 @@ class SupervisingRecorder:
     def _is_over(self) -> bool:
         return self.verdict is not None or self._closed
 
-    def _shaped(self, time: Array, block: Array | None) -> tuple[Array, Array] | None:
-        """As float64, time (n,) and block (channels, n); None when they are anything else."""
-        wanted = len(self._channels or ())
-        try:
-            time = np.asarray(time, dtype=np.float64)
-            if block is None:
-                block = np.full((wanted, len(time)), np.nan)
-            block = np.asarray(block, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            self._refuse("shape", f"a block is no array of numbers: {error}")
-            return None
-        if time.ndim != 1 or block.shape != (wanted, len(time)):
-            self._refuse(
-                "shape",
-                f"a block has the shape {block.shape} and its time {time.shape}; {wanted} channels "
-                f"of n samples each were announced: ({wanted}, n) and (n,)",
-            )
-            return None
-        return time, block
-
     def _judge(self, time: Array, block: Array, *, was_lost: bool) -> int:
         """How many samples are archived: all, or those up to the one that ends the trial."""
-        good = len(time)
         found: list[tuple[int, Verdict]] = []
-        if (wrong := self._wrong_time(time)) is not None:
+        if (wrong := wrong_time(self._trial.task, self._samples, time)) is not None:
             found.append(wrong)
-            good = wrong[0]
         if was_lost:
             if self._watch is not None:
                 self._watch.skip(len(time))
         else:
-            undefined = ~np.isfinite(block).all(axis=0)
-            if undefined.any():
-                index = int(np.argmax(undefined))
-                names = [info.name for info in self._channels or ()]
-                row = int(np.argmax(~np.isfinite(block[:, index])))
-                reason = f"{names[row]} is {block[row, index]} at {time[index]:.4g} s"
-                found.append(
-                    (index, self._new("undefined", Outcome.DIVERGED, reason, time=time[index]))
-                )
-                good = min(good, index)
+            names = [info.name for info in self._channels or ()]
+            if (bad := undefined(names, time, block)) is not None:
+                found.append(bad)
             if self._watch is not None and "limit" not in self._said:
+                good = min((index for index, _ in found), default=len(time))
                 end = good if self._ends_trials else len(time)
                 violation = self._watch.look(time[:end], block[:, :end])
                 if violation is not None:
-                    at = time[violation.index]
-                    verdict = self._new("limit", Outcome.LIMIT, violation.text, time=at)
+                    at = float(time[violation.index])
+                    verdict = Verdict("limit", Outcome.LIMIT, violation.text, at)
                     found.append((violation.index, verdict))
         if not found:
             return len(time)
@@ -262,53 +224,16 @@ class SupervisingRecorder:
         self._give(verdict)
         return index + 1 if np.isfinite(time[index]) else index
 
-    def _wrong_time(self, time: Array) -> tuple[int, Verdict] | None:
-        """The first sample that is not where its number puts it, or comes after the last one."""
-        task = self._trial.task
-        numbers = self._samples + np.arange(len(time))
-        wrong = ~(np.abs(time * task.sample_rate - numbers) < STEP)  # NaN is wrong, too
-        beyond = numbers > task.duration * task.sample_rate + 1
-        if not (wrong.any() or beyond.any()):
-            return None
-        index = int(np.argmax(wrong | beyond))
-        number, due = int(numbers[index]), numbers[index] / task.sample_rate
-        if wrong[index]:
-            reason = f"sample {number} is at {time[index]:.6g} s instead of {due:.6g} s"
-            if number and index == 0:
-                reason += ", where the block before it ended"
-        else:
-            reason = f"the recording goes on after the {task.duration:g} s of the trial"
-        return index, self._new("time", Outcome.FAULT, reason, Fault.RECORDING, time=due)
-
-    def _make_watch(self, names: Sequence[str]) -> LimitWatch | None:
-        tree = self._trial.bench.get("limits")
-        if tree is None:
-            return None
-        try:
-            limits = LimitsOptions.model_validate(tree, context={"si": True})
-        except ValidationError:  # of a program that knows other limits
-            self.unwatched = tuple(each.limit for each in WATCHED)
-            return None
-        watch = LimitWatch(limits, self._trial.task.sample_rate, names)
-        self.unwatched = watch.unwatched
-        return watch
-
     # Verdicts
 
-    def _new(
-        self,
-        kind: str,
-        outcome: Outcome,
-        reason: str,
-        fault: Fault | None = None,
-        time: float | None = None,
-    ) -> Verdict:
-        at = self._samples / self._trial.task.sample_rate if time is None else float(time)
-        return Verdict(kind, outcome, reason, at, fault)
+    def _new(self, kind: str, reason: str, fault: Fault) -> Verdict:
+        """Of where the recording is now."""
+        at = self._samples / self._trial.task.sample_rate
+        return Verdict(kind, Outcome.FAULT, reason, at, fault)
 
     def _find(self, kind: str, reason: str) -> None:
         """What the backend recorded is not what it promised."""
-        verdict = self._new(kind, Outcome.FAULT, reason, Fault.RECORDING)
+        verdict = self._new(kind, reason, Fault.RECORDING)
         if self._ends_trials:
             self._give(verdict)
         else:
@@ -316,7 +241,7 @@ class SupervisingRecorder:
 
     def _refuse(self, kind: str, reason: str) -> None:
         """What cannot be archived ends a recording as well."""
-        self._give(self._new(kind, Outcome.FAULT, reason, Fault.RECORDING))
+        self._give(self._new(kind, reason, Fault.RECORDING))
 
     def _give(self, verdict: Verdict) -> None:
         with self._judging:
@@ -357,7 +282,7 @@ class SupervisingRecorder:
         task = self._trial.task
         if self._lost and self._ends_trials:
             reason = f"{self._lost} samples were lost and are marked"
-            self._give(self._new("lost", Outcome.FAULT, reason, Fault.LOST_SAMPLES))
+            self._give(self._new("lost", reason, Fault.LOST_SAMPLES))
         elif self._channels is None:
             self._find("channels", "completed, but nothing was recorded")
         elif task.stop_rate is None and not self.is_complete:
@@ -383,7 +308,7 @@ class SupervisingRecorder:
     def _judged(self, ending: Ending) -> dict[str, JsonValue]:
         """What is said of a recording that was made before, but for what it says itself."""
         told = [ending.reason, *(event.text for event in self._events)]
-        known = {"undefined"} if _tells_of_gaps(ending, told) else set[str]()
+        known = {"undefined"} if tells_of_gaps(ending, told) else set[str]()
         if ending.outcome is not Outcome.COMPLETED:  # its last sample is the evidence of that
             known |= {kind for kind, each in self._said.items() if self._is_last(each)}
         said: dict[str, JsonValue] = {}
@@ -410,10 +335,3 @@ class SupervisingRecorder:
 
 LATE = "samples were handed over"
 """How the event begins that tells of samples which came late."""
-
-
-def _tells_of_gaps(ending: Ending, told: Sequence[str]) -> bool:
-    """Whether a recording says itself that samples of it are undefined."""
-    if ending.outcome is Outcome.DIVERGED or ending.fault is Fault.LOST_SAMPLES:
-        return True
-    return any("were lost and are NaN" in text for text in told)
