@@ -107,13 +107,15 @@ class SerialBackend:
 
     def panic_stop(self) -> PanicStop | None:
         """The stop from outside that keeps the bench off; None, too, while nobody can be asked."""
-        with self._busy:
-            if self._session is None:
-                return None  # the next trial looks for the controller, and is told when it arms
-            try:
-                return self._session.panic_stop()
-            except LinkFaultError:
-                return None
+        if not self._busy.acquire(timeout=LETTING_GO):
+            return None  # a trial that hangs has the line, and is left behind
+        try:
+            # Without a session the next trial looks for the controller, and is told when it arms.
+            return None if self._session is None else self._session.panic_stop()
+        except LinkFaultError:
+            return None
+        finally:
+            self._busy.release()
 
     def clear_stop(self, count: int) -> None:
         """Let the bench move again after the stop that a person has seen."""

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 from campaign.backends.interface import Backend, StoppedOutside
+from campaign.execution.safety import describe
 from campaign.execution.stop import StopSwitch
 from campaign.trial import PanicStop
 
@@ -47,7 +48,11 @@ class OutsideWatch:
         """Ask the bench now, also after the run was asked to stop."""
         if self._bench is None or self.stop is not None:
             return
-        stop = self._bench.panic_stop()
+        try:
+            stop = self._bench.panic_stop()
+        except Exception as error:  # noqa: BLE001 - who cannot be asked may have been stopped
+            self._switch.request(f"the bench, which cannot be asked: {describe(error)}")
+            return
         self._due = self._now() + INTERVAL
         if stop is not None:
             self.stop = stop
