@@ -40,7 +40,7 @@ from campaign.trial import (
 from campaign.units import Time
 from campaign.wire.channel_features import named_channels
 from campaign.wire.configuration import REHEARSAL, configuration_of
-from campaign.wire.messages import Channel, Release, State, Value, WireError
+from campaign.wire.messages import Channel, Clear, Release, State, Value, WireError
 
 RETRY = 0.2
 """s between two attempts to reach a controller that has gone."""
@@ -48,6 +48,8 @@ ANSWER = 1.0
 """s that a controller found again may take to answer while it is being made safe."""
 LETTING_GO = 1.0
 """s in which a trial in another thread lets go of the line, unless it hangs elsewhere."""
+LOOKING = 2.0
+"""s between two looks for a controller that was lost, while no trial runs."""
 REST = 2.0
 """s in which a controller that has ended a trial is seen at rest."""
 
@@ -76,7 +78,8 @@ class SerialBackend:
         self._refusal = Refusal(base_motion=self._motion is not None)
         self._number = new_session()
         self._host = identity("campaign")
-        self._trials = 0
+        self._trials = new_session() // 2  # no other host's records can be taken for ours
+        self._look_for_it = 0.0  # when (steady clock) a controller that was lost is looked for
         self._connection: Connection | None = None
         self._session: Session | None = None
         self._busy = threading.RLock()
@@ -110,12 +113,20 @@ class SerialBackend:
         if not self._busy.acquire(timeout=LETTING_GO):
             return None  # a trial that hangs has the line, and is left behind
         try:
-            # Without a session the next trial looks for the controller, and is told when it arms.
-            return None if self._session is None else self._session.panic_stop()
-        except LinkFaultError:
-            return None
+            session = self._session or self._found_again()
+            return None if session is None else session.panic_stop()
+        except (LinkFaultError, BackendError, UsageError):
+            return None  # the next trial is told when it arms
         finally:
             self._busy.release()
+
+    def _found_again(self) -> Session | None:
+        """A controller that was lost, if it is there again; looked for now and then."""
+        now = time.monotonic()
+        if now < self._look_for_it:
+            return None
+        self._look_for_it = now + LOOKING
+        return self._connect()
 
     def clear_stop(self, count: int) -> None:
         """Let the bench move again after the stop that a person has seen."""
@@ -165,6 +176,8 @@ class SerialBackend:
             while not seen and time.monotonic() < deadline:
                 held = held or self._busy.acquire(timeout=LETTING_GO)
                 seen = self._seen_safe(deadline) if held else self._seen_safe_beside(deadline)
+        except HeldError:
+            seen = False
         finally:
             if held:
                 self._busy.release()
@@ -194,6 +207,9 @@ class SerialBackend:
         number = self._trials
         recorder.start(tuple(map(_info, channels)))
         collector = Collector(session, number, rate, channels, recorder, task.duration)
+        if stop() or self._urgent.is_set():
+            session.command(Clear())
+            return Ending(Outcome.INTERRUPTED, "stopped by the operator before it moved")
         if self._motion is not None:
             self._motion.trigger()
         try:
@@ -237,7 +253,7 @@ class SerialBackend:
         """How a trial ended that the session could not bring to its end."""
         safe, stop = False, None
         try:
-            if isinstance(error, SilenceError):
+            if isinstance(error, SilenceError | HeldError):
                 self._disconnect(last_words=False)
             elif isinstance(error, RefusedError | ResetError | StoppedError):
                 safe = session.rested(time.monotonic() + REST)
@@ -289,12 +305,14 @@ class SerialBackend:
             connection.close(last_words=last_words)
 
     def _seen_safe(self, deadline: float) -> bool:
+        """Raises HeldError: another host's bench now is not ours to stop, nor to call safe."""
         try:
             if self._session is not None:
                 return self._session.safe(deadline)
             return self._seen_safe_anew(deadline)
         except HeldError:
-            return False  # another host's bench now: not ours to stop, nor to call safe
+            self._disconnect(last_words=False)
+            raise
         except ResetError:
             self._disconnect()
         except (LinkFaultError, UsageError):
@@ -307,14 +325,14 @@ class SerialBackend:
         not know, it would be a stop from outside, and a person would have to clear it. Who does not
         answer HELLO may still hear SAFE.
         """
-        connection = Connection(self._options.port, self._options.baud, self._number)
-        try:
-            session = Session(connection, ANSWER, self._number, self._host)
-            with contextlib.suppress(SilenceError):
-                session.hello()
-            return session.safe(deadline)
-        finally:
-            connection.close()  # the next trial says HELLO, and can be given up
+        self._connection = Connection(self._options.port, self._options.baud, self._number)
+        session = Session(self._connection, ANSWER, self._number, self._host)
+        with contextlib.suppress(SilenceError):
+            session.hello()
+        seen = session.safe(deadline)
+        session.silence, session.given_up = self._options.silence, self._urgent.is_set
+        self._session = session
+        return seen
 
     def _seen_safe_beside(self, deadline: float) -> bool:
         """Over the connection of a trial that does not let go of it, and does not read it."""

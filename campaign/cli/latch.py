@@ -19,8 +19,10 @@ class StillStoppedError(CampaignError):
     exit_code = ExitCode.LIMIT_OR_FAULT
 
 
-def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> None:
+def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> str:
     """See that `backend` may move: where it was stopped, a person has to have seen that.
+
+    Returns what was cleared and how, for the record; empty when there was nothing to clear.
 
     Args:
         backend: connected.
@@ -31,25 +33,28 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
     Raises StillStoppedError when it stays off, with what to do.
     """
     if not isinstance(backend, StoppedOutside):
-        return
+        return ""
     found = backend.panic_stop()
     if found is None:
         if seen is not None:
             print_note(f"--clear-stop {seen}: the bench is not stopped")
-        return
+        return ""
     print_note(f"PANIC STOP: {told(found)}", "bold red")
+    how = "at the terminal" if seen is None else f"by --clear-stop {seen}"
     if seen is None:
         _ask(found, stop)
         seen = found.count
     if seen != found.count:
         raise StillStoppedError(
-            f"--clear-stop {seen}: the bench was stopped since, {told(found)}; nothing was moved"
+            f"--clear-stop {seen}: that is not the latest stop; the bench was {told(found)}; "
+            "nothing was moved"
         )
     try:
         backend.clear_stop(seen)
     except BackendError as error:  # another stop has come meanwhile, say
         raise StillStoppedError(f"{error}; nothing was moved") from None
     print_note(f"stop {seen} is cleared; the bench may move")
+    return f"{told(found)}, was cleared {how}"
 
 
 def told(stop: PanicStop) -> str:

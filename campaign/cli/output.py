@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from campaign.plain_text import printable
+
 
 def console() -> Console:
     """Standard output: what a command was asked for."""
@@ -23,12 +25,12 @@ def error_console() -> Console:
 
 def print_line(text: str = "") -> None:
     """One line of output as it is, never wrapped by us."""
-    console().print(Text(text), soft_wrap=True)
+    console().print(Text(_plain(text)), soft_wrap=True)
 
 
 def print_note(text: str, style: str = "") -> None:
     """One line on standard error."""
-    error_console().print(Text(text, style=style), soft_wrap=True)
+    error_console().print(Text(_plain(text), style=style), soft_wrap=True)
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -36,14 +38,19 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     out = console()
     if not out.is_terminal:
         for row in (headings, *rows):
-            print("\t".join(" ".join(cell.split()) for cell in row))  # noqa: T201
+            print("\t".join(_plain(" ".join(cell.split())) for cell in row))  # noqa: T201
         return
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in headings:
         table.add_column(heading, overflow="fold")
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(_plain(cell)) for cell in row))
     out.print(table)
+
+
+def _plain(text: str) -> str:
+    """What a file or a line has brought must not command the terminal."""
+    return printable(text, keep="\n\t")
 
 
 def bytes_text(count: int) -> str:

@@ -32,6 +32,7 @@ from campaign.execution.safety import (
 )
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
+from campaign.interrupts import unwinding
 from campaign.policy import Policy
 from campaign.trial import Outcome, Trial
 
@@ -75,7 +76,8 @@ def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: 
     say_outcome(outcome, time.monotonic() - began)
     try:
         if report:
-            codes.append(_report(outcome))
+            with unwinding():
+                codes.append(_report(outcome))
     finally:
         print_line(str(outcome.archive))
     return worst_exit_code(codes)
@@ -99,21 +101,27 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             stop.make_safe = partial(safe_at_once, backend)
             with safe_when_broken_off(backend):
                 check_channels(session.kind, backend, session.left)
-                clear_stop(backend, session.clear_stop, stop)
+                cleared = clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
-            stop.kept(
-                f"stopped at once; the finished trials are in {writer.folder}; "
-                f"{how_to_go_on(writer.folder)}"
-            )
+                if cleared:
+                    writer.decision("stop cleared", cleared)
+            stop.kept(partial(_what_is_kept, writer.folder), moves=session.kind.live)
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
-                stop.kept(f"left at once; the run is in {outcome.archive}")
     except BackendError as error:
         if outcome is None:
             raise
         print_warning(str(error))
         return outcome, worst_exit_code([outcome.exit_code, error.exit_code])
     return outcome, outcome.exit_code
+
+
+def _what_is_kept(folder: Path) -> str:
+    """For whoever leaves at once: the run in its folder, or the archive that is whole already."""
+    sealed = folder.with_suffix(SEALED)
+    if sealed.is_file():
+        return f"left at once; the run is in {sealed}"
+    return f"stopped at once; the finished trials are in {folder}; {how_to_go_on(folder)}"
 
 
 @contextmanager

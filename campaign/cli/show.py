@@ -32,7 +32,7 @@ def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
     rows = [(t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed]
     _section(("trial", "what", "outcome", "reason"), rows)
     _section(("trial", "attempt", "outcome", "reason"), [_attempt(a) for a in _repeated(story)])
-    _section(("trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
+    _section(("when", "trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
     _section(("trial", "operator step", "answer"), [_step(s) for s in story.all(OperatorStep)])
     _section(("resumed", "changes"), [(r.at, "; ".join(r.changes)) for r in story.all(RunResumed)])
     _section(("damaged", "why"), [_damage(damage) for damage in run.damaged])
@@ -60,7 +60,7 @@ def _attempt(attempt: TrialFinished) -> tuple[str, ...]:
 
 
 def _decision(decision: Decision) -> tuple[str, ...]:
-    return (_name(decision.trial), decision.decision, decision.reason)
+    return (decision.at, _name(decision.trial), decision.decision, decision.reason)
 
 
 def _step(step: OperatorStep) -> tuple[str, ...]:

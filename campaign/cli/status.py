@@ -10,9 +10,10 @@ from campaign.cli.latch import told
 from campaign.cli.output import print_line
 from campaign.errors import BackendError, ExitCode
 from campaign.execution.display import clock
-from campaign.link.panic import panic_stop_of, printable
+from campaign.link.panic import panic_stop_of
 from campaign.link.port import Port, open_port
 from campaign.link.safe import SafeWatch, query_frame
+from campaign.plain_text import printable
 from campaign.wire.messages import Holder, Latch, Message, Nak, Status
 
 INTERVAL = 0.1

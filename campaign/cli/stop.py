@@ -50,8 +50,10 @@ class Attempt:
     def is_over(self) -> bool:
         """Whether there is nothing more to be reached."""
         now = time.monotonic()
-        safe = self.watch.confirmed.is_set() and self.watch.acknowledged
-        if safe and self.safe_at is None:
+        safe = self.watch.confirmed.is_set()
+        if not safe:
+            self.safe_at = None
+        elif self.safe_at is None:
             self.safe_at = now
         if safe and (self.latched or now - (self.safe_at or now) > LATCHING):
             return True

@@ -120,6 +120,7 @@ class Controller:
 
     def tick(self) -> None:
         """Do what is due."""
+        self._latch.remember()
         if self.state in WATCHED and self._now() >= self._silent_at():
             self._silence()
         for strike in self.machine.tick():

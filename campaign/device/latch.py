@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from campaign.plain_text import printable
 from campaign.wire.device import Latch
+from campaign.wire.fields import clipped
 from campaign.wire.messages import LatchCause
 
 MOST = 2**32
@@ -48,6 +51,7 @@ class LatchMemory:
         self._file = file
         self._wall_clock = wall_clock
         self._session = 0  # who stopped it last, for the same stop sent again
+        self._remembered = True
         self.stop = _read(file) or Stop(True, boot, LatchCause.NO_MEMORY)
 
     @property
@@ -70,12 +74,21 @@ class LatchMemory:
         again = self.latched and session != 0 and session == self._session
         self._session = session
         if again:
+            self.remember()
             return False
         count = (self.stop.count + 1) % MOST
         self.stop = Stop(True, count, LatchCause.STOPPED, by, self._wall_clock())
-        with contextlib.suppress(OSError):  # a full disk must not hinder a stop; it holds until
-            self._keep(self.stop)  # the controller is switched off
+        self._remembered = False
+        self.remember()
         return True
+
+    def remember(self) -> None:
+        """Try again what could not be remembered: a full disk must not hinder a stop, which holds
+        all the same until the controller is switched off.
+        """
+        if not self._remembered:
+            with contextlib.suppress(OSError):
+                self._keep(self.stop)
 
     def clear(self, count: int) -> bool:
         """A person has seen stop number `count`; False when that is not what it is latched by.
@@ -92,6 +105,7 @@ class LatchMemory:
         if self._file is not None:
             _write(self._file, stop)
         self.stop = stop
+        self._remembered = True
 
 
 def _read(file: Path | None) -> Stop | None:
@@ -107,11 +121,13 @@ def _read(file: Path | None) -> Stop | None:
     try:
         tree = json.loads(text)
         at = None if tree["at"] is None else float(tree["at"])
+        if at is not None and not math.isfinite(at):
+            return None
         cause, count = LatchCause(tree["cause"]), tree["count"]
         if not (isinstance(tree["latched"], bool) and type(count) is int and 0 <= count < MOST):
             return None
-        return Stop(tree["latched"], count, cause, str(tree["by"]), at)
-    except (ValueError, TypeError, KeyError):
+        return Stop(tree["latched"], count, cause, clipped(printable(str(tree["by"]))), at)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         return None
 
 

@@ -14,6 +14,7 @@ from rich.progress import Progress as Live
 from rich.text import Text
 
 from campaign.execution.progress import Progress
+from campaign.plain_text import printable
 from campaign.trial import Ending, Outcome, Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
@@ -158,7 +159,7 @@ def _news(progress: Progress) -> Iterator[Text]:
     if (failure := _failure(progress.ended)) is not None:
         yield failure
     if progress.remark:
-        yield Text(progress.remark, style="yellow")
+        yield Text(printable(progress.remark), style="yellow")
 
 
 def current_test(progress: Progress) -> str:
@@ -193,4 +194,5 @@ def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
         return None
     trial, ending = ended
     reason = f": {ending.reason}" if ending.reason else ""
-    return Text(f"{trial.name} {trial.label} {ending.outcome.value}{reason}", style="yellow")
+    told = f"{trial.name} {trial.label} {ending.outcome.value}{reason}"
+    return Text(printable(told), style="yellow")

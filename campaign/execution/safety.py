@@ -15,6 +15,7 @@ from campaign.trial import SafeState
 
 AT_ONCE = 20.0
 """s that it may take to see the bench safe when somebody insists on leaving."""
+SAFE = "safe state confirmed: the bench is at rest with its drive off"
 NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
 
 

@@ -21,7 +21,7 @@ from typing import NoReturn
 
 from campaign.errors import ExitCode
 from campaign.execution.guardian import MAKING_SAFE, NOTE, Asked
-from campaign.execution.safety import NOT_SAFE
+from campaign.execution.safety import NOT_SAFE, SAFE
 
 _NOTICE = (
     "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
@@ -47,7 +47,8 @@ class StopSwitch:
 
     def __init__(self) -> None:
         self._reason = ""
-        self._note = _NOTHING
+        self._note: Callable[[], str] = lambda: _NOTHING
+        self._moves = False
         self._noticed = False
         self._pipe: int | None = None  # to the guardian
         self.make_safe: Callable[[], ExitCode] = lambda: ExitCode.INTERRUPTED
@@ -64,13 +65,14 @@ class StopSwitch:
         """Ask the run to stop; a second request changes nothing."""
         self._reason = self._reason or reason
 
-    def kept(self, note: str) -> None:
+    def kept(self, note: Callable[[], str], *, moves: bool) -> None:
         """What is said last when the program is left at once: what of the run is kept, and where.
 
-        The text is at the guardian's before this returns.
+        `moves`: whether there is a bench that somebody has to have seen at rest. The text is at the
+        guardian's before this returns: if that has to end the program, nobody has seen it.
         """
-        self._note = note
-        text = note.encode()[:2000]
+        self._note, self._moves = note, moves
+        text = f"{NOT_SAFE if moves else ''}\n{note()}".strip().encode()[:2000]
         self._tell(bytes((NOTE,)) + len(text).to_bytes(2) + text)
 
     @contextmanager
@@ -153,9 +155,10 @@ class StopSwitch:
         """Somebody insists: bench to rest, a last line, and out."""
         self._tell(bytes((MAKING_SAFE,)))
         code = self.make_safe()
-        unsafe = f"{NOT_SAFE}\n" if code is ExitCode.NOT_SAFE else ""
+        unsafe = code is ExitCode.NOT_SAFE
+        state = f"{NOT_SAFE if unsafe else SAFE}\n" if unsafe or self._moves else ""
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
-        _say(f"{cursor}\n{unsafe}{self._note}\n")
+        _say(f"{cursor}\n{state}{self._note()}\n")
         os._exit(code)
 
 

@@ -13,6 +13,7 @@ from pydantic import JsonValue
 from campaign.link.errors import RefusedError, SilenceError, ViolationError
 from campaign.link.records import Missing, RecordOrder
 from campaign.link.session import Session, Traffic
+from campaign.plain_text import printable
 from campaign.trial import Array, Ending, Fault, Outcome, Recorder, SafeState
 from campaign.trial import Event as TrialEvent
 from campaign.wire.messages import (
@@ -171,7 +172,7 @@ class Collector:
                 self._take_samples(item)
             elif isinstance(item, Event):
                 self._flush()
-                self._recorder.event(TrialEvent(item.time, item.text))
+                self._recorder.event(TrialEvent(item.time, printable(item.text)))
             else:
                 self._fill(item.samples)
                 self._end = item
@@ -226,7 +227,7 @@ class Collector:
         safe = SafeState.CONFIRMED if end.safe else SafeState.NOT_CONFIRMED
         outcome = Outcome(end.outcome.text)
         fault = None if end.fault is FaultCode.NONE else Fault(end.fault.text)
-        reason = end.reason
+        reason = printable(end.reason)
         if outcome is Outcome.FAULT:
             fault = fault or Fault.OTHER
         if self.lost or self._missing:

@@ -7,6 +7,8 @@ import os
 import platform
 import random
 
+from campaign.plain_text import printable
+
 LONGEST = 120
 """Bytes of UTF-8; a controller may have little memory."""
 
@@ -20,8 +22,7 @@ def identity(purpose: str) -> str:
     """User, machine, process and what it is about: `ada@lab-3 pid 4711, run 2026-11-21T09-...`."""
     try:
         user = getpass.getuser()
-    except (KeyError, OSError):  # an account without a name
+    except Exception:  # noqa: BLE001 - an account without a name; a stop must not fail for it
         user = "unknown"
     text = f"{user}@{platform.node() or 'unknown'} pid {os.getpid()}, {purpose}"
-    printable = "".join(letter if letter.isprintable() else "?" for letter in text)
-    return printable.encode("utf-8", "replace")[:LONGEST].decode("utf-8", "ignore")
+    return printable(text).encode("utf-8", "replace")[:LONGEST].decode("utf-8", "ignore")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from campaign.plain_text import printable
 from campaign.trial import PanicStop
 from campaign.wire.codes import LatchCause
 from campaign.wire.messages import Latch
@@ -17,8 +18,3 @@ def panic_stop_of(latch: Latch) -> PanicStop | None:
     forgetful = latch.cause is LatchCause.NO_MEMORY
     by = printable(latch.by) or (FORGETFUL if forgetful else NOBODY)
     return PanicStop(latch.count, by, latch.age)
-
-
-def printable(text: str) -> str:
-    """What came over a line, fit for a terminal."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

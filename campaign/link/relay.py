@@ -8,6 +8,7 @@ heartbeats and its last words.
 
 from __future__ import annotations
 
+import random
 import signal
 import sys
 import threading
@@ -25,6 +26,12 @@ HEARTBEAT_INTERVAL = 0.025
 LAST_WORDS = 2.0
 """s for which an orphaned relay goes on sending SAFE unless it is confirmed before."""
 SAFE_INTERVAL = 0.02
+LAPSE = 0.05
+"""s that a heartbeat may be late; later, a controller may have taken it for silence."""
+ECHO = 0.3
+"""s in which the controller says whose it is."""
+BEATS = 400
+"""Heartbeats whose echo is remembered."""
 
 
 class Relay:
@@ -38,8 +45,9 @@ class Relay:
         self._parent: BinaryIO | None = parent
         self._writing, self._telling = threading.RLock(), threading.RLock()
         self._wanted = (0, 0)  # trial, record
-        self._counter = 0
-        self._beats: deque[tuple[int, float]] = deque(maxlen=400)
+        self._counter = random.SystemRandom().randrange(2**32)  # no other relay's echo is ours
+        self._lapsed = False  # whether heartbeats were late enough to lose the controller
+        self._beats: deque[tuple[int, float]] = deque(maxlen=BEATS)
         self._watch: SafeWatch | None = None
         self._quiet = threading.Event()  # set: no more heartbeats
         self._lost = threading.Event()
@@ -73,11 +81,23 @@ class Relay:
         a SAFE would be a stranger's there, and stop another host's run.
         """
         self._quiet.set()
-        if not self._holds:
+        if not self._holds or (self._lapsed and self._is_anothers()):
             return True
         seen = self._seen_safe()
         self._write(bye_frame(self._session))
         return seen
+
+    def _is_anothers(self) -> bool:
+        """Whether the controller answers a heartbeat of ours with the counter of another host's."""
+        watch = SafeWatch()
+        self._watch = watch
+        end = time.monotonic() + ECHO
+        while not self._lost.is_set() and time.monotonic() < end:
+            self._heartbeat()
+            time.sleep(SAFE_INTERVAL)
+            if watch.last is not None and (self._counter - watch.last.heartbeat) % 2**32 < BEATS:
+                return False
+        return watch.last is not None
 
     def _seen_safe(self) -> bool:
         watch = SafeWatch()
@@ -109,6 +129,7 @@ class Relay:
     def _beat(self) -> None:
         due = time.monotonic()
         while not self._quiet.is_set() and not self._lost.is_set():
+            self._lapsed = self._lapsed or time.monotonic() > due + LAPSE
             self._heartbeat()
             due = max(due + HEARTBEAT_INTERVAL, time.monotonic())
             self._quiet.wait(max(0.0, due - time.monotonic()))

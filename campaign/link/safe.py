@@ -52,10 +52,12 @@ def is_safe(status: Status) -> bool:
 class SafeWatch:
     """Reads what a device sends until it says that it is safe.
 
+    What it said before it heard our SAFE counts for nothing: it may have moved since.
+
     Attributes:
-        confirmed: set when it has.
-        acknowledged: set when it has answered a SAFE with the sequence number that is waited for.
-        latch: the newest one told, None before the first.
+        confirmed: whether its newest word, after it heard our SAFE, is that it is safe.
+        acknowledged: whether it has answered a SAFE with the sequence number that is waited for.
+        latch: the newest one told since, None before the first.
         last: the newest status, None before the first.
     """
 
@@ -81,15 +83,17 @@ class SafeWatch:
             return
         if self._told is not None:
             self._told(message)
-        if isinstance(message, Latch):
-            self.latch = message
-        elif isinstance(message, Ack):
+        if isinstance(message, Ack):
             ours = message.kind is Kind.SAFE and message.sequence == self._sequence
             self.acknowledged = self.acknowledged or ours
+        elif isinstance(message, Latch) and self.acknowledged:
+            self.latch = message
         elif isinstance(message, Status):
             self.last = message
-            if is_safe(message):
+            if self.acknowledged and is_safe(message):
                 self.confirmed.set()
+            else:
+                self.confirmed.clear()
 
 
 def _frame(message: Message, sequence: int = 0) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import random
 import time
 from collections.abc import Callable, Mapping
@@ -16,8 +18,9 @@ from campaign.link.errors import (
     SilenceError,
     StoppedError,
 )
-from campaign.link.panic import panic_stop_of, printable
+from campaign.link.panic import panic_stop_of
 from campaign.link.safe import is_safe, query_frame, safe_frame
+from campaign.plain_text import printable
 from campaign.trial import PanicStop
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
 from campaign.wire.frames import FrameDecoder, encode_frame
@@ -60,6 +63,10 @@ ASLEEP = 1.0
 suspended machine): what was not heard meanwhile is nobody's silence."""
 LETTING_GO = 0.5
 """s that a controller may think it is held by a host that has just left."""
+GREETING = 0.3
+"""s for an answer to HELLO before a SAFE that must not wait."""
+FRESH = 0.5
+"""s for which an echo of one of our heartbeats says that the controller is ours."""
 GIVEN_UP = "given up: the bench is being made safe"
 
 
@@ -82,6 +89,7 @@ class Session:
     """Speaks the protocol over an open connection. Used by one thread at a time.
 
     Attributes:
+        silence, given_up: as given.
         capabilities: of the controller, after `hello`.
         status: the newest one, None before the first.
         latch: the newest one told, None before the first.
@@ -103,8 +111,8 @@ class Session:
         it is.
         """
         self._connection = connection
-        self._silence = silence
-        self._given_up = given_up
+        self.silence = silence
+        self.given_up = given_up
         self._decoder = FrameDecoder()
         self._sequence = random.SystemRandom().randrange(2**16)
         self._answers: dict[int, Ack | Nak | Capabilities] = {}
@@ -114,6 +122,7 @@ class Session:
         self.capabilities: Capabilities | None = None
         self.status: Status | None = None
         self.latch: Latch | None = None
+        self._echoed = -math.inf  # when the controller last echoed a heartbeat of ours
         self.records: Callable[[Samples | Event | End | Lost], None] = lambda record: None
         self.traffic = Traffic()
 
@@ -122,14 +131,14 @@ class Session:
         """Frames that arrived damaged since the connection was opened."""
         return self._decoder.counts.bad
 
-    def hello(self) -> Capabilities:
-        """Begin the session.
+    def hello(self, patience: float | None = None) -> Capabilities:
+        """Begin the session; with `patience` (s) in that time, whoever is to give up meanwhile.
 
         Raises BackendError when the two cannot talk, HeldError when another host has the
         controller, else SilenceError.
         """
         try:
-            answer = self._greet()
+            answer = self._greet(patience)
         except RefusedError as error:
             if error.nak is not None and error.nak.code is NakCode.BUSY:
                 raise HeldError(f"the controller is in use: {printable(error.nak.text)}") from None
@@ -154,15 +163,15 @@ class Session:
         self._hold(held=True)
         return answer
 
-    def _greet(self) -> Ack | Capabilities:
+    def _greet(self, patience: float | None) -> Ack | Capabilities:
         """HELLO; again for a moment where a host before us may just have left."""
-        patience = time.monotonic() + LETTING_GO
+        letting_go = time.monotonic() + (LETTING_GO if patience is None else 0.0)
         while True:
             try:
-                return self._command(Hello(VERSION, VERSION, self._number, self._host))
+                return self._command(Hello(VERSION, VERSION, self._number, self._host), patience)
             except RefusedError as error:
                 busy = error.nak is not None and error.nak.code is NakCode.BUSY
-                if not busy or time.monotonic() > patience:
+                if not busy or time.monotonic() > letting_go:
                     raise
                 self.look(POLL)
 
@@ -174,7 +183,7 @@ class Session:
         self._drain()
         self.latch = None
         deadline = time.monotonic() + ASKING
-        while time.monotonic() < deadline and not self._given_up():
+        while time.monotonic() < deadline and not self.given_up():
             self._write(query_frame())
             again = time.monotonic() + FIRST_WAIT
             while time.monotonic() < again:
@@ -210,7 +219,7 @@ class Session:
 
     def _become_idle(self) -> None:
         """Whatever an earlier trial or host has left behind is over."""
-        deadline = time.monotonic() + self._silence
+        deadline = time.monotonic() + self.silence
         while (state := self._fresh_status().state) is not State.IDLE:
             try:
                 if state is State.RUNNING:
@@ -236,7 +245,7 @@ class Session:
             status: Status | None = self.status
             if status is not None:
                 return status
-            if self._given_up():
+            if self.given_up():
                 raise SilenceError(GIVEN_UP)
 
     def start(self, trial: int) -> None:
@@ -258,8 +267,15 @@ class Session:
         self._connection_wanted(trial, record, at_once=at_once)
 
     def safe(self, deadline: float) -> bool:
-        """Send SAFE until the controller says that it is; False after `deadline` (steady clock)."""
+        """Send SAFE until the controller says that it is; False after `deadline` (steady clock).
+
+        After a time in which this program did not run, another host may have the controller: SAFE
+        would stop that one's run. Raises HeldError then.
+        """
         self._drain()
+        if self.capabilities is not None and time.monotonic() - self._echoed > FRESH:
+            with contextlib.suppress(SilenceError):  # who does not answer may still hear SAFE
+                self.hello(GREETING)
         self.status = None  # only what it says from now on counts
         while time.monotonic() < deadline:
             self._write(safe_frame(self._number, self._host))
@@ -297,8 +313,8 @@ class Session:
         if slept:
             self._heard = now
         if not data:
-            if now - self._heard > self._silence:
-                raise SilenceError(f"the controller has not been heard for {self._silence:g} s")
+            if now - self._heard > self.silence:
+                raise SilenceError(f"the controller has not been heard for {self.silence:g} s")
             return False
         self.traffic.received += len(data)
         for frame in self._decoder.feed(data):
@@ -319,6 +335,7 @@ class Session:
             self.traffic.ring_used = max(self.traffic.ring_used, message.ring_used)
             sent = self._connection.beats.pop(message.heartbeat, None)
             if sent is not None:
+                self._echoed = max(self._echoed, sent)
                 self.traffic.round_trips.append(now - sent)
         elif isinstance(message, Latch):
             self.latch = message
@@ -335,14 +352,17 @@ class Session:
             self._hold(held=False)  # it does not know us any more
             raise ResetError("the controller started anew")
 
-    def _command(self, message: Message) -> Ack | Capabilities:
-        """Send until answered, with growing patience."""
+    def _command(self, message: Message, patience: float | None = None) -> Ack | Capabilities:
+        """Send until answered, with growing patience; with `patience` (s) at most so long."""
         kind, body = encode(message)
+        if kind in (Kind.ARM, Kind.START) and self.given_up():
+            raise SilenceError(GIVEN_UP)
         self._sequence = (self._sequence + 1) % 2**16
         self._answers.clear()
         frame = encode_frame(kind, self._sequence, body)
         now = time.monotonic()
-        deadline, wait = now + self._silence, FIRST_WAIT
+        deadline = now + (self.silence if patience is None else patience)
+        wait = FIRST_WAIT
         while now < deadline:
             self._write(frame)
             again = min(deadline, now + wait)
@@ -351,20 +371,22 @@ class Session:
                 answer = self._answer(kind)
                 if answer is not None:
                     return answer
-                if self._given_up():
+                if patience is None and self.given_up():
                     raise SilenceError(GIVEN_UP)
                 now = time.monotonic()
             wait = min(LONGEST_WAIT, 2 * wait)
             self.traffic.repeated_commands += 1
-        raise SilenceError(f"the controller did not answer {kind.name} for {self._silence:g} s")
+        raise SilenceError(f"the controller did not answer {kind.name} for {self.silence:g} s")
 
     def _answer(self, kind: Kind) -> Ack | Capabilities | None:
         answer = self._answers.get(self._sequence)
         if isinstance(answer, Nak):
-            name = f"{answer.name}: " if answer.name else ""
+            name = f"{printable(answer.name)}: " if answer.name else ""
             why = printable(answer.text) or answer.code.text
             if answer.code is NakCode.LATCHED:
                 raise StoppedError(self._stop_behind(why))
+            if answer.code is NakCode.BUSY and kind is not Kind.HELLO:
+                raise HeldError(f"the controller is in use: {why}")
             raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer)
         if answer is None or isinstance(answer, Capabilities) != (kind is Kind.HELLO):
             return None

@@ -81,7 +81,7 @@ _PRESLIDING = _Scale(
     0.05,
     0.2,
     _COARSE,
-    "Stiffness found in so few counts is guesswork: take a finer sensor, or the motor's.",
+    "Stiffness found in so few counts is guesswork: take a finer encoder.",
 )
 _STRIBECK_GYRO = _Scale(
     0.05, 0.5, _COARSE, "The Stribeck curve is lost between counts: take a finer gyro."
@@ -180,15 +180,12 @@ def _sensors(bench: Bench) -> Iterator[Fact]:
 
 
 def _presliding(bench: Bench) -> Iterator[Fact]:
-    """One count of the finer angle sensor against Ts / sigma0 of each interface, at the load."""
-    counts = {
-        "encoder": bench.sensors.encoder.resolution,
-        "resolver": bench.sensors.resolver.resolution / bench.gear.ratio,
-    }
-    counts = {name: count for name, count in counts.items() if count > 0}
-    if not counts:
+    """One count of the encoder, whose angle is recorded and analysed, against Ts / sigma0 of each
+    interface, at the load.
+    """
+    count = bench.sensors.encoder.resolution
+    if count == 0:
         return
-    finer = min(counts, key=lambda name: counts[name])
     for name, options in bench.friction.items():
         declared = friction_models()[options.model].small_signal
         stuck = None if declared is None else declared(options).stuck
@@ -196,8 +193,8 @@ def _presliding(bench: Bench) -> Iterator[Fact]:
         if stuck is None or stuck.stiffness <= 0 or not static:
             continue
         span = static / stuck.stiffness / at_load(options, bench)[1]
-        subject = f"one count of the {finer} against the presliding Ts/σ0 of '{name}'"
-        yield _PRESLIDING(subject, counts[finer], span, "rad", "deg")
+        subject = f"one count of the encoder against the presliding Ts/σ0 of '{name}'"
+        yield _PRESLIDING(subject, count, span, "rad", "deg")
 
 
 def _torques(bench: Bench) -> Iterator[Fact]:

@@ -240,3 +240,30 @@ def test_a_program_of_version_1_is_told_so_and_its_stop_is_confirmed() -> None:
     status = [m for to, m in rig.said if to == STRANGER and isinstance(m, Status)][-1]
     assert not status.drive_on
     assert rig.latch().latched
+
+
+def test_what_could_not_be_remembered_is_tried_again(tmp_path: Path) -> None:
+    folder = tmp_path / "memory"
+    memory = LatchMemory(folder / "latch", boot=1)
+    memory.set(THEIRS, "eve")  # there is no such folder yet
+    folder.mkdir()
+    assert not memory.set(THEIRS, "eve")  # the same stop, sent until it is confirmed
+    assert LatchMemory(folder / "latch", boot=2).stop.by == "eve"
+
+
+@pytest.mark.parametrize("at", ["1e400", "[" * 100_000, "9" * 400])
+def test_no_rubbish_in_the_memory_ends_the_controller(tmp_path: Path, at: str) -> None:
+    file = tmp_path / "latch"
+    file.write_text(f'{{"latched": false, "count": 1, "cause": 0, "by": "x", "at": {at}}}')
+    assert LatchMemory(file, boot=99).stop.cause is LatchCause.NO_MEMORY
+
+
+def test_whatever_is_remembered_of_who_it_was_can_be_told(tmp_path: Path) -> None:
+    rig = Rig(latch=tmp_path / "latch")
+    (tmp_path / "latch").write_text(
+        json.dumps(
+            {"latched": True, "count": 1, "cause": 1, "by": "\x1b[2J" + "e" * 999, "at": None}
+        )
+    )
+    rig.controller._switch_on()
+    assert rig.latch().by.startswith("?[2Jeee")

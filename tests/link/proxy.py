@@ -40,19 +40,36 @@ class Proxy:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self.acted = threading.Event()
+        self._ends: list[socket.socket] = []
+        self._whole = threading.Event()
+        self._whole.set()
 
     def serve(self) -> None:
         """Until the listener is closed."""
         with contextlib.suppress(OSError):
             while True:
                 near, _ = self._listener.accept()
+                self._whole.wait()
                 far = socket.create_connection(self._target)
+                self._ends += [near, far]
                 for one, other, cut in ((near, far, Cut()), (far, near, None)):
                     threading.Thread(
                         target=self._forward, args=(one, other, cut), daemon=True
                     ).start()
 
+    def cut(self) -> None:
+        """Nothing passes until `mend`, and what is connected is not any more."""
+        self._whole.clear()
+        for end in self._ends:
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def mend(self) -> None:
+        """The line is whole again for who connects."""
+        self._whole.set()
+
     def close(self) -> None:
+        self._whole.set()
         # A thread that waits in accept would keep the socket listening.
         with contextlib.suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)

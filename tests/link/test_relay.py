@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import socket
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
 from campaign.errors import UsageError
 from campaign.link.connection import Connection, LineLostError
 from campaign.link.port import open_port
+from campaign.link.relay import Relay
 from campaign.wire.codes import Fault, Kind, State
 from campaign.wire.frames import Frame, FrameDecoder, encode_frame
-from campaign.wire.messages import Bye, Heartbeat, Safe, Status, decode, encode
+from campaign.wire.messages import Ack, Bye, Heartbeat, Safe, Status, decode, encode
 
 SESSION = 0x12345678
 
@@ -81,11 +85,14 @@ def test_bytes_pass_both_ways_unchanged(line) -> None:
         came += there.recv(4096)
 
 
-def status(*, drive_on: bool) -> bytes:
+def status(*, drive_on: bool, heartbeat: int = 1) -> bytes:
     """What a controller answers to SAFE."""
-    message = Status(State.SAFE, Fault.NONE, True, drive_on, 1, 0.0, 1, 0.0, 0, 0, 0, 0)
+    message = Status(State.SAFE, Fault.NONE, True, drive_on, 1, 0.0, heartbeat, 0.0, 0, 0, 0, 0)
     kind, body = encode(message)
     return encode_frame(kind, 0, body)
+
+
+ACKNOWLEDGED = encode_frame(Kind.ACK, 0, encode(Ack(0, Kind.SAFE, State.SAFE, 1))[1])
 
 
 def last_words(frames: list[Frame]) -> list[Frame]:
@@ -106,7 +113,9 @@ def test_when_the_parent_goes_it_sends_its_sessions_safe_until_confirmed_and_the
     while (frame := heard.next()).kind == Kind.HEARTBEAT:
         pass
     assert decode(frame.kind, frame.body) == Safe(SESSION)  # the holder's: it latches nothing
-    there.sendall(status(drive_on=True))
+    there.sendall(status(drive_on=False))
+    assert decode(Kind.SAFE, heard.next().body) == Safe(SESSION)  # it was said before it heard us
+    there.sendall(ACKNOWLEDGED + status(drive_on=True))
     assert decode(Kind.SAFE, heard.next().body) == Safe(SESSION)  # that was no confirmation
     there.sendall(status(drive_on=False))
     *safes, bye = heard.until_the_end()
@@ -185,3 +194,44 @@ def test_without_pyserial_the_message_says_how_to_get_it(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(UsageError, match=r"campaign\[serial\]"):
         open_port("/dev/ttyUSB0", 115_200, exclusive=False)
+
+
+class ControllerAtHand:
+    """A port whose controller answers every heartbeat with the counter that it heard last."""
+
+    def __init__(self, others: int | None) -> None:
+        """`others`: the counter of the host that holds it; None when it is ours."""
+        self._others = others
+        self._decoder = FrameDecoder()
+        self._answers: list[bytes] = []
+        self.heard: list[Kind] = []
+
+    def read(self) -> bytes:
+        time.sleep(0.001)
+        return self._answers.pop(0) if self._answers else b""
+
+    def write(self, data: bytes) -> None:
+        for frame in self._decoder.feed(data):
+            self.heard.append(Kind(frame.kind))
+            message = decode(frame.kind, frame.body)
+            if isinstance(message, Heartbeat):
+                counter = message.counter if self._others is None else self._others
+                self._answers.append(status(drive_on=False, heartbeat=counter))
+            if isinstance(message, Safe):
+                self._answers.append(ACKNOWLEDGED + status(drive_on=False))
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize(("lapsed", "others"), [(True, 7), (True, None), (False, 7)])
+def test_after_a_lapse_an_orphan_makes_sure_that_the_controller_is_not_anothers(
+    lapsed: bool, others: int | None
+) -> None:
+    """A computer that slept may have lost it: SAFE would stop the run of whoever has it now."""
+    port = ControllerAtHand(others)
+    relay = Relay(port, io.BytesIO(), SESSION)
+    relay._holds, relay._lapsed = True, lapsed
+    threading.Thread(target=relay._read, daemon=True).start()
+    assert relay.make_safe()
+    relay._lost.set()
+    assert (Kind.SAFE in port.heard) == (not lapsed or others is None)

@@ -55,21 +55,19 @@ def test_a_low_pass_takes_its_share_of_a_count() -> None:
     assert behind["encoder"] == pytest.approx(passed * plain["encoder"])
 
 
-def test_presliding_is_counted_in_what_the_finer_sensor_sees() -> None:
-    """32 N m / 18 000 N m/rad = 0.1019 deg; the resolver's count at the load is 1/N of its own."""
+def test_presliding_is_counted_in_the_encoder_whose_angle_is_analysed() -> None:
+    """32 N m / 18 000 N m/rad = 0.1019 deg; the resolver's finer counts help no analysis."""
     found = fact(facts_of(bench(small_servo)), "presliding", "'load'")
-    assert "resolver" in found.subject
+    assert "encoder" in found.subject
     assert found.against == pytest.approx(32 / 18000)
-    assert found.value == pytest.approx(math.radians(360 / 4096) / 141.176)
-    assert found.verdict == "fine"
+    assert found.share == pytest.approx(360 / 4096 / math.degrees(32 / 18000))
+    assert found.verdict == "too coarse"
 
-    def no_resolver(tree: Tree) -> None:
+    def finer(tree: Tree) -> None:
         small_servo(tree)
-        del tree["sensors"]["resolver"]
+        tree["sensors"]["encoder"]["resolution"] = "0.001 deg"
 
-    coarse = fact(facts_of(bench(no_resolver)), "presliding", "'load'")
-    assert coarse.share == pytest.approx(360 / 4096 / math.degrees(32 / 18000))
-    assert coarse.verdict == "too coarse"
+    assert fact(facts_of(bench(finer)), "presliding", "'load'").verdict == "fine"
 
 
 def test_static_friction_against_what_drives() -> None:

@@ -234,6 +234,57 @@ def test_while_the_controller_starts_anew(tmp_path: Path) -> None:
         rig.judged(process, began=True)
 
 
+def test_while_the_line_is_cut(tmp_path: Path) -> None:
+    """The host cannot be told then; it finds out as soon as it finds the controller again."""
+    text = PROTOCOL.replace(
+        'default = { do = "retry", times = 2, pause = "1 s" }', 'default = "abort"'
+    )
+    with bench(tmp_path, speed="1", text=text.replace("cycles = 2", "cycles = 1000")) as rig:
+        with proxy(rig.port, Kind.HEARTBEAT, 10**9, rig.stop) as line:
+            process = rig.run(line.port, "--set", "backend.silence=1 s")
+            wait_for(lambda: rig.count("drive on") == 1, process)
+            line.cut()
+            rig.stop()
+            line.mend()
+            rig.judged(process, began=True)
+
+
+def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Path) -> None:
+    """As when a laptop is closed in a rest and opened again: it and its relay did not run."""
+    text = PROTOCOL.replace('pause = "1 s"\n\n[[', 'pause = "100 s"\n\n[[')
+    (tmp_path / "first").mkdir()
+    (tmp_path / "second").mkdir()
+    log, latch = tmp_path / "device.log", tmp_path / "latch.json"
+    options = ("--log", str(log), "--latch", str(latch), "--heartbeat-timeout", "1")
+    with controller("--speed", "1", *options, bench="simulink") as port:
+        first, second = Bench(tmp_path / "first", port), Bench(tmp_path / "second", port)
+        write(first.folder, text)
+        write(second.folder, PROTOCOL.replace("cycles = 2", "cycles = 1000"))
+        sleeper = first.run()
+        lines = iter(sleeper.stderr.readline, "")
+        assert any("the bench rests" in line for line in lines)
+        relays = [int(text) for text in children(sleeper.pid)]
+        for pid in (sleeper.pid, *relays):
+            os.kill(pid, signal.SIGSTOP)
+        time.sleep(2.0)  # longer than the controller waits for a heartbeat
+        other = second.run()
+        wait_for(lambda: log.read_text().count("drive on") == 2, other)
+        for pid in (sleeper.pid, *relays):
+            os.kill(pid, signal.SIGCONT)
+        sleeper.send_signal(signal.SIGINT)
+        sleeper.communicate(timeout=120)
+        assert sleeper.returncode in (5, 130)  # nobody there saw the bench safe: it is not theirs
+        assert "latched" not in [json.loads(line)["event"] for line in log.read_text().splitlines()]
+        assert other.poll() is None
+        other.send_signal(signal.SIGINT)
+        out, err = other.communicate(timeout=120)
+        assert open_run(second.folder / out.splitlines()[-1]).reason == "stopped by Ctrl-C", err
+
+
+def children(pid: int) -> list[str]:
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
 # What is done about it
 
 
@@ -251,7 +302,12 @@ def test_nobody_but_a_person_clears_it(tmp_path: Path) -> None:
         assert (shown["latched"], shown["stop"]["count"], shown["held"]) == (True, 1, False)
         right = (*ON, "--port", rig.port, "--clear-stop", "1")
         done = campaign(tmp_path, "run", "protocol.toml", *right)
-        assert open_run(tmp_path / done.last_line).status == "complete"
+        run = open_run(tmp_path / done.last_line)
+        assert run.status == "complete"
+        (told,) = read_lines(run.journal.encode()).all(Decision)[:1]
+        assert told.decision == "stop cleared"
+        assert "campaign stop" in told.reason  # whose stop it was
+        assert "by --clear-stop 1" in told.reason
         assert rig.count("cleared") == 1
 
 
@@ -280,16 +336,17 @@ def test_at_a_terminal_it_is_asked_with_when_and_by_whom(
 
 
 def test_a_second_host_is_told_who_holds_it_and_disturbs_nothing(tmp_path: Path) -> None:
-    with bench(tmp_path, speed="1") as rig:
+    with bench(tmp_path, speed="1", text=PROTOCOL.replace("cycles = 2", "cycles = 1000")) as rig:
         process = rig.run()
         wait_for(lambda: rig.count("drive on") == 1, process)
         second = campaign(tmp_path, "run", "protocol.toml", *ON, "--port", rig.port, code=3)
         assert f"pid {process.pid}" in second.err
         status = campaign(tmp_path, "status", "--port", rig.port).out
         assert f"pid {process.pid}, run " in status
+        assert rig.count("drive off") == 0
+        process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)
-        assert process.returncode == 0, err
-        assert open_run(tmp_path / out.splitlines()[-1]).status == "complete"
+        assert open_run(tmp_path / out.splitlines()[-1]).reason == "stopped by Ctrl-C", err
         assert rig.count("latched") == 0
 
 
