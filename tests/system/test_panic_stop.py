@@ -236,17 +236,18 @@ def test_while_the_controller_starts_anew(tmp_path: Path) -> None:
 
 def test_while_the_line_is_cut(tmp_path: Path) -> None:
     """The host cannot be told then; it finds out as soon as it finds the controller again."""
-    text = PROTOCOL.replace(
-        'default = { do = "retry", times = 2, pause = "1 s" }', 'default = "abort"'
-    )
-    with bench(tmp_path, speed="1", text=text.replace("cycles = 2", "cycles = 1000")) as rig:
-        with proxy(rig.port, Kind.HEARTBEAT, 10**9, rig.stop) as line:
-            process = rig.run(line.port, "--set", "backend.silence=1 s")
-            wait_for(lambda: rig.count("drive on") == 1, process)
-            line.cut()
-            rig.stop()
-            line.mend()
-            rig.judged(process, began=True)
+    text = PROTOCOL.replace("cycles = 2", "cycles = 1000")
+    text = text.replace('{ do = "retry", times = 2, pause = "1 s" }', '"abort"')
+    with (
+        bench(tmp_path, speed="1", text=text) as rig,
+        proxy(rig.port, Kind.HEARTBEAT, 10**9, rig.stop) as line,
+    ):
+        process = rig.run(line.port, "--set", "backend.silence=1 s")
+        wait_for(lambda: rig.count("drive on") == 1, process)
+        line.cut()
+        rig.stop()
+        line.mend()
+        rig.judged(process, began=True)
 
 
 def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Path) -> None:
