@@ -20,7 +20,9 @@ void campaign_latch_init(struct campaign_device *device, const struct campaign_l
 static bool remember(struct campaign_device *device)
 {
     const struct campaign_hooks *hooks = device->hooks;
-    return hooks->remember == NULL || hooks->remember(hooks->context, &device->latch);
+    device->unremembered =
+        hooks->remember != NULL && !hooks->remember(hooks->context, &device->latch);
+    return !device->unremembered;
 }
 
 /* A session's SAFE, sent until it is confirmed, is one stop. What does not say whose it is counts
@@ -29,8 +31,11 @@ static void set_latch(struct campaign_device *device, uint32_t session, const ch
 {
     struct campaign_latch *latch = &device->latch;
     const bool again = latch->latched && session != 0 && session == device->stopped_by;
-    if (again)
+    if (again) {
+        if (device->unremembered)
+            (void)remember(device);
         return;
+    }
     device->stopped_by = session;
     device->stopped_at = device->now;
     device->stopped_at_known = true;
@@ -38,7 +43,7 @@ static void set_latch(struct campaign_device *device, uint32_t session, const ch
     latch->count = (latch->count + 1u) & 0xFFFFFFFFu;
     latch->cause = CAMPAIGN_STOPPED;
     strcpy(latch->by, by);
-    (void)remember(device); /* where that fails it holds until the next reset */
+    (void)remember(device); /* where that fails it holds until the next reset, and is tried again */
 }
 
 void campaign_on_safe(struct campaign_device *device, const struct campaign_frame *frame)
@@ -77,6 +82,7 @@ struct campaign_refusal campaign_latch_check(struct campaign_device *device)
 struct campaign_refusal campaign_do_unlatch(struct campaign_device *device, uint32_t count)
 {
     const struct campaign_latch before = device->latch;
+    const bool unremembered = device->unremembered;
     if (campaign_may_move(device))
         return campaign_refused(CAMPAIGN_WRONG_STATE, NULL);
     if (!before.latched || count != before.count)
@@ -85,6 +91,7 @@ struct campaign_refusal campaign_do_unlatch(struct campaign_device *device, uint
     device->latch.cause = CAMPAIGN_NOT_LATCHED;
     if (!remember(device)) {
         device->latch = before;
+        device->unremembered = unremembered;
         return campaign_refused(CAMPAIGN_NOT_READY, "it could not be remembered");
     }
     return campaign_accepted();

@@ -214,6 +214,7 @@ struct campaign_device {
     char stopped_text[CAMPAIGN_LONGEST_HOST + 16u];
 
     struct campaign_latch latch;
+    bool unremembered;     /* the memory failed at the latest stop */
     uint32_t stopped_by;   /* session of the latest stop, 0 for nobody's */
     bool stopped_at_known; /* it was since the start */
     uint64_t stopped_at;

@@ -31,7 +31,7 @@ HEADINGS = (
     "phase margin",
     "gain margin",
     "delay margin",
-    "fastest pole",
+    "slowest decay",
     "least damped",
     "verdict",
 )
@@ -136,7 +136,7 @@ def _loop_row(loop: CheckedLoop) -> tuple[str, ...]:
         *place,
         _shown(margins.crossover, 1.0 / TWO_PI, "Hz"),
         _shown(margins.phase_margin, 180.0 / math.pi, "deg"),
-        _shown(margins.gain_margin_db, 1.0, "dB"),
+        _gain(margins.gain_margin_db),
         _shown(margins.delay_margin, 1e3, "ms"),
         *poles,
         loop.verdict,
@@ -145,6 +145,13 @@ def _loop_row(loop: CheckedLoop) -> tuple[str, ...]:
 
 def _shown(value: float | None, factor: float, unit: str) -> str:
     return "–" if value is None else f"{number(round(value * factor, 3), 3)} {unit}"
+
+
+def _gain(margin: float | None) -> str:
+    """A margin below 0 dB is one to what the gain may fall to: a conditionally stable loop."""
+    if margin is not None and margin < 0:
+        return f"may fall {_shown(-margin, 1.0, 'dB')}"
+    return _shown(margin, 1.0, "dB")
 
 
 def _damping(pole: complex | None) -> str:

@@ -340,6 +340,16 @@ def test_a_stop_that_cannot_be_remembered_holds_until_the_next_reset(console: Co
     assert console.send(6, wire.Arm(CRC))[0].code is NakCode.LATCHED
 
 
+def test_what_could_not_be_remembered_is_tried_again_with_the_same_stop(console: Console) -> None:
+    bring_to(console, State.IDLE)
+    console.do("memory", 0)
+    console.upon(0, wire.Safe(OTHERS, "eve"))
+    console.do("memory", 1)
+    remembered = note(True, 1, STOPPED, "eve")
+    assert remembered in kinds(console.upon(0, wire.Safe(OTHERS, "eve")))
+    assert remembered not in kinds(console.upon(0, wire.Safe(OTHERS, "eve")))  # once is enough
+
+
 def test_an_unlatch_that_cannot_be_remembered_is_refused(console: Console) -> None:
     bring_to(console, State.IDLE, past="latched 3")
     console.do("memory", 0)
