@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
+from campaign.execution.safety import NOT_SAFE
 from campaign.execution.stop import StopSwitch
 
 hangs_up = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no SIGHUP here")
+on_posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX, and a guardian")
 STOPPING = [signal.SIGINT, signal.SIGTERM]
 
 
@@ -24,6 +30,16 @@ def test_the_first_signal_only_asks(number: signal.Signals, who: str):
         signal.raise_signal(number)
         assert stop()
         assert stop.reason == who
+
+
+def test_before_anybody_asks_nobody_has_and_the_first_who_does_is_named():
+    stop = StopSwitch()
+    assert stop() is False
+    assert stop.reason == ""
+    stop.request("the operator")
+    stop.request("Ctrl-C")
+    assert stop() is True
+    assert stop.reason == "the operator"
 
 
 @pytest.fixture
@@ -66,6 +82,28 @@ def test_a_terminal_that_closes_asks_and_never_insists(
         assert left.wait(60)
 
 
+def test_one_signal_is_one_although_two_listen(left: threading.Event):
+    with StopSwitch().on_signals() as stop:
+        signal.raise_signal(signal.SIGINT)
+    assert stop()
+    assert not left.is_set()  # whatever was heard has been counted when the block is left
+
+
+@on_posix
+def test_the_signals_of_others_ask_nothing(left: threading.Event):
+    heard = []
+    before = signal.signal(signal.SIGUSR1, lambda number, frame: heard.append(number))
+    try:
+        with StopSwitch().on_signals() as stop:
+            signal.raise_signal(signal.SIGUSR1)
+            signal.raise_signal(signal.SIGUSR1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert heard == [signal.SIGUSR1, signal.SIGUSR1]
+    assert not stop()
+    assert not left.is_set()
+
+
 @contextmanager
 def heeding_hang_ups() -> Iterator[None]:
     """As without nohup, under which these tests must pass as well."""
@@ -96,3 +134,201 @@ def test_a_stop_is_taken_although_nobody_can_read_the_notice(monkeypatch: pytest
     with StopSwitch().on_signals() as stop:
         signal.raise_signal(signal.SIGTERM)
         assert stop.reason == "SIGTERM"
+
+
+def test_where_there_are_no_hang_ups_the_others_are_heard(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delattr(signal, "SIGHUP", raising=False)
+    with StopSwitch().on_signals() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        assert stop.reason == "SIGTERM"
+
+
+def test_a_handler_that_python_does_not_know_is_left_alone(monkeypatch: pytest.MonkeyPatch):
+    """There is no way to put it back, and no reason to fail."""
+    before = signal.getsignal(signal.SIGTERM)
+    known = signal.signal
+
+    def unknown(number: int, handler: object) -> object:
+        was = known(number, handler)
+        return None if number == signal.SIGTERM else was
+
+    monkeypatch.setattr(signal, "signal", unknown)
+    try:
+        with StopSwitch().on_signals() as stop:
+            pass
+        signal.raise_signal(signal.SIGTERM)
+        assert stop()
+    finally:
+        known(signal.SIGTERM, before)
+
+
+def test_it_is_said_once_that_the_run_is_being_stopped(left: threading.Event, capfd):
+    with StopSwitch().on_signals():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+    assert capfd.readouterr().err.count("stopping: ") == 1
+
+
+@pytest.fixture
+def guardian(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+    """Every process that is started."""
+    started, known = [], subprocess.Popen
+
+    def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
+        started.append(known(*arguments, **options))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    return started
+
+
+@on_posix
+def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
+    come, back = os.pipe()
+    os.set_blocking(back, False)
+    outer = signal.set_wakeup_fd(back)
+    try:
+        threads, open_files = threading.enumerate(), sorted(os.listdir("/dev/fd"))
+        with StopSwitch().on_signals():
+            new = [thread for thread in threading.enumerate() if thread not in threads]
+            assert all(thread.daemon for thread in new)
+            (process,) = guardian
+            assert process.poll() is None
+        assert threading.enumerate() == threads
+        assert sorted(os.listdir("/dev/fd")) == open_files
+        assert process.returncode == 0
+        assert signal.set_wakeup_fd(-1) == back
+    finally:
+        signal.set_wakeup_fd(outer)
+        os.close(come)
+        os.close(back)
+
+
+@on_posix
+def test_a_note_that_comes_late_is_written_into_nobodys_file():
+    with StopSwitch().on_signals() as stop:
+        pass
+    pipes = [os.pipe() for _ in range(8)]  # they get the numbers that have become free
+    stop.kept("late")
+    for come, back in pipes:
+        os.close(back)
+        assert os.read(come, 100) == b""
+        os.close(come)
+
+
+@on_posix
+def test_a_guardian_that_does_nothing_holds_nothing_up(
+    left: threading.Event, guardian: list[subprocess.Popen[bytes]], capfd
+):
+    with StopSwitch().on_signals() as stop:
+        (process,) = guardian
+        # The terminal's Ctrl-C reaches the program only.
+        assert os.getsid(process.pid) != os.getsid(0)
+        process.send_signal(signal.SIGSTOP)
+        try:
+            for _ in range(100):  # more than a pipe can hold
+                stop.kept("x" * 5000)
+            signal.raise_signal(signal.SIGINT)
+            assert not left.is_set()
+            signal.raise_signal(signal.SIGINT)
+            assert left.wait(60)
+        finally:
+            process.send_signal(signal.SIGCONT)
+    assert "ignored" not in capfd.readouterr().err  # what Python says of a wakeup pipe that is full
+
+
+PROGRAM = """
+import ctypes, pathlib, signal, sys, time
+from campaign.errors import ExitCode
+from campaign.execution.stop import StopSwitch
+
+def hang(library):
+    "In a call that no signal breaks off: the shell says when it has begun."
+    library(None).system(b"echo ready; read line")
+
+def made_safe(code=ExitCode.INTERRUPTED, seconds=0.0):
+    time.sleep(seconds)
+    pathlib.Path("safe").touch()
+    return code
+
+with StopSwitch().on_signals() as stop:
+    signal.raise_signal(signal.SIGTERM)
+    {does}
+"""
+
+
+def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[int, str]:
+    """The exit code of a program that was asked twice, the second time while it hangs, and what it
+    said."""
+    come, back = os.pipe()
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM.format(does=does)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        stdin=come,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        text=True,
+    )
+    os.close(come)
+    with process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            process.send_signal(signal.SIGTERM)
+            code = process.wait(60)
+        finally:
+            process.kill()
+            os.close(back)  # ends what it hangs in
+        return code, process.stderr.read() if process.stderr else ""
+
+
+@on_posix
+def test_who_insists_before_anything_was_begun_leaves_at_once(tmp_path: Path):
+    code, said = insisted(tmp_path, "hang(ctypes.CDLL)")
+    assert code == 130
+    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+
+
+@on_posix
+def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
+    does = "stop.make_safe = lambda: made_safe(seconds=2.0); stop.kept('kept'); hang(ctypes.CDLL)"
+    code, said = insisted(tmp_path, does)
+    assert (tmp_path / "safe").exists()
+    assert code == 130
+    assert said.endswith("unclosed\n\nkept\n")
+
+
+@on_posix
+def test_a_program_without_standard_error_of_its_own_is_left_as_well(tmp_path: Path):
+    code, said = insisted(tmp_path, "sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)")
+    assert code == 130
+    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+
+
+@on_posix
+def test_a_bench_that_was_not_seen_safe_has_its_own_code_and_line(tmp_path: Path):
+    does = "stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); hang(ctypes.CDLL)"
+    code, said = insisted(tmp_path, does)
+    assert code == 5
+    assert f"\n{NOT_SAFE}\nstopped at once" in said
+
+
+@on_posix
+def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
+    ours, theirs = os.openpty()
+    try:
+        code, _ = insisted(tmp_path, "hang(ctypes.CDLL)", stderr=theirs)
+        said = os.read(ours, 4096).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert code == 130
+    assert "\x1b[?25h\r\nstopped at once" in said
+
+
+@on_posix
+def test_a_program_that_lets_no_thread_run_is_ended_with_its_last_note(tmp_path: Path):
+    code, said = insisted(tmp_path, "stop.kept('one'); stop.kept('zwö'); hang(ctypes.PyDLL)")
+    assert code == -signal.SIGKILL
+    assert said.endswith("\nzwö\n")
+    assert "one" not in said
