@@ -88,7 +88,7 @@ def test_what_breaks_making_safe_off_goes_on_and_leaves_the_bench_unsafe(
 
 
 def test_an_error_of_a_safe_bench_is_its_own() -> None:
-    with pytest.raises(ArchiveError, match="^no space left$"), unsafe_first(Ended(kept=RUN)):
+    with pytest.raises(ArchiveError, match=r"^no space left$"), unsafe_first(Ended(kept=RUN)):
         raise ArchiveError("no space left")
 
 
@@ -138,9 +138,11 @@ def test_a_stop_by_force_is_made_safe_and_says_what_is_kept_and_how_to_go_on() -
         f"stopped at once; the finished trials are in {RUN}; `campaign report run` shows them, "
         "`campaign resume run` goes on from there"
     )
-    with pytest.raises(AbortedError, match="^stopped at once$"):
-        with safe_afterwards(FakeBackend(), Ended()):
-            raise KeyboardInterrupt
+    with (
+        pytest.raises(AbortedError, match=r"^stopped at once$"),
+        safe_afterwards(FakeBackend(), Ended()),
+    ):
+        raise KeyboardInterrupt
 
 
 def test_a_connected_bench_is_made_safe_only_when_the_block_breaks_off() -> None:
@@ -151,9 +153,9 @@ def test_a_connected_bench_is_made_safe_only_when_the_block_breaks_off() -> None
     with pytest.raises(ArchiveError), safe_when_broken_off(backend):
         raise ArchiveError("no space left")
     assert backend.log == ["made safe"]
-    with pytest.raises(NotSafeError, match="not seen at rest"):
-        with safe_when_broken_off(resting(not_seen)):
-            raise KeyboardInterrupt
+    unsafe = pytest.raises(NotSafeError, match="not seen at rest")
+    with unsafe, safe_when_broken_off(resting(not_seen)):
+        raise KeyboardInterrupt
 
 
 class Clinging(FakeBackend):
