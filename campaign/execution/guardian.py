@@ -14,7 +14,8 @@ import signal
 import sys
 import time
 
-NOTE, MAKING_SAFE = 0xFE, 0xFD
+NOTE = 0xFE
+MAKING_SAFE = 0xFD
 """First bytes of what the program says itself, above all signal numbers: NOTE, its length (two
 bytes) and a text, or just MAKING_SAFE."""
 STUCK = 1.5
@@ -51,9 +52,9 @@ class Guardian:
         data, signals = self._left + data, b""
         while data:
             if data[0] == NOTE:
-                if len(data) < 3 or len(data) < 3 + int.from_bytes(data[1:3]):
-                    break
                 end = 3 + int.from_bytes(data[1:3])
+                if len(data) < end:
+                    break  # the rest is still to come
                 self.note, data = data[3:end], data[end:]
                 continue
             if data[0] == MAKING_SAFE:

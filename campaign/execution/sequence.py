@@ -71,13 +71,13 @@ class TrialSequence:
                 for future in sorted(finished, key=lambda future: self._running[future].number):
                     self._settle(self._running.pop(future), future.result())
         except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(wait=False)
             raise
         except BaseException:
             self._fail("the run cannot go on")  # lets the other trials end
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown()
             raise
-        pool.shutdown(wait=True)
+        pool.shutdown()
 
     def _halted(self) -> bool:
         return self._stop() or bool(self._ended.fault)

@@ -29,6 +29,8 @@ _NOTICE = (
 )
 _NOTHING = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
+_LONGEST = 2000
+"""bytes of a note, so that a pipe takes it whole."""
 _OWN = 128
 """Added to a signal's number by our own handler: the guardian hands on the plain ones."""
 
@@ -70,7 +72,7 @@ class StopSwitch:
         The text is at the guardian's before this returns.
         """
         self._note = note
-        text = note.encode()[:2000]
+        text = note.encode()[:_LONGEST]
         self._tell(bytes((NOTE,)) + len(text).to_bytes(2) + text)
 
     @contextmanager
@@ -106,9 +108,10 @@ class StopSwitch:
         """With a guardian that is told of every signal at once."""
         theirs, ours = os.pipe()
         os.set_blocking(ours, False)
+        beside = Path(__file__).with_name("guardian.py")
         # -I, -S: nothing in the user's folder can stand in for a module of the library.
         guardian = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-I", "-S", str(Path(__file__).with_name("guardian.py")), _own_id()],
+            [sys.executable, "-I", "-S", str(beside), str(os.getpid())],
             stdin=theirs,
             stdout=back,
             start_new_session=True,
@@ -157,10 +160,6 @@ class StopSwitch:
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
         _say(f"{cursor}\n{unsafe}{self._note}\n")
         os._exit(code)
-
-
-def _own_id() -> str:
-    return str(os.getpid())
 
 
 def _say(text: str) -> None:

@@ -59,6 +59,15 @@ def test_the_second_one_sets_a_deadline_that_more_of_them_do_not_put_off() -> No
     assert one.deadline == 100.0 + STUCK
 
 
+def test_other_signals_are_handed_on_and_count_for_nothing() -> None:
+    other = bytes((signal.SIGSEGV,))
+    one = Guardian()
+    assert one.feed(INT + other + other, 100.0) == INT + other + other
+    assert one.deadline is None
+    one.feed(INT, 101.0)
+    assert one.deadline == 101.0 + STUCK
+
+
 def test_a_program_that_makes_safe_has_longer() -> None:
     one = Guardian()
     one.feed(INT + INT, 100.0)
@@ -76,6 +85,14 @@ def test_a_note_comes_through_however_it_is_cut_and_is_no_signal(text: bytes, pi
     heard = b"".join(one.feed(data[i : i + piece], 1.0) for i in range(0, len(data), piece))
     assert heard == INT + TERM
     assert one.note == text
+
+
+def test_a_note_is_known_as_soon_as_it_is_whole() -> None:
+    one = Guardian()
+    one.feed(note(b"kept"), 1.0)
+    assert one.note == b"kept"
+    one.feed(note(b"more")[:-1], 1.0)
+    assert one.note == b"kept"
 
 
 def test_before_the_program_has_said_anything_there_is_no_note() -> None:
@@ -143,6 +160,14 @@ def test_who_does_not_obey_is_ended_and_the_last_note_is_said(program) -> None:
     assert watching.process.stdout.read() == INT
     assert watching.process.stderr.read() == b"\nthe run is kept\n"
     watching.end()
+
+
+@on_posix
+def test_a_deadline_that_has_passed_already_is_kept_as_well(program) -> None:
+    watching = Watching(program, edit="g['main'].__globals__.update(STUCK=-60.0)")
+    watching.say(INT + INT)
+    assert program.wait(60) == -signal.SIGKILL
+    assert watching.end() == (INT + INT, b"\n\n")
 
 
 @on_posix

@@ -7,25 +7,9 @@ from dataclasses import dataclass, field
 from campaign.execution.outside import INTERVAL, OutsideWatch
 from campaign.execution.stop import StopSwitch
 from campaign.trial import PanicStop
-from tests.execution.fakes import FakeBackend
+from tests.execution.fakes import FakeBackend, SwitchedBench
 
 BY_EVE = PanicStop(3, "eve", 1.5)
-
-
-@dataclass
-class SwitchedBench(FakeBackend):
-    """A bench that others can switch off."""
-
-    stop: PanicStop | None = None
-    asked: int = 0
-
-    def introduce(self, run: str) -> None: ...
-
-    def panic_stop(self) -> PanicStop | None:
-        self.asked += 1
-        return self.stop
-
-    def clear_stop(self, count: int) -> None: ...
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
@@ -206,6 +207,14 @@ def test_leaving_at_once_says_whether_the_bench_was_seen_safe() -> None:
     assert safe_at_once(FakeBackend()) is ExitCode.INTERRUPTED
     assert safe_at_once(resting(not_seen)) is ExitCode.NOT_SAFE
     assert safe_at_once(resting(raising(OSError()))) is ExitCode.NOT_SAFE
+
+
+def test_leaving_at_once_waits_for_a_bench_that_takes_a_moment() -> None:
+    def slow() -> SafeState:
+        time.sleep(0.3)
+        return SafeState.CONFIRMED
+
+    assert safe_at_once(resting(slow)) is ExitCode.INTERRUPTED
 
 
 def test_leaving_at_once_does_not_wait_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -241,6 +241,13 @@ def test_a_guardian_that_does_nothing_holds_nothing_up(
     assert "ignored" not in capfd.readouterr().err  # what Python says of a wakeup pipe that is full
 
 
+@on_posix
+def test_a_note_is_never_longer_than_a_pipe_takes_whole(tmp_path: Path):
+    code, said = insisted(tmp_path, "stop.kept('x' * 100_000); hang(ctypes.PyDLL)")
+    assert code == -signal.SIGKILL
+    assert 1000 < said.count("x") <= 4096 - 3
+
+
 PROGRAM = """
 import ctypes, pathlib, signal, sys, time
 from campaign.errors import ExitCode
