@@ -18,6 +18,8 @@ NOTE = 0xFE
 MAKING_SAFE = 0xFD
 """First bytes of what the program says itself, above all signal numbers: NOTE, its length (two
 bytes) and a text, or just MAKING_SAFE."""
+PIECE = 65536
+"""bytes read at a time."""
 STUCK = 1.5
 """s in which the program has to begin to leave once it was insisted."""
 SAFE = 30.0
@@ -79,7 +81,7 @@ def main(parent: int) -> None:
             os.kill(parent, signal.SIGKILL)
             os.write(2, b"\n" + guardian.note + b"\n")
             return
-        data = os.read(0, 65536)
+        data = os.read(0, PIECE)
         if not data:
             return
         signals = guardian.feed(data, time.monotonic())

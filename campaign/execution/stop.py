@@ -31,6 +31,8 @@ _NOTHING = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
 _LONGEST = 2000
 """bytes of a note, so that a pipe takes it whole."""
+_PIECE = 4096
+"""bytes read at a time."""
 _OWN = 128
 """Added to a signal's number by our own handler: the guardian hands on the plain ones."""
 
@@ -140,13 +142,13 @@ class StopSwitch:
 
     def _watch(self, come: int) -> None:
         """Count what our handler and what the guardian has heard: the larger number is true."""
-        heard = {True: Asked(), False: Asked()}
+        heard = {0: Asked(), _OWN: Asked()}
         with suppress(OSError):
-            while data := os.read(come, 4096):
+            while data := os.read(come, _PIECE):
                 for byte in data:
                     number = byte % _OWN
                     if number in _stopping_signals():  # others may have handlers, too
-                        heard[byte >= _OWN].add(number)
+                        heard[byte & _OWN].add(number)
                         self._ask(number)
                 if max(asked.times for asked in heard.values()) > 1:
                     self._leave()

@@ -230,12 +230,15 @@ def test_a_guardian_that_does_nothing_holds_nothing_up(
         assert os.getsid(process.pid) != os.getsid(0)
         process.send_signal(signal.SIGSTOP)
         try:
-            for _ in range(100):  # more than a pipe can hold
-                stop.kept("x" * 5000)
+            for text in ("x" * 5000, ""):  # more than a pipe can hold, to the last byte
+                for _ in range(1000):
+                    stop.kept(text)
             signal.raise_signal(signal.SIGINT)
             assert not left.is_set()
             signal.raise_signal(signal.SIGINT)
             assert left.wait(60)
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
         finally:
             process.send_signal(signal.SIGCONT)
     assert "ignored" not in capfd.readouterr().err  # what Python says of a wakeup pipe that is full
@@ -243,7 +246,7 @@ def test_a_guardian_that_does_nothing_holds_nothing_up(
 
 @on_posix
 def test_a_note_is_never_longer_than_a_pipe_takes_whole(tmp_path: Path):
-    code, said = insisted(tmp_path, "stop.kept('x' * 100_000); hang(ctypes.PyDLL)")
+    code, said = insisted(tmp_path, "asked(); stop.kept('x' * 100_000); hang(ctypes.PyDLL)")
     assert code == -signal.SIGKILL
     assert 1000 < said.count("x") <= 4096 - 3
 
@@ -262,8 +265,10 @@ def made_safe(code=ExitCode.INTERRUPTED, seconds=0.0):
     pathlib.Path("safe").touch()
     return code
 
-with StopSwitch().on_signals() as stop:
+def asked():
     signal.raise_signal(signal.SIGTERM)
+
+with StopSwitch().on_signals() as stop:
     {does}
 """
 
@@ -285,6 +290,10 @@ def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[in
     with process:
         try:
             assert process.stdout.readline() == "ready\n"
+            if "asked()" not in does:
+                process.send_signal(signal.SIGTERM)
+                assert process.stderr.readline() == "\n"
+                assert process.stderr.readline().startswith("stopping: ")
             process.send_signal(signal.SIGTERM)
             code = process.wait(60)
         finally:
@@ -295,15 +304,22 @@ def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[in
 
 @on_posix
 def test_who_insists_before_anything_was_begun_leaves_at_once(tmp_path: Path):
-    code, said = insisted(tmp_path, "hang(ctypes.CDLL)")
+    code, said = insisted(tmp_path, "asked(); hang(ctypes.CDLL)")
     assert code == 130
     assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
 
 
 @on_posix
+def test_a_program_that_hangs_already_is_heard_to_be_stopped_as_well(tmp_path: Path):
+    code, said = insisted(tmp_path, "hang(ctypes.CDLL)")
+    assert code == 130
+    assert said == "\nstopped at once; nothing was begun\n"
+
+
+@on_posix
 def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
-    does = "stop.make_safe = lambda: made_safe(seconds=2.0); stop.kept('kept'); hang(ctypes.CDLL)"
-    code, said = insisted(tmp_path, does)
+    does = "asked(); stop.make_safe = lambda: made_safe(seconds=2.0); stop.kept('kept')"
+    code, said = insisted(tmp_path, f"{does}; hang(ctypes.CDLL)")
     assert (tmp_path / "safe").exists()
     assert code == 130
     assert said.endswith("unclosed\n\nkept\n")
@@ -311,14 +327,16 @@ def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
 
 @on_posix
 def test_a_program_without_standard_error_of_its_own_is_left_as_well(tmp_path: Path):
-    code, said = insisted(tmp_path, "sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)")
+    code, said = insisted(
+        tmp_path, "asked(); sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)"
+    )
     assert code == 130
     assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
 
 
 @on_posix
 def test_a_bench_that_was_not_seen_safe_has_its_own_code_and_line(tmp_path: Path):
-    does = "stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); hang(ctypes.CDLL)"
+    does = "asked(); stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); hang(ctypes.CDLL)"
     code, said = insisted(tmp_path, does)
     assert code == 5
     assert f"\n{NOT_SAFE}\nstopped at once" in said
@@ -328,7 +346,7 @@ def test_a_bench_that_was_not_seen_safe_has_its_own_code_and_line(tmp_path: Path
 def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
     ours, theirs = os.openpty()
     try:
-        code, _ = insisted(tmp_path, "hang(ctypes.CDLL)", stderr=theirs)
+        code, _ = insisted(tmp_path, "asked(); hang(ctypes.CDLL)", stderr=theirs)
         said = os.read(ours, 4096).decode()
     finally:
         os.close(ours)
@@ -339,7 +357,9 @@ def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
 
 @on_posix
 def test_a_program_that_lets_no_thread_run_is_ended_with_its_last_note(tmp_path: Path):
-    code, said = insisted(tmp_path, "stop.kept('one'); stop.kept('zwö'); hang(ctypes.PyDLL)")
+    code, said = insisted(
+        tmp_path, "asked(); stop.kept('one'); stop.kept('zwö'); hang(ctypes.PyDLL)"
+    )
     assert code == -signal.SIGKILL
     assert said.endswith("\nzwö\n")
     assert "one" not in said
