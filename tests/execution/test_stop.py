@@ -192,13 +192,12 @@ def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
     os.set_blocking(back, False)
     outer = signal.set_wakeup_fd(back)
     try:
-        threads, files = threading.enumerate(), open_files()
+        threads, files = set(threading.enumerate()), open_files()
         with StopSwitch().on_signals():
-            new = [thread for thread in threading.enumerate() if thread not in threads]
-            assert all(thread.daemon for thread in new)
+            assert all(thread.daemon for thread in set(threading.enumerate()) - threads)
             (process,) = guardian
             assert process.poll() is None
-        assert threading.enumerate() == threads
+        assert not set(threading.enumerate()) - threads
         assert open_files() == files
         assert process.returncode == 0
         assert signal.set_wakeup_fd(-1) == back

@@ -31,6 +31,7 @@ from tests.mutants.mutations import Mutant, mutants
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 MAY_SURVIVE = 0.05
+SAID = "said-by-pytest.txt"
 MEMORY = 6 * 2**30
 """bytes; a bug may ask for any amount."""
 LEFT_OUT = (".*", "results", "build", "dist", "__pycache__", "*.egg-info")
@@ -54,8 +55,8 @@ class Copy:
             cwd=self.root,
             env=os.environ | new,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stdout=(self.root / SAID).open("wb"),
+            stderr=subprocess.STDOUT,
             start_new_session=True,
         )
         try:
@@ -78,7 +79,8 @@ class Copy:
         self.tests_pass(tests, None)  # compiles what is compiled only once
         begun = time.monotonic()
         if not self.tests_pass(tests, None):
-            raise SystemExit(f"without any bug these fail: {' '.join(tests)}")
+            said = (self.root / SAID).read_text(encoding="utf-8", errors="replace")
+            raise SystemExit(f"without any bug these fail: {' '.join(tests)}\n{said}")
         self.patience[tests] = 10.0 + 5.0 * (time.monotonic() - begun)
 
     def survives(self, mutant: Mutant, tests: tuple[str, ...]) -> bool:
