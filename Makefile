@@ -6,15 +6,16 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PINNED := --quiet --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak check format clean
+.PHONY: help demo test soak mutants check format clean
 
 help:
-	@echo "make demo    run the quick-start protocol on the simulated bench and report it"
-	@echo "make test    run the whole test suite"
-	@echo "make soak    wear: hundreds of kills, thousands of damaged files, a million frames (long)"
-	@echo "make check   lint, formatting, types, import contracts"
-	@echo "make format  put the code into the project's format"
-	@echo "make clean   remove the environment and everything built (results/ stays)"
+	@echo "make demo     run the quick-start protocol on the simulated bench and report it"
+	@echo "make test     run the whole test suite"
+	@echo "make soak     wear: hundreds of kills, thousands of damaged files, a million frames (long)"
+	@echo "make mutants  put small bugs into what keeps the bench safe: do the tests notice? (long)"
+	@echo "make check    lint, formatting, types, import contracts"
+	@echo "make format   put the code into the project's format"
+	@echo "make clean    remove the environment and everything built (results/ stays)"
 
 demo: $(VENV)/installed
 	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) \
@@ -25,6 +26,9 @@ test: $(VENV)/installed-test
 
 soak: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m soak -n auto $(PYTEST_OPTIONS)
+
+mutants: $(VENV)/installed-mutants
+	$(BIN)/python tests/mutants/run.py $(MUTANTS_OPTIONS)
 
 check: $(VENV)/installed-test
 	$(BIN)/ruff check .
@@ -48,6 +52,10 @@ $(VENV)/installed: $(VENV)/made pyproject.toml constraints.txt
 
 $(VENV)/installed-test: $(VENV)/installed
 	$(PIP) install $(PINNED) --no-build-isolation --editable ".[test]"
+	@touch $@
+
+$(VENV)/installed-mutants: $(VENV)/installed-test
+	$(PIP) install $(PINNED) --no-build-isolation --editable ".[mutants]"
 	@touch $@
 
 # PYTHON=... overrides the search. A candidate must run: a bare shim on the PATH is not enough.

@@ -14,9 +14,12 @@ import signal
 import sys
 import time
 
-NOTE, MAKING_SAFE = 0xFE, 0xFD
+NOTE = 0xFE
+MAKING_SAFE = 0xFD
 """First bytes of what the program says itself, above all signal numbers: NOTE, its length (two
 bytes) and a text, or just MAKING_SAFE."""
+PIECE = 65536
+"""bytes read at a time."""
 STUCK = 1.5
 """s in which the program has to begin to leave once it was insisted."""
 SAFE = 30.0
@@ -51,9 +54,9 @@ class Guardian:
         data, signals = self._left + data, b""
         while data:
             if data[0] == NOTE:
-                if len(data) < 3 or len(data) < 3 + int.from_bytes(data[1:3]):
-                    break
                 end = 3 + int.from_bytes(data[1:3])
+                if len(data) < end:
+                    break  # the rest is still to come
                 self.note, data = data[3:end], data[end:]
                 continue
             if data[0] == MAKING_SAFE:
@@ -78,7 +81,7 @@ def main(parent: int) -> None:
             os.kill(parent, signal.SIGKILL)
             os.write(2, b"\n" + guardian.note + b"\n")
             return
-        data = os.read(0, 65536)
+        data = os.read(0, PIECE)
         if not data:
             return
         signals = guardian.feed(data, time.monotonic())

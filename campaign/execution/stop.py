@@ -29,6 +29,10 @@ _NOTICE = (
 )
 _NOTHING = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
+_LONGEST = 2000
+"""bytes of a note, so that a pipe takes it whole."""
+_PIECE = 4096
+"""bytes read at a time."""
 _OWN = 128
 """Added to a signal's number by our own handler: the guardian hands on the plain ones."""
 
@@ -72,7 +76,7 @@ class StopSwitch:
         guardian's before this returns: if that has to end the program, nobody has seen it.
         """
         self._note, self._moves = note, moves
-        text = f"{NOT_SAFE if moves else ''}\n{note()}".strip().encode()[:2000]
+        text = f"{NOT_SAFE if moves else ''}\n{note()}".strip().encode()[:_LONGEST]
         self._tell(bytes((NOTE,)) + len(text).to_bytes(2) + text)
 
     @contextmanager
@@ -108,9 +112,10 @@ class StopSwitch:
         """With a guardian that is told of every signal at once."""
         theirs, ours = os.pipe()
         os.set_blocking(ours, False)
+        beside = Path(__file__).with_name("guardian.py")
         # -I, -S: nothing in the user's folder can stand in for a module of the library.
         guardian = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-I", "-S", str(Path(__file__).with_name("guardian.py")), _own_id()],
+            [sys.executable, "-I", "-S", str(beside), str(os.getpid())],
             stdin=theirs,
             stdout=back,
             start_new_session=True,
@@ -139,13 +144,13 @@ class StopSwitch:
 
     def _watch(self, come: int) -> None:
         """Count what our handler and what the guardian has heard: the larger number is true."""
-        heard = {True: Asked(), False: Asked()}
+        heard = {0: Asked(), _OWN: Asked()}
         with suppress(OSError):
-            while data := os.read(come, 4096):
+            while data := os.read(come, _PIECE):
                 for byte in data:
                     number = byte % _OWN
                     if number in _stopping_signals():  # others may have handlers, too
-                        heard[byte >= _OWN].add(number)
+                        heard[byte & _OWN].add(number)
                         self._ask(number)
                 if max(asked.times for asked in heard.values()) > 1:
                     self._leave()
@@ -160,10 +165,6 @@ class StopSwitch:
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
         _say(f"{cursor}\n{state}{self._note()}\n")
         os._exit(code)
-
-
-def _own_id() -> str:
-    return str(os.getpid())
 
 
 def _say(text: str) -> None:

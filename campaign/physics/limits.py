@@ -26,13 +26,12 @@ TINY_RATE = 1e-6
 """rad/s; a jump of a rate command below this is rounding, not a step."""
 POINTS_PER_CYCLE = 64
 """of a sine added to something else; its extreme is then missed by less than 0.13 %."""
-MOST_CYCLES = 1000
-"""of such a sum that are looked at."""
-
-
-_SPEEDS = np.concatenate([[1e-12], np.geomspace(1e-6, 1.0, 60)])
-_SPEEDS = np.concatenate([-_SPEEDS[::-1], _SPEEDS])
-"""Shares of the largest speed, both ways, at which friction is looked at."""
+MOST_POINTS = 64_000
+"""of such a sum that are looked at: of more than 1000 cycles fewer points each."""
+POINTS_OF_A_LINE = 1001
+"""at which a polyline is looked at besides its knots."""
+SPEEDS = 121
+"""at which friction is looked at."""
 
 
 @dataclass(frozen=True)
@@ -123,9 +122,10 @@ def motion(task: Task) -> Extremes:
     hull = Zero() if task.mode == "prescribed" else task.base_acceleration
     hull_acceleration = _largest(hull, task.duration)
     if task.mode in ("torque", "spring"):
+        start = abs(task.start_angle)
         pulled = task.mode == "spring" and task.spring_stiffness > 0
-        reach = _largest(task.command, task.duration) if pulled else 0.0
-        return Extremes(max(abs(task.start_angle), reach), 0.0, 0.0, hull_acceleration)
+        reach = _largest(task.command, task.duration) if pulled else start
+        return Extremes(max(start, reach), 0.0, 0.0, hull_acceleration)
     time = _grid(task)
     rate, angle = _load_motion(task.command, time)
     hull_rate, hull_angle = _hull_motion(hull, time)
@@ -147,13 +147,12 @@ def worst_friction(bench: Bench, rate: float) -> float:
     from campaign.physics.friction import friction_models
     from campaign.physics.variation import of_its_day
 
-    if rate == 0:
-        return 0.0
+    shares = np.geomspace(1e-12, 1.0, SPEEDS)
     total = 0.0
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
         speed = rate * (bench.gear.ratio if friction.velocity == "motor" else 1.0)
-        speeds = _SPEEDS * speed
+        speeds = np.concatenate([-shares, shares]) * speed
         viscous = model.viscous(friction)
         dry = float(np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds)))
         torque = dry * (1.0 + friction.ripple.amplitude) + viscous * speed
@@ -168,30 +167,32 @@ def _grid(task: Task) -> Array:
     times = [np.array([0.0, duration])]
     mixed = not any(isinstance(signal, Zero) for signal in signals)
     for signal in signals:
-        if isinstance(signal, Sine):
-            times.append(_sine_times(signal, duration, POINTS_PER_CYCLE if mixed else 4))
-        elif isinstance(signal, MultiSine):
-            times.append(_dense_times(signal, duration))
-        elif isinstance(signal, Polyline):
-            knots = np.asarray(signal.times)
-            times += [knots, _zero_crossings(signal), np.linspace(0.0, duration, 1001)]
-    joined = np.unique(np.concatenate(times))
-    return joined[(joined >= 0) & (joined <= duration)]
+        match signal:
+            case Sine(frequency=frequency):
+                times.append(_dense_times(frequency, duration) if mixed else _quarters(signal))
+            case MultiSine(frequencies=frequencies):
+                times.append(_dense_times(max(frequencies), duration))
+            case Polyline():
+                even = np.linspace(0.0, duration, POINTS_OF_A_LINE)
+                times += [np.asarray(signal.times), _zero_crossings(signal), even]
+    return _within(np.concatenate(times), duration)
 
 
-def _sine_times(sine: Sine, duration: float, per_cycle: int) -> Array:
-    """Times of equal phase, the quarters of the cycle among them."""
-    cycles = min(duration * sine.frequency + 1, 2 if per_cycle == 4 else MOST_CYCLES)
-    steps = np.arange(math.ceil(cycles * per_cycle) + 1)
-    # Times at which 2 pi f t + phase is a multiple of a quarter turn.
-    shift = (-sine.phase / (2 * math.pi)) % (1 / per_cycle)
-    return np.asarray((steps / per_cycle + shift) / sine.frequency)
+def _within(time: Array, duration: float) -> Array:
+    """Those of [0, duration], once each and increasing."""
+    return np.unique(time[(time >= 0) & (time <= duration)])
 
 
-def _dense_times(sines: MultiSine, duration: float) -> Array:
+def _quarters(sine: Sine) -> Array:
+    """The first times at which sine and cosine, and so every integral, are extreme or zero."""
+    shift = (-sine.phase / (2 * math.pi)) % (1 / 4)
+    return np.asarray((np.arange(4) / 4 + shift) / sine.frequency)
+
+
+def _dense_times(frequency: float, duration: float) -> Array:
     """Even times over the whole of an irregular motion: its largest swing may come anywhere."""
-    cycles = min(duration * max(sines.frequencies), MOST_CYCLES)
-    return np.linspace(0.0, duration, math.ceil(cycles * POINTS_PER_CYCLE) + 2)
+    step = max(1 / (POINTS_PER_CYCLE * frequency), duration / MOST_POINTS)
+    return np.append(np.arange(0.0, duration, step), duration)
 
 
 def _zero_crossings(polyline: Polyline) -> Array:
@@ -251,21 +252,22 @@ def _integrated(polyline: Polyline, time: Array) -> tuple[Array, Array]:
 
 def _after(polyline: Polyline, time: Array) -> Array:
     """Limits from the right: at a jump, the value after it."""
-    return _at(polyline, time, np.searchsorted(polyline.times, time, side="right"))
+    return _at(polyline, time, "right")
 
 
 def _before(polyline: Polyline, time: Array) -> Array:
     """Limits from the left: at a jump, the value before it."""
-    return _at(polyline, time, np.searchsorted(polyline.times, time, side="left"))
+    return _at(polyline, time, "left")
 
 
-def _at(polyline: Polyline, time: Array, right: NDArray[np.intp]) -> Array:
-    """Values on the segment that ends at knot `right`; held beyond the ends."""
+def _at(polyline: Polyline, time: Array, side: Literal["left", "right"]) -> Array:
+    """Limits from one side; held beyond the ends."""
     knots, values = np.asarray(polyline.times), np.asarray(polyline.values)
-    high = np.clip(right, 0, len(knots) - 1)
-    low = np.clip(right - 1, 0, len(knots) - 1)
-    span = knots[high] - knots[low]
-    share = np.where(span > 0, (time - knots[low]) / np.where(span > 0, span, 1.0), 0.0)
+    next_knot = np.searchsorted(knots, time, side=side)
+    high = np.minimum(next_knot, len(knots) - 1)
+    low = np.maximum(next_knot - 1, 0)
+    span = knots[high] - knots[low]  # 0 beyond the ends only, where both have one value
+    share = (time - knots[low]) / np.where(span > 0, span, 1.0)
     return np.asarray(values[low] + share * (values[high] - values[low]))
 
 
@@ -273,16 +275,14 @@ def _largest(signal: Signal, duration: float) -> float:
     """Largest magnitude of a signal over [0, duration]."""
     match signal:
         case Sine():
-            time = np.append(_sine_times(signal, duration, 4), [0.0, duration])
-            time = time[(time >= 0) & (time <= duration)]
+            time = _within(np.append(_quarters(signal), [0.0, duration]), duration)
             return float(np.max(np.abs(signal.sample(time))))
         case MultiSine():
-            return float(np.max(np.abs(signal.sample(_dense_times(signal, duration)))))
+            time = _dense_times(max(signal.frequencies), duration)
+            return float(np.max(np.abs(signal.sample(time))))
         case Polyline():
-            knots = np.asarray(signal.times)
-            ends = np.array([0.0, duration])
-            inside = np.asarray(signal.values)[(knots >= 0) & (knots <= duration)]
-            values = np.concatenate([_after(signal, ends[:1]), _before(signal, ends[1:]), inside])
+            time = _within(np.append(signal.times, [0.0, duration]), duration)
+            values = np.concatenate([_after(signal, time), _before(signal, time[1:])])
             return float(np.max(np.abs(values)))
     return 0.0
 
@@ -293,16 +293,12 @@ def _steepest(command: Signal, duration: float) -> float:
         case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
             if abs(amplitude * math.sin(phase)) > TINY_RATE:
                 return math.inf
-            slope = Sine(
-                amplitude=amplitude * 2 * math.pi * frequency,
-                frequency=frequency,
-                phase=phase + math.pi / 2,
-            )
-            return _largest(slope, duration)
+            return 2 * math.pi * frequency * abs(amplitude)  # at once, where it begins at zero
         case MultiSine():
-            if abs(float(command.sample(np.zeros(1))[0])) > TINY_RATE:
+            if abs(command.sample(np.zeros(1)).item()) > TINY_RATE:
                 return math.inf
-            return float(np.max(np.abs(command.integral(_dense_times(command, duration), -1))))
+            time = _dense_times(max(command.frequencies), duration)
+            return float(np.max(np.abs(command.integral(time, -1))))
         case Polyline():
             return _steepest_line(command, duration)
     return 0.0
@@ -310,7 +306,7 @@ def _steepest(command: Signal, duration: float) -> float:
 
 def _steepest_line(command: Polyline, duration: float) -> float:
     knots, values = np.asarray(command.times), np.asarray(command.values)
-    if abs(float(_after(command, np.zeros(1))[0])) > TINY_RATE:
+    if abs(_after(command, np.zeros(1)).item()) > TINY_RATE:
         return math.inf
     step, change = np.diff(knots), np.abs(np.diff(values))
     inside = (knots[1:] > 0) & (knots[:-1] < duration)

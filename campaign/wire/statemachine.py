@@ -104,7 +104,7 @@ class Numbering:
 
     def __init__(self) -> None:
         self._hello: tuple[int, int] | None = None
-        self._last: tuple[int, int | None] = (0, None)
+        self._last: tuple[int, int | None] | None = None
 
     def same_session(self, session: int) -> bool:
         """Whether HELLO renews the session there is."""
@@ -120,7 +120,7 @@ class Numbering:
         """Judge a command, and remember it when it is new and neither HELLO nor SAFE."""
         if kind in (Kind.HELLO, Kind.SAFE):
             return Turn.NEW
-        if self._hello is None:
+        if self._last is None:  # nobody said HELLO
             return Turn.OUT_OF_ORDER
         this = (sequence, zlib.crc32(bytes((kind,)) + body))
         if this == self._last:

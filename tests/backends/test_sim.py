@@ -148,6 +148,15 @@ def test_the_stop_rate_completes_a_trial_early() -> None:
     assert recording.events[0].time == pytest.approx(beyond * 1e-3)
 
 
+def test_the_stop_rate_is_relative_to_the_hull() -> None:
+    """The hull speeds up by 0.1 rad/s^2 under a load that stands still in space."""
+    push_off = Polyline(times=(0.0,), values=(0.1,))
+    ending, recording = execute(bench(), task(base_acceleration=push_off, stop_rate=0.05))
+    assert ending == Ending(Outcome.COMPLETED)
+    assert recording.time[-1] == pytest.approx(0.5, abs=0.02)
+    assert np.max(np.abs(recording["gyro_rate"])) < 0.01
+
+
 def test_a_limit_after_the_stop_rate_does_not_count() -> None:
     stops = PUSH.model_copy(update={"stop_rate": 0.02})
     ending, _ = execute(limited(rate="10 deg/s"), stops)

@@ -15,7 +15,9 @@ from campaign.trial import (
     Ending,
     MemoryRecorder,
     Outcome,
+    PanicStop,
     Recorder,
+    Recording,
     SafeState,
     Task,
     Trial,
@@ -66,6 +68,31 @@ class FakeBackend:
         return self.rest()
 
 
+@dataclass
+class SwitchedBench(FakeBackend):
+    """A bench that others can switch off, as `stop` says; it may not be asked while it moves."""
+
+    stop: PanicStop | None = None
+    asked: int = 0
+    moving: set[int] = field(default_factory=set)
+
+    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        self.moving.add(trial.number)
+        try:
+            return super().execute(trial, recorder, stopped)
+        finally:
+            self.moving.remove(trial.number)
+
+    def introduce(self, run: str) -> None: ...
+
+    def panic_stop(self) -> PanicStop | None:
+        assert not self.moving
+        self.asked += 1
+        return self.stop
+
+    def clear_stop(self, count: int) -> None: ...
+
+
 class MemoryTrial(MemoryRecorder):
     def __init__(self, archive: MemoryArchive, trial: Trial) -> None:
         super().__init__()
@@ -76,6 +103,7 @@ class MemoryTrial(MemoryRecorder):
         with self.archive.lock:
             self.archive.endings[self.trial.number] = ending
             self.archive.attempts.append((self.trial.number, ending.outcome))
+            self.archive.recordings[self.trial.number] = self.recording(ending)
             self.archive.samples[self.trial.number] = len(self.recording(ending).time)
 
 
@@ -83,6 +111,7 @@ class MemoryTrial(MemoryRecorder):
 class MemoryArchive:
     endings: dict[int, Ending] = field(default_factory=dict)
     samples: dict[int, int] = field(default_factory=dict)
+    recordings: dict[int, Recording] = field(default_factory=dict)
     decisions: list[tuple[str, int | None]] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
     steps: list[tuple[int, str, str]] = field(default_factory=list)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import pytest
@@ -14,8 +15,14 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Policy, Response, Rest
-from campaign.trial import Ending, Fault, Outcome, Trial
-from tests.execution.fakes import COMPLETED, FakeBackend, MemoryArchive, make_trials
+from campaign.trial import Ending, Fault, Outcome, PanicStop, SafeState, Trial
+from tests.execution.fakes import (
+    COMPLETED,
+    FakeBackend,
+    MemoryArchive,
+    SwitchedBench,
+    make_trials,
+)
 
 LOST = Ending(Outcome.FAULT, "no word for 3 s", fault=Fault.LOST_CONNECTION)
 LIMIT = Ending(Outcome.LIMIT, "too fast")
@@ -49,6 +56,10 @@ class Lab:
         )
 
     @property
+    def remarks(self) -> list[str]:
+        return [progress.remark for progress in self.progress if progress.remark]
+
+    @property
     def executed(self) -> list[str]:
         return [name for name in self.backend.log if name != "made safe"]
 
@@ -68,6 +79,7 @@ def test_a_trial_is_executed_again_after_a_pause_and_only_its_last_attempt_count
         (2, Outcome.COMPLETED),
     ]
     assert lab.pauses == [5.0, 5.0]
+    assert lab.remarks == ["trial-00001 is executed again in 5 s"] * 2
     assert lab.archive.decisions == [("retry", 1), ("retry", 1)]
     assert run.outcomes == {Outcome.COMPLETED: 2}
     assert (run.status, run.exit_code) == (RunStatus.COMPLETE, ExitCode.DONE)
@@ -103,6 +115,7 @@ def test_policies_work_for_parallel_trials():
     run = lab.run(workers=3)
     assert run.outcomes == {Outcome.COMPLETED: 8}
     assert sorted(lab.archive.decisions) == [("retry", n) for n in range(1, 9)]
+    assert sorted(lab.remarks) == [f"trial-0000{n} is executed again" for n in range(1, 9)]
 
 
 def test_the_bench_rests_between_trials_after_so_much_bench_time():
@@ -110,6 +123,122 @@ def test_the_bench_rests_between_trials_after_so_much_bench_time():
     lab.run()
     assert lab.pauses == [60.0, 60.0]
     assert lab.archive.decisions == [("rest", None), ("rest", None)]
+    assert lab.archive.reasons == ["60 s after 4 s of bench time"] * 2
+    assert lab.remarks == ["the bench rests for 60 s"] * 2
+
+
+def test_nothing_moves_while_the_bench_rests_or_hands_are_at_it():
+    """Trial 2 goes on until somebody rests or is asked beside it, or long enough."""
+    disturbed, moving = threading.Event(), threading.Event()
+
+    def second(stopped: Callable[[], bool]) -> Ending:
+        moving.set()
+        assert not disturbed.wait(0.3)
+        moving.clear()
+        return COMPLETED
+
+    def first(stopped: Callable[[], bool]) -> Ending:
+        assert moving.wait(60)
+        return COMPLETED
+
+    class Hands:
+        def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
+            disturbed.set()
+            assert not moving.is_set()
+            return "done"
+
+    for policy, setups in (
+        (Policy.model_validate({"rest": {"every": 1.0, "pause": 60.0}}, context={"si": True}), ()),
+        (Policy(), ("preload",)),
+    ):
+        disturbed.clear()
+        lab = Lab(set_up((), (), setups, setups), {1: first, 2: second})
+        run = run_plan(
+            lab.trials,
+            lab.backend,
+            lab.archive,
+            workers=2,
+            display=lab.progress.append,
+            stop=lab.stop,
+            policy=policy,
+            attendance=Attendance(Hands(), lambda seconds, stop: disturbed.set()),
+        )
+        assert disturbed.is_set()
+        assert run.outcomes == {Outcome.COMPLETED: 4}
+
+
+def test_a_run_that_was_stopped_neither_rests_nor_asks_anybody():
+    def stops(stopped: Callable[[], bool]) -> Ending:
+        lab.stop.request("Ctrl-C")
+        return COMPLETED
+
+    lab = Lab(set_up((), ("preload",)), {1: stops}, rest=Rest(every="1 s", pause="60 s"))
+    lab.run()
+    assert (lab.pauses, lab.archive.decisions, lab.archive.steps) == ([], [], [])
+    lab = Lab(set_up((), ("preload",)), {}, rest=Rest(every="1 s", pause="60 s"))
+    lab.pauses = _StoppedPause(lab.stop)  # in the rest itself
+    lab.run()
+    assert lab.archive.steps == []
+    assert lab.executed == ["trial-00001"]
+
+
+def test_a_rest_asks_for_nothing_that_has_been_done():
+    one = ("preload to 1 N m",)
+    lab = Lab(set_up(one, one, (), one), {}, rest=Rest(every="1 s", pause="60 s"))
+    lab.run()
+    assert lab.archive.steps == [(1, "preload to 1 N m", "simulated")]
+    assert lab.pauses == [60.0] * 3
+
+
+BY_EVE = PanicStop(3, "eve", 1.5)
+
+
+def switched(count: int, behaviour: dict, **policy: object) -> Lab:
+    lab = Lab(count, behaviour, **policy)
+    lab.backend = SwitchedBench(behaviour)
+    return lab
+
+
+def test_a_panic_stop_between_trials_ends_the_run_before_anything_moves_again(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr("campaign.execution.outside.INTERVAL", 0.0)  # these trials take no time
+
+    def switched_off(stopped: Callable[[], bool]) -> Ending:
+        lab.backend.stop = BY_EVE
+        return COMPLETED
+
+    lab = switched(3, {1: switched_off})
+    run = lab.run()
+    assert lab.executed == ["trial-00001"]
+    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "panic stop by eve")
+    assert lab.archive.decisions == [("panic stop", None)]
+    assert lab.archive.reasons == ["by eve, stop number 3"]
+    assert lab.remarks == ["PANIC STOP by eve: the bench stays off until that is cleared"]
+
+
+def test_a_panic_stop_in_a_trial_is_in_the_journal_before_the_bench_is_made_safe():
+    def switched_off(stopped: Callable[[], bool]) -> Ending:
+        lab.backend.stop = BY_EVE
+        return Ending(Outcome.INTERRUPTED, "switched off by SAFE")
+
+    def made_safe() -> SafeState:
+        assert lab.archive.decisions == [("panic stop", None)]
+        return SafeState.CONFIRMED
+
+    lab = switched(3, {1: switched_off})
+    lab.backend.rest = made_safe
+    run = lab.run()
+    assert (run.exit_code, run.reason) == (ExitCode.INTERRUPTED, "panic stop by eve")
+
+
+def test_a_bench_is_asked_about_stops_only_while_nothing_moves_also_in_parallel():
+    moment = threading.Event()
+    behaviour = {n: lambda stopped: moment.wait(0.02) or COMPLETED for n in range(1, 7)}
+    lab = switched(6, behaviour)
+    run = lab.run(workers=2)
+    assert run.outcomes == {Outcome.COMPLETED: 6}
+    assert lab.backend.asked >= 1
 
 
 def test_nothing_rests_for_a_trial_that_does_not_come():

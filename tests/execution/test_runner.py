@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from campaign.archive.header import RunStatus
@@ -14,8 +16,8 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.safety import AbortedError, NotSafeError
 from campaign.execution.stop import StopSwitch
-from campaign.trial import Ending, Outcome, SafeState, Trial
-from tests.execution.fakes import COMPLETED, FakeBackend, MemoryArchive, make_trials
+from campaign.trial import Ending, Fault, Outcome, SafeState, Trial
+from tests.execution.fakes import COMPLETED, RATE, FakeBackend, MemoryArchive, make_trials
 
 
 class Bench:
@@ -87,6 +89,9 @@ def test_nothing_moves_after_an_unsafe_trial_until_the_bench_was_seen_at_rest():
         *("trial-00001", "trial-00002", "made safe", "trial-00003", "made safe")
     ]
     assert bench.archive.decisions == [("make safe", 2), ("skip", 2)]
+    assert "trial-00002: the safe state was not confirmed; now confirmed" in [
+        progress.remark for progress in bench.progress
+    ]
     assert run.status is RunStatus.FAILED_TRIALS
 
 
@@ -177,11 +182,54 @@ def test_a_stop_after_the_last_trial_changes_nothing():
     assert bench.run().exit_code is ExitCode.DONE
 
 
-def test_a_trial_interrupted_at_the_bench_interrupts_the_run():
-    bench = Bench(3, FakeBackend({1: ends(Outcome.INTERRUPTED, "emergency stop")}))
+@pytest.mark.parametrize(("said", "who"), [("emergency stop", "emergency stop"), ("", "the bench")])
+def test_a_trial_interrupted_at_the_bench_interrupts_the_run(said: str, who: str):
+    bench = Bench(3, FakeBackend({1: ends(Outcome.INTERRUPTED, said)}))
     run = bench.run()
     assert set(bench.archive.endings) == {1}
-    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "stopped by emergency stop")
+    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, f"stopped by {who}")
+
+
+def test_who_stopped_a_run_comes_before_what_then_failed():
+    bench = Bench(3, FakeBackend())
+
+    def stop_and_fail(stopped: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        raise BackendError("the port closed")
+
+    bench.backend.behaviour[2] = stop_and_fail
+    run = bench.run()
+    assert (run.status, run.exit_code) == (RunStatus.INTERRUPTED, ExitCode.INTERRUPTED)
+    assert run.reason == "stopped by Ctrl-C; the port closed"
+
+
+def test_a_run_that_ends_anyway_makes_the_bench_safe_once():
+    bench = Bench(3, FakeBackend())
+
+    def stop_unseen(stopped: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        return Ending(Outcome.FAULT, "no answer", SafeState.NOT_CONFIRMED)
+
+    bench.backend.behaviour[1] = stop_unseen
+    bench.run()
+    assert bench.backend.log == ["trial-00001", "made safe"]
+
+
+def test_samples_that_were_lost_are_no_numbers():
+    class Leaky(FakeBackend):
+        def execute(self, trial, recorder, stopped):
+            recorder.start((RATE,))
+            recorder.append(np.array([0.0, 0.1]), np.array([[1.0, 2.0]]))
+            recorder.lost(np.array([0.2, 0.3]))
+            recorder.append(np.array([0.4]), np.array([[5.0]]))
+            return Ending(Outcome.FAULT, "samples were lost", fault=Fault.LOST_SAMPLES)
+
+    bench = Bench(1, Leaky())
+    bench.run()
+    recording = bench.archive.recordings[1]
+    np.testing.assert_array_equal(recording["gyro_rate"], [1.0, 2.0, np.nan, np.nan, 5.0])
+    (event,) = recording.events
+    assert (event.time, event.text) == (0.2, "samples 2 to 3 were lost and are NaN")
 
 
 def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
@@ -283,16 +331,90 @@ def test_an_unsafe_bench_comes_before_a_stop_by_force():
 
 
 def test_parallel_trials_run_at_the_same_time_and_all_are_archived():
-    together = threading.Barrier(2, timeout=10)
+    together = threading.Barrier(40, timeout=60)
 
     def meet(stopped: Callable[[], bool]) -> Ending:
         together.wait()  # breaks, and so fails the trial, when nobody else comes
         return COMPLETED
 
-    bench = Bench(4, FakeBackend(dict.fromkeys(range(1, 5), meet)))
-    run = bench.run(workers=2)
-    assert run.outcomes == {Outcome.COMPLETED: 4}
-    assert set(bench.archive.endings) == {1, 2, 3, 4}
+    before = set(threading.enumerate())
+    bench = Bench(80, FakeBackend(dict.fromkeys(range(1, 81), meet)))
+    run = bench.run(workers=40)
+    assert not set(threading.enumerate()) - before
+    assert run.outcomes == {Outcome.COMPLETED: 80}
+    assert set(bench.archive.endings) == set(range(1, 81))
+
+
+def test_a_second_stop_waits_for_no_trial_that_does_not_end():
+    let_go, hanging = threading.Event(), threading.Event()
+
+    def hang(stopped: Callable[[], bool]) -> Ending:
+        hanging.set()
+        assert let_go.wait(60)
+        return COMPLETED
+
+    def end(stopped: Callable[[], bool]) -> Ending:
+        assert hanging.wait(60)
+        return COMPLETED
+
+    def insist(progress: Progress) -> None:
+        if progress.ended:
+            raise KeyboardInterrupt
+
+    before = set(threading.enumerate())
+    bench = Bench(2, FakeBackend({1: hang, 2: end}))
+    bench.display = insist
+    try:
+        with pytest.raises(AbortedError):
+            bench.run(workers=2)
+        assert 1 not in bench.archive.endings
+    finally:
+        let_go.set()
+        for thread in set(threading.enumerate()) - before:
+            thread.join(60)
+
+
+def until_stopped(then: Callable[[], Ending]) -> Callable[[Callable[[], bool]], Ending]:
+    def behave(stopped: Callable[[], bool]) -> Ending:
+        while not stopped():
+            time.sleep(0.001)
+        return then()
+
+    return behave
+
+
+def test_when_the_archive_fails_the_other_trials_end_before_the_bench_is_made_safe():
+    bench = Bench(2, FakeBackend())
+    begin = bench.archive.begin
+
+    def last() -> Ending:
+        time.sleep(0.1)
+        bench.backend.log.append("ended")
+        return COMPLETED
+
+    def full(trial: Trial) -> object:
+        if trial.number == 2:
+            raise ArchiveError("no space left")
+        return begin(trial)
+
+    bench.backend.behaviour[1] = until_stopped(last)
+    bench.archive.begin = full  # type: ignore[assignment]
+    before = set(threading.enumerate())
+    with pytest.raises(ArchiveError, match="no space left"):
+        bench.run(workers=2)
+    assert not set(threading.enumerate()) - before
+    assert bench.backend.log == ["trial-00001", "ended", "made safe"]
+
+
+def test_of_several_faults_the_first_is_the_reason():
+    def second() -> Ending:
+        raise ValueError("two")
+
+    bench = Bench(2, FakeBackend({1: raises(KeyError("one")), 2: until_stopped(second)}))
+    with pytest.raises(KeyError, match="one"):
+        bench.run(workers=2)
+    assert "KeyError: 'one'" in bench.archive.sealed[1]
+    assert "two" not in bench.archive.sealed[1]
 
 
 def test_a_fault_lets_parallel_trials_end_without_calling_it_an_interruption():

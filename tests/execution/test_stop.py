@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 
 import pytest
 
+from campaign.execution.safety import NOT_SAFE
 from campaign.execution.stop import StopSwitch
 
 hangs_up = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no SIGHUP here")
+on_posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX, and a guardian")
 STOPPING = [signal.SIGINT, signal.SIGTERM]
 
 
@@ -24,6 +31,16 @@ def test_the_first_signal_only_asks(number: signal.Signals, who: str):
         signal.raise_signal(number)
         assert stop()
         assert stop.reason == who
+
+
+def test_before_anybody_asks_nobody_has_and_the_first_who_does_is_named():
+    stop = StopSwitch()
+    assert stop() is False
+    assert stop.reason == ""
+    stop.request("the operator")
+    stop.request("Ctrl-C")
+    assert stop() is True
+    assert stop.reason == "the operator"
 
 
 @pytest.fixture
@@ -66,6 +83,28 @@ def test_a_terminal_that_closes_asks_and_never_insists(
         assert left.wait(60)
 
 
+def test_one_signal_is_one_although_two_listen(left: threading.Event):
+    with StopSwitch().on_signals() as stop:
+        signal.raise_signal(signal.SIGINT)
+    assert stop()
+    assert not left.is_set()  # whatever was heard has been counted when the block is left
+
+
+@on_posix
+def test_the_signals_of_others_ask_nothing(left: threading.Event):
+    heard = []
+    before = signal.signal(signal.SIGUSR1, lambda number, frame: heard.append(number))
+    try:
+        with StopSwitch().on_signals() as stop:
+            signal.raise_signal(signal.SIGUSR1)
+            signal.raise_signal(signal.SIGUSR1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert heard == [signal.SIGUSR1, signal.SIGUSR1]
+    assert not stop()
+    assert not left.is_set()
+
+
 @contextmanager
 def heeding_hang_ups() -> Iterator[None]:
     """As without nohup, under which these tests must pass as well."""
@@ -96,3 +135,250 @@ def test_a_stop_is_taken_although_nobody_can_read_the_notice(monkeypatch: pytest
     with StopSwitch().on_signals() as stop:
         signal.raise_signal(signal.SIGTERM)
         assert stop.reason == "SIGTERM"
+
+
+def test_where_there_are_no_hang_ups_the_others_are_heard(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delattr(signal, "SIGHUP", raising=False)
+    with StopSwitch().on_signals() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        assert stop.reason == "SIGTERM"
+
+
+def test_a_handler_that_python_does_not_know_is_left_alone(monkeypatch: pytest.MonkeyPatch):
+    """There is no way to put it back, and no reason to fail."""
+    before = signal.getsignal(signal.SIGTERM)
+    known = signal.signal
+
+    def unknown(number: int, handler: object) -> object:
+        was = known(number, handler)
+        return None if number == signal.SIGTERM else was
+
+    monkeypatch.setattr(signal, "signal", unknown)
+    try:
+        with StopSwitch().on_signals() as stop:
+            pass
+        signal.raise_signal(signal.SIGTERM)
+        assert stop()
+    finally:
+        known(signal.SIGTERM, before)
+
+
+def test_it_is_said_once_that_the_run_is_being_stopped(left: threading.Event, capfd):
+    with StopSwitch().on_signals():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+    assert capfd.readouterr().err.count("stopping: ") == 1
+
+
+@pytest.fixture
+def guardian(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+    """Every process that is started."""
+    started, known = [], subprocess.Popen
+
+    def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
+        started.append(known(*arguments, **options))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    return started
+
+
+def open_files() -> set[Path]:
+    return {file for file in Path("/dev/fd").iterdir() if file.exists()}  # not its own
+
+
+@on_posix
+def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
+    come, back = os.pipe()
+    os.set_blocking(back, False)
+    outer = signal.set_wakeup_fd(back)
+    try:
+        threads, files = set(threading.enumerate()), open_files()
+        with StopSwitch().on_signals():
+            assert all(thread.daemon for thread in set(threading.enumerate()) - threads)
+            (process,) = guardian
+            assert process.poll() is None
+        assert not set(threading.enumerate()) - threads
+        assert open_files() == files
+        assert process.returncode == 0
+        assert signal.set_wakeup_fd(-1) == back
+    finally:
+        signal.set_wakeup_fd(outer)
+        os.close(come)
+        os.close(back)
+
+
+@on_posix
+def test_a_note_that_comes_late_is_written_into_nobodys_file():
+    with StopSwitch().on_signals() as stop:
+        pass
+    pipes = [os.pipe() for _ in range(8)]  # they get the numbers that have become free
+    stop.kept(lambda: "late", moves=False)
+    for come, back in pipes:
+        os.close(back)
+        assert os.read(come, 100) == b""
+        os.close(come)
+
+
+@on_posix
+def test_a_guardian_that_does_nothing_holds_nothing_up(
+    left: threading.Event, guardian: list[subprocess.Popen[bytes]], capfd
+):
+    with StopSwitch().on_signals() as stop:
+        (process,) = guardian
+        # The terminal's Ctrl-C reaches the program only.
+        assert os.getsid(process.pid) != os.getsid(0)
+        process.send_signal(signal.SIGSTOP)
+        try:
+            for text in ("x" * 5000, ""):  # more than a pipe can hold, to the last byte
+                for _ in range(1000):
+                    stop.kept(partial(str, text), moves=False)
+            signal.raise_signal(signal.SIGINT)
+            assert not left.is_set()
+            signal.raise_signal(signal.SIGINT)
+            assert left.wait(60)
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            process.send_signal(signal.SIGCONT)
+    assert "ignored" not in capfd.readouterr().err  # what Python says of a wakeup pipe that is full
+
+
+@on_posix
+def test_a_note_is_never_longer_than_a_pipe_takes_whole(tmp_path: Path):
+    code, said = insisted(tmp_path, "asked(); kept('x' * 100_000); hang(ctypes.PyDLL)")
+    assert code == -signal.SIGKILL
+    assert 1000 < said.count("x") <= 4096 - 3
+
+
+PROGRAM = """
+import ctypes, pathlib, signal, sys, time
+from campaign.errors import ExitCode
+from campaign.execution.stop import StopSwitch
+
+def hang(library):
+    "In a call that no signal breaks off: the shell says when it has begun."
+    library(None).system(b"echo ready; read line")
+
+def made_safe(code=ExitCode.INTERRUPTED, seconds=0.0):
+    time.sleep(seconds)
+    pathlib.Path("safe").touch()
+    return code
+
+def kept(text):
+    stop.kept(lambda: text, moves=False)
+
+def asked():
+    signal.raise_signal(signal.SIGTERM)
+
+with StopSwitch().on_signals() as stop:
+    {does}
+"""
+
+
+def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[int, str]:
+    """The exit code of a program that was asked twice, the second time while it hangs, and what it
+    said."""
+    come, back = os.pipe()
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM.format(does=does)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        stdin=come,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        text=True,
+    )
+    os.close(come)
+    with process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            if "asked()" not in does:
+                process.send_signal(signal.SIGTERM)
+                assert process.stderr.readline() == "\n"
+                assert process.stderr.readline().startswith("stopping: ")
+            process.send_signal(signal.SIGTERM)
+            code = process.wait(60)
+        finally:
+            process.kill()
+            os.close(back)  # ends what it hangs in
+        return code, process.stderr.read() if process.stderr else ""
+
+
+@on_posix
+def test_who_insists_before_anything_was_begun_leaves_at_once(tmp_path: Path):
+    code, said = insisted(tmp_path, "asked(); hang(ctypes.CDLL)")
+    assert code == 130
+    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+
+
+@on_posix
+def test_a_program_that_hangs_already_is_heard_to_be_stopped_as_well(tmp_path: Path):
+    code, said = insisted(tmp_path, "hang(ctypes.CDLL)")
+    assert code == 130
+    assert said == "\nstopped at once; nothing was begun\n"
+
+
+@on_posix
+def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
+    does = "asked(); stop.make_safe = lambda: made_safe(seconds=2.0); kept('kept')"
+    code, said = insisted(tmp_path, f"{does}; hang(ctypes.CDLL)")
+    assert (tmp_path / "safe").exists()
+    assert code == 130
+    assert said.endswith("unclosed\n\nkept\n")
+
+
+@on_posix
+def test_a_program_without_standard_error_of_its_own_is_left_as_well(tmp_path: Path):
+    code, said = insisted(
+        tmp_path, "asked(); sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)"
+    )
+    assert code == 130
+    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+
+
+@on_posix
+def test_a_bench_that_was_not_seen_safe_has_its_own_code_and_line(tmp_path: Path):
+    does = "asked(); stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); hang(ctypes.CDLL)"
+    code, said = insisted(tmp_path, does)
+    assert code == 5
+    assert f"\n{NOT_SAFE}\nstopped at once" in said
+
+
+@on_posix
+def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
+    ours, theirs = os.openpty()
+    try:
+        code, _ = insisted(tmp_path, "asked(); hang(ctypes.CDLL)", stderr=theirs)
+        said = os.read(ours, 4096).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert code == 130
+    assert "\x1b[?25h\r\nstopped at once" in said
+
+
+@on_posix
+def test_a_bench_that_the_guardian_has_not_seen_safe_is_said_to_be_so(tmp_path: Path):
+    code, said = insisted(
+        tmp_path, "asked(); stop.kept(lambda: 'kept', moves=True); hang(ctypes.PyDLL)"
+    )
+    assert code == -signal.SIGKILL
+    assert said.endswith("look at the bench before anything else\nkept\n")
+
+
+@on_posix
+def test_who_insists_is_told_that_a_bench_which_moves_is_safe(tmp_path: Path):
+    code, said = insisted(
+        tmp_path, "asked(); stop.kept(lambda: 'kept', moves=True); hang(ctypes.CDLL)"
+    )
+    assert code == 130
+    assert said.endswith("safe state confirmed: the bench is at rest with its drive off\nkept\n")
+
+
+@on_posix
+def test_a_program_that_lets_no_thread_run_is_ended_with_its_last_note(tmp_path: Path):
+    code, said = insisted(tmp_path, "asked(); kept('one'); kept('zwö'); hang(ctypes.PyDLL)")
+    assert code == -signal.SIGKILL
+    assert said.endswith("\nzwö\n")
+    assert "one" not in said

@@ -78,7 +78,8 @@ def test_every_safe_but_the_holders_latches() -> None:
 
 def test_numbers_follow_each_other_over_the_wrap() -> None:
     numbering = Numbering()
-    assert numbering.turn(Kind.SET, 0, b"a") is Turn.OUT_OF_ORDER  # nobody said HELLO
+    for number in (0, 1):
+        assert numbering.turn(Kind.SET, number, b"a") is Turn.OUT_OF_ORDER  # nobody said HELLO
     assert numbering.turn(Kind.SAFE, 9, b"") is Turn.NEW
     numbering.begin(session=1, sequence=65534)
     assert numbering.turn(Kind.SET, 65535, b"a") is Turn.NEW
@@ -92,6 +93,24 @@ def test_numbers_follow_each_other_over_the_wrap() -> None:
     assert numbering.turn(Kind.ARM, 0, b"crc.") is Turn.REPEATED
     numbering.begin(session=1, sequence=7)
     assert numbering.turn(Kind.START, 8, b"") is Turn.NEW
+
+
+def test_the_same_number_and_body_of_another_kind_is_no_repetition() -> None:
+    numbering = Numbering()
+    numbering.begin(session=1, sequence=1)
+    assert numbering.turn(Kind.START, 2, b"") is Turn.NEW
+    assert numbering.turn(Kind.STOP, 2, b"") is Turn.OUT_OF_ORDER
+    assert numbering.turn(Kind.START, 2, b"") is Turn.REPEATED
+
+
+def test_a_session_is_the_same_until_another_begins() -> None:
+    numbering = Numbering()
+    assert numbering.same_session(7) is False
+    numbering.begin(session=7, sequence=9)
+    assert numbering.same_session(7) is True
+    assert numbering.same_session(9) is False
+    numbering.begin(session=8, sequence=9)
+    assert numbering.same_session(7) is False
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.booleans()), max_size=30))

@@ -1,0 +1,173 @@
+"""Put one small bug after another into the files of attacked.toml: do their tests notice?
+
+Each worker has a copy of the project of its own, so that nobody's files are touched and child
+processes are attacked as well. Exit code 1 when more than 5 % survive of those that are not named
+in equivalents.toml, or when that names what there is not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tomllib
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from tests.mutants.mutations import Mutant, mutants
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+MAY_SURVIVE = 0.05
+SAID = "said-by-pytest.txt"
+MEMORY = 6 * 2**30
+"""bytes; a bug may ask for any amount."""
+LEFT_OUT = (".*", "results", "build", "dist", "__pycache__", "*.egg-info")
+PYTEST = ("-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0", "--tb=no")
+
+
+@dataclass
+class Copy:
+    """A copy of the project in which one test run at a time goes on."""
+
+    root: Path
+    patience: dict[tuple[str, ...], float] = field(default_factory=dict)
+
+    def tests_pass(self, tests: tuple[str, ...], patience: float | None) -> bool:
+        """Whether they all do, in time. Whatever they have started is gone afterwards."""
+        new = {"PYTHONPATH": str(self.root)}
+        if patience is not None:
+            new["PYTHONDONTWRITEBYTECODE"] = "1"  # a mutant's would be taken for the next one's
+        run = subprocess.Popen(
+            [sys.executable, "-m", "pytest", *PYTEST, *tests],
+            cwd=self.root,
+            env=os.environ | new,
+            stdin=subprocess.DEVNULL,
+            stdout=(self.root / SAID).open("wb"),
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            return run.wait(patience) == 0
+        except subprocess.TimeoutExpired:
+            return False
+        finally:
+            self._end_all()
+            run.wait()
+
+    def _end_all(self) -> None:
+        """End every process that works in this copy, also one with a session of its own."""
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                if (process / "cwd").readlink().is_relative_to(self.root):
+                    os.kill(int(process.name), signal.SIGKILL)
+
+    def baseline(self, tests: tuple[str, ...]) -> None:
+        """The tests pass without a bug; how long they took says how long to wait for a mutant."""
+        self.tests_pass(tests, None)  # compiles what is compiled only once
+        begun = time.monotonic()
+        if not self.tests_pass(tests, None):
+            said = (self.root / SAID).read_text(encoding="utf-8", errors="replace")
+            raise SystemExit(f"without any bug these fail: {' '.join(tests)}\n{said}")
+        self.patience[tests] = 10.0 + 5.0 * (time.monotonic() - begun)
+
+    def survives(self, mutant: Mutant, tests: tuple[str, ...]) -> bool:
+        """Whether the tests pass with this bug in place."""
+        file = self.root / mutant.file
+        for stale in (file.parent / "__pycache__").glob(f"{file.stem}.*"):
+            stale.unlink()
+        before = file.read_bytes()
+        file.write_text(mutant.source, encoding="utf-8")
+        try:
+            return self.tests_pass(tests, self.patience[tests])
+        finally:
+            file.write_bytes(before)
+
+
+def main() -> int:
+    """Attack, and say what survived."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="*", help="only these of attacked.toml")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    arguments = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    table = tomllib.loads((HERE / "attacked.toml").read_text(encoding="utf-8"))
+    attacked = {file: tuple(table[file]) for file in arguments.files or table}
+    listed = {
+        (one["file"], one["function"], one["was"], one["now"])
+        for one in tomllib.loads((HERE / "equivalents.toml").read_text(encoding="utf-8"))["mutant"]
+        if one["file"] in attacked
+    }
+    every = [m for f in attacked for m in mutants(f, (ROOT / f).read_text(encoding="utf-8"))]
+    todo = [mutant for mutant in every if mutant.key not in listed]
+    survivors = _attack(todo, attacked, arguments.workers)
+    _tell(every, survivors, listed)
+    gone = listed - {mutant.key for mutant in every}
+    for key in sorted(gone):
+        print("equivalents.toml names what there is not:", *key, sep="\n    ")
+    share = len(survivors) / max(1, len(todo))
+    print(f"{len(survivors)} of {len(todo)} survive ({share:.1%}); {MAY_SURVIVE:.0%} may")
+    return int(share > MAY_SURVIVE or bool(gone))
+
+
+def _attack(todo: list[Mutant], attacked: dict[str, tuple[str, ...]], workers: int) -> list[Mutant]:
+    waiting: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
+    survivors: list[Mutant] = []
+    failed: list[BaseException] = []
+    for mutant in todo:
+        waiting.put(mutant)
+
+    def work(copy: Copy) -> None:
+        try:
+            for tests in dict.fromkeys(attacked.values()):
+                copy.baseline(tests)
+            while not failed:
+                mutant = waiting.get_nowait()
+                if copy.survives(mutant, attacked[mutant.file]):
+                    survivors.append(mutant)
+                    place = f"{mutant.file}:{mutant.line} {mutant.function}"
+                    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}", flush=True)
+                if not waiting.qsize() % 100:
+                    print(f"{waiting.qsize()} to go, {len(survivors)} survivors", flush=True)
+        except queue.Empty:
+            pass
+        except BaseException as error:  # noqa: BLE001 - raised again below
+            failed.append(error)
+
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        threads = []
+        for number in range(workers):
+            root = Path(folder).resolve() / str(number)
+            shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
+            threads.append(threading.Thread(target=work, args=(Copy(root),)))
+            threads[-1].start()
+        for thread in threads:
+            thread.join()
+    if failed:
+        raise failed[0]
+    return survivors
+
+
+def _tell(every: list[Mutant], survivors: list[Mutant], listed: set[tuple[str, ...]]) -> None:
+    made, left = (Counter(mutant.file for mutant in some) for some in (every, survivors))
+    equal = Counter(mutant.file for mutant in every if mutant.key in listed)
+    print("\n| file | mutants | killed | equivalent | survivors |\n|---|--:|--:|--:|--:|")
+    for file, count in (*made.items(), ("all", made.total())):
+        same, alive = (c.total() if file == "all" else c[file] for c in (equal, left))
+        print(f"| {file} | {count} | {count - same - alive} | {same} | {alive} |")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
