@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -88,6 +89,22 @@ def test_one_signal_is_one_although_two_listen(left: threading.Event):
         signal.raise_signal(signal.SIGINT)
     assert stop()
     assert not left.is_set()  # whatever was heard has been counted when the block is left
+
+
+def test_who_insists_at_the_last_moment_is_heard_before_the_block_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    left = []
+
+    def leave(self: StopSwitch) -> None:
+        time.sleep(0.2)  # long enough for a block that does not wait
+        left.append(self.reason)
+
+    monkeypatch.setattr(StopSwitch, "_leave", leave)
+    with StopSwitch().on_signals():
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+    assert set(left) == {"SIGTERM"}
 
 
 @on_posix
