@@ -76,6 +76,13 @@ def test_a_trapezoid_of_rate(bench: Bench) -> None:
     assert found["torque"] == pytest.approx(35 * 0.5 + friction, rel=1e-6)
 
 
+def test_backwards_is_as_far_as_forwards() -> None:
+    times, rates = (0, 1, 2, 3, 4, 6), (0, 0, 0.5, 0.5, -0.2, -0.2)
+    forwards = motion(rate_task(Polyline(times=times, values=rates)))
+    backwards = motion(rate_task(Polyline(times=times, values=tuple(-r for r in rates))))
+    assert forwards == backwards
+
+
 def test_out_and_back_is_furthest_where_the_rate_crosses_zero(bench: Bench) -> None:
     command = Polyline(times=(0, 1, 3.7), values=(0, 0.1, -0.17))
     # Up to 0.1 in 1 s, down with slope 0.1: zero at 2 s, so 0.05 + 0.05 rad.
@@ -250,6 +257,8 @@ def test_a_spring_pulls_with_what_it_is_stretched_by(bench: Bench) -> None:
     assert found["torque"] == pytest.approx(20.0 * 1.3)
     assert found["current"] == 0.0
     assert found["angle"] == pytest.approx(0.8)
+    back = Polyline(times=(0, 10), values=(0.5, 0.2))
+    assert values(bench, spring(back, start=0.5))["torque"] == pytest.approx(20.0 * 0.3)
     wave = spring(Sine(amplitude=0.3, frequency=1.0), start=-0.5)
     assert values(bench, wave)["torque"] == pytest.approx(20.0 * 0.8)
     assert values(bench, wave)["angle"] == pytest.approx(0.5)
@@ -308,7 +317,7 @@ def test_slower_than_the_curve_falls_friction_has_not_come_up_yet(bench: Bench) 
     tree["friction"]["load"] |= {"static_torque": "20 N m", "viscous_friction": "0 N m s/rad"}
     load = Bench.model_validate(tree)
     slow = 0.1 * load.friction["load"].stribeck_velocity
-    assert 20.0 < worst_friction(load, slow) < 21.0
+    assert worst_friction(load, slow) == pytest.approx(26 - 6 * math.exp(-(0.1**2)), rel=1e-6)
 
 
 def drawn_signal(chance: np.random.Generator, *, from_zero: bool) -> Signal:
@@ -343,7 +352,7 @@ def integrals(signal: Signal, time: NDArray, *, hull: bool) -> tuple[NDArray, ND
 @pytest.mark.parametrize("seed", range(200))
 def test_any_motion_against_plain_integration(seed: int) -> None:
     chance = np.random.default_rng(seed)
-    command = drawn_signal(chance, from_zero=True)
+    command = drawn_signal(chance, from_zero=bool(seed % 2))
     base = drawn_signal(chance, from_zero=False)
     duration = float(np.exp(chance.uniform(np.log(0.1), np.log(12.0))))
     start = float(chance.normal())
@@ -362,5 +371,7 @@ def test_any_motion_against_plain_integration(seed: int) -> None:
     assert found.angle == largest(start + load_angle - hull_angle)
     assert found.rate == largest(command.sample(time) - hull_rate)
     assert found.hull_acceleration == largest(base.sample(time))
-    slopes = np.diff(command.sample(time)) / np.diff(time)
-    assert found.load_acceleration == pytest.approx(np.max(np.abs(slopes)), rel=3e-3, abs=1e-9)
+    slope = np.max(np.abs(np.diff(command.sample(time)) / np.diff(time)))
+    if abs(command.sample(np.zeros(1))[0]) > TINY_RATE:
+        slope = math.inf
+    assert found.load_acceleration == pytest.approx(slope, rel=3e-3, abs=1e-9)
