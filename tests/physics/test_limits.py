@@ -292,8 +292,33 @@ def test_a_jump_of_the_rate_is_one_from_where_rounding_ends(beyond: float) -> No
         assert math.isinf(motion(rate_task(command)).load_acceleration) is (beyond > 1)
 
 
+def test_a_motion_may_be_largest_where_it_begins() -> None:
+    """Behind its fastest point the hull of a steady sine gets slower until the next quarter."""
+    hull = Sine(amplitude=0.3, frequency=0.1, phase=0.3)
+    found = motion(rate_task(Zero(), hull, duration=1.5, start=-0.5))
+    assert found.rate == pytest.approx(0.3 / (2 * math.pi * 0.1) * math.cos(0.3), rel=1e-12)
+    assert found.angle == pytest.approx(0.5, rel=1e-12)  # the hull comes towards the load
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "largest"),
+    [
+        ((-1, 4), (3, -1), 2.2),  # on its way at the start
+        ((2, 4), (0.7, 0), 0.7),  # held before its first knot
+        ((0, 1, 1, 5), (0, 2, 0, 0), 2.0),  # just before a jump
+        ((0, 1, 1, 5), (0, 0, 2, 0), 2.0),  # just after one
+    ],
+)
+def test_a_line_is_largest_at_its_ends_its_knots_and_beside_its_jumps(
+    times: tuple[float, ...], values: tuple[float, ...], largest: float
+) -> None:
+    hull = Polyline(times=times, values=values)
+    task = rate_task(Zero(), hull, duration=3.0)
+    assert motion(task).hull_acceleration == pytest.approx(largest, rel=1e-12)
+
+
 def test_what_is_before_the_start_or_at_the_very_end_is_no_motion() -> None:
-    before = Polyline(times=(-3, -2, -2, 0, 0, 5), values=(0, 9, 7, 3, 0, 1))
+    before = Polyline(times=(-3, -0.5, -0.5, 0, 0, 5), values=(0, 9, 7, 3, 0, 1))
     found = motion(rate_task(before, before, duration=5.0, start=0.4))
     assert found.load_acceleration == pytest.approx(0.2)
     assert found.hull_acceleration == pytest.approx(1.0)
