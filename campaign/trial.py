@@ -271,6 +271,11 @@ class ChannelInfo:
     measured: bool = True
     own_rate: float | None = None
 
+    @property
+    def long_name(self) -> str:
+        """What stands at an axis: label and unit."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
     def with_samples(self, samples: Array) -> Channel:
         return Channel(
             self.name,

@@ -7,7 +7,8 @@ format is described in `docs/archive-format.md`. Importing this package does not
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
 from campaign.archive.listing import find_run, find_runs, list_runs
-from campaign.archive.reader import RunReader, open_run
+from campaign.archive.opening import open_run
+from campaign.archive.run_reader import RunReader
 from campaign.archive.summary import RunSummary
 from campaign.archive.writer import RunWriter, TrialWriter
 

@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
+from campaign.estimate import Estimate, Window
 from campaign.trial import ChannelInfo, Ending, Recording, Trial
+
+
+class Samples(Protocol):
+    """What a trial recorded, as one format of archives keeps it."""
+
+    def recording(self, ending: Ending) -> Recording:
+        """The samples, SI. Raises ArchiveError when one fails its checksum."""
+
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        """What was announced. Raises ArchiveError."""
+
+    def problems(self) -> Iterator[str]:
+        """What is damaged, by trial and channel; reads every sample in flat memory."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +34,8 @@ class ArchivedTrial:
         started, ended: ISO 8601.
         path: the file it lies in: the sealed run, or its own while the run is in progress.
         entry: its group there.
+        windows: parts that its analysis uses, where they are not the one in `trial`.
+        estimates: what was found while it was executed.
     """
 
     trial: Trial
@@ -27,18 +44,20 @@ class ArchivedTrial:
     ended: str
     path: Path
     entry: str
+    samples: Samples = field(repr=False)
+    windows: tuple[Window, ...] = ()
+    estimates: tuple[Estimate, ...] = ()
 
     def recording(self) -> Recording:
-        """The samples, SI, read now. Raises ArchiveError when one fails its checksum."""
-        from campaign.archive.sample_reading import read_recording
+        """The samples, SI. Raises ArchiveError when something of them is not what was archived.
 
-        return read_recording(self.path, self.entry, self.ending)
+        A channel may be read only when it is asked for, and raise that error then.
+        """
+        return self.samples.recording(self.ending)
 
     def channels(self) -> tuple[ChannelInfo, ...]:
         """What was announced, without its samples; nothing when the trial did not come to that."""
-        from campaign.archive.sample_reading import read_channels
-
-        return read_channels(self.path, self.entry)
+        return self.samples.channels()
 
     def channel_names(self) -> frozenset[str]:
         """The names of `channels`."""
@@ -46,6 +65,4 @@ class ArchivedTrial:
 
     def problems(self) -> Iterator[str]:
         """Reads every sample in flat memory; what is damaged, by trial and channel."""
-        from campaign.archive.sample_reading import check_recordings
-
-        return check_recordings(self.path, [self.entry])
+        return self.samples.problems()

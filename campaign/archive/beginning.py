@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from campaign.archive.files import PART, sync_folder, write_atomically, write_li
 from campaign.archive.full_plan import write_full_plan
 from campaign.archive.header import FORMAT, PlannedTrial, RunHeader
 from campaign.archive.journal import JOURNAL, Journal, RunStarted
+from campaign.archive.remnants import remove_folder
 from campaign.archive.run_folder import HEADER, PLAN, header_document
 from campaign.trial import Trial, canonical_json
 
@@ -19,7 +19,7 @@ def make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Jou
     """Make a run's folder, under another name until everything is in it."""
     part = folder.with_name(folder.name + PART)
     if part.is_dir():
-        shutil.rmtree(part)
+        remove_folder(part)
     part.mkdir()
     try:
         write_full_plan(part, trials)
@@ -33,6 +33,6 @@ def make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Jou
         sync_folder(folder.parent)
     except BaseException:
         with contextlib.suppress(OSError):
-            shutil.rmtree(part)
+            remove_folder(part)
         raise
     return Journal(folder / JOURNAL)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import DamageList
+from campaign.archive.entries import entry_names
 from campaign.archive.full_plan import FullPlan
 from campaign.archive.header import PlannedTrial, RunHeader
-from campaign.archive.journal import RunStarted, TrialFinished
+from campaign.archive.journal import RunStarted
 from campaign.archive.story import Lines
-from campaign.archive.trial_file import earlier_entry_name, entry_name
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
 
@@ -57,17 +57,6 @@ class Executed:
         )
 
 
-def attempts(story: Lines) -> dict[str, TrialFinished]:
-    """Every finished attempt by the name of its group in a sealed run."""
-    last = {number: finished.attempt for number, finished in story.finished.items()}
-    return {
-        entry_name(e.trial)
-        if e.attempt == last[e.trial]
-        else earlier_entry_name(e.trial, e.attempt): e
-        for e in story.attempts
-    }
-
-
 def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
     """Whole lines, and the beginning that the header tells of."""
     for number in story.damaged:
@@ -85,7 +74,7 @@ def check_trials(
     story: Lines, there: Mapping[str, Executed], unreadable: Iterable[str], found: DamageList
 ) -> None:
     """Each finished trial of the journal is there, ended as it says; `unreadable` are told of."""
-    told = attempts(story)
+    told = entry_names(story.attempts)
     for entry in told.keys() - there.keys() - set(unreadable):
         found.add(f"/{entry}", "is missing, and the journal says that it finished")
     for entry, trial in there.items():

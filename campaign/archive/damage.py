@@ -76,12 +76,16 @@ class DamageList:
     def add(self, place: str, reason: str) -> None:
         self.found.append(Damage.at(place, reason))
 
+    def note(self, error: ArchiveError) -> None:
+        """What an error tells of."""
+        self.found.append(Damage.of(self.path, error))
+
     def read(self, what: Callable[[], _Read], instead: _Read) -> _Read:
         """What `what` reads, or `instead` when that is damaged, which is noted."""
         try:
             return what()
         except ArchiveError as error:
-            self.found.append(Damage.of(self.path, error))
+            self.note(error)
             return instead
 
     @contextlib.contextmanager
@@ -90,4 +94,4 @@ class DamageList:
         try:
             yield
         except ArchiveError as error:
-            self.found.append(Damage.of(self.path, error))
+            self.note(error)

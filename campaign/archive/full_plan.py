@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from campaign.archive.files import write_lines_atomically
-from campaign.archive.run_folder import first_line, read_optional
+from campaign.archive.run_folder import first_line
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
 
@@ -48,25 +48,28 @@ def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:
 
 @dataclass(frozen=True)
 class FullPlan:
-    """The planned trials of a run.
+    """The planned trials of a run; they are read when they are asked for.
 
     Attributes:
         path: of the run, for messages.
-        trials_text, trees_text: the two files.
+        texts: reads the two files; empty texts in an archive of format 1. Raises ArchiveError.
     """
 
     path: Path
-    trials_text: str = field(repr=False)
-    trees_text: str = field(repr=False)
+    texts: Callable[[], tuple[str, str]] = field(repr=False)
+
+    @cached_property
+    def _both(self) -> tuple[str, str]:
+        return self.texts()
 
     @cached_property
     def _lines(self) -> list[str]:
-        return self.trials_text.splitlines()
+        return self._both[0].splitlines()
 
     @cached_property
     def _trees(self) -> dict[str, Any]:
         trees = {}
-        for number, line in enumerate(self.trees_text.splitlines(), start=1):
+        for number, line in enumerate(self._both[1].splitlines(), start=1):
             try:
                 entry = json.loads(line)
                 digest, tree = entry["sha256"], entry["tree"]
@@ -101,22 +104,3 @@ class FullPlan:
 
     def _damaged(self, name: str, line: int, what: str) -> ArchiveError:
         return ArchiveError(f"{self.path}: {name}, line {line}: {what}")
-
-
-def read_full_plan(path: Path) -> FullPlan:
-    """The planned trials of a run; none in an archive of format 1. Raises ArchiveError."""
-    if path.is_dir():
-        texts = [read_optional(path / name) for name in (PLAN_TRIALS, PLAN_TREES)]
-    else:
-        texts = list(_sealed_texts(path))
-    return FullPlan(path, *texts)
-
-
-def _sealed_texts(path: Path) -> Iterator[str]:
-    from campaign.archive import guarded
-
-    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
-        run = guarded.group_at(file, "run", "NXentry")
-        for name in ("plan_trials", "plan_trees"):
-            there = name in run
-            yield guarded.text_at(guarded.group_at(run, name, "NXnote"), "data") if there else ""

@@ -13,7 +13,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -25,14 +26,18 @@ from h5py import h5a, h5d, h5ds, h5f, h5g, h5o, h5p, h5s, h5t
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from campaign.archive.checksums import BLOCK, SeriesDigest
+
 Array = NDArray[np.float64]
 
-CHUNK = 32_768
-"""Samples per chunk. A power of two (see `preview`); deflate looks back 32 768 bytes, which is one
-byte of each of so many samples: shorter chunks compress worse, longer ones hardly better."""
+CHUNK = BLOCK
+"""Samples per chunk, as many as a block of `checksums` has. A power of two (see `preview`); deflate
+looks back 32 768 bytes, which is a byte of each of so many samples: shorter chunks compress worse,
+longer ones hardly better."""
 
 CHECKSUM = "sha256"
-"""Attribute of every dataset: SHA-256 of its raw bytes, little endian (text: UTF-8)."""
+"""Attribute of every text and number: SHA-256 of its raw bytes, little endian (text: UTF-8).
+Samples have theirs in their trial's record."""
 
 SAMPLE = np.dtype("<f8")
 _LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
@@ -78,6 +83,11 @@ def make_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     return group
 
 
+def link(source: h5py.Group, name: str, target: h5py.Group, new_name: str) -> None:
+    """Let what `source` has as `name` be found in `target`, too: a second name, not a copy."""
+    target.id.links.create_hard(new_name.encode(), source.id, name.encode())
+
+
 def put_attribute(item: h5py.HLObject, name: str, value: str) -> None:
     """A text attribute of variable length."""
     attribute = h5a.create(item.id, name.encode(), _TEXT, _SCALAR)
@@ -86,7 +96,7 @@ def put_attribute(item: h5py.HLObject, name: str, value: str) -> None:
 
 def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None:
     """A text as a scalar of fixed length, so that a reader knows its size before reading it."""
-    raw = text.replace("\0", "\N{REPLACEMENT CHARACTER}").encode("utf-8")  # zeros pad a text
+    raw = storable(text).encode("utf-8")
     kind = h5t.C_S1.copy()
     kind.set_size(max(1, len(raw)))
     kind.set_strpad(h5t.STR_NULLPAD)
@@ -94,6 +104,11 @@ def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None
     dataset = _put_scalar(group, name, kind, np.array(raw, dtype=f"S{max(1, len(raw))}"), raw)
     for key, value in attributes.items():
         put_attribute(dataset, key, value)
+
+
+def storable(text: str) -> str:
+    """A text as it can be stored: zeros pad one there, so none can be part of it."""
+    return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 
 def put_integer(group: h5py.Group, name: str, value: int) -> None:
@@ -161,10 +176,16 @@ def copy_entry(source: h5py.File, name: str, target: h5py.File, new_name: str) -
         attach_time(data)
 
 
-def copy_entry_back(source: h5py.File, name: str, target: h5py.File, new_name: str) -> None:
-    """Copy an entry out of a sealed file, without its dimension scales: `copy_entry` undone."""
-    h5o.copy(source.id, name.encode(), target.id, new_name.encode())
-    for data in _plotted(target[new_name]):
+def copy_entry_back(
+    source: h5py.File, name: str, target: h5py.File, new_name: str, members: Iterable[str]
+) -> None:
+    """Copy some members of an entry out of a sealed file, without dimension scales."""
+    entry = make_group(target, new_name, "NXentry")
+    if "default" in source[name].attrs:
+        put_attribute(entry, "default", source[name].attrs["default"])
+    for member in members:
+        h5o.copy(source[name].id, member.encode(), entry.id, member.encode())
+    for data in _plotted(entry):
         for item in data.values():
             for attribute in _SCALES:
                 if h5a.exists(item.id, attribute):
@@ -179,12 +200,15 @@ class SampleColumns:
     """Datasets of equal length, written as their samples come; one chunk of each is in memory.
 
     Args:
-        group: where they go.
+        group: where they go; None: nowhere, only their digests are wanted.
         attributes: of each dataset, by name, in the order of the rows that `append` takes.
     """
 
     def __init__(
-        self, group: h5py.Group, attributes: Mapping[str, Mapping[str, str]], chunk: int = CHUNK
+        self,
+        group: h5py.Group | None,
+        attributes: Mapping[str, Mapping[str, str]],
+        chunk: int = CHUNK,
     ) -> None:
         self._group = group
         self._attributes = attributes
@@ -192,7 +216,7 @@ class SampleColumns:
         self._filled = 0
         self._written = 0
         self._columns: list[_Column] = []
-        self._digests = [hashlib.sha256() for _ in attributes]
+        self._digests = [SeriesDigest() for _ in attributes]
 
     @property
     def length(self) -> int:
@@ -220,32 +244,35 @@ class SampleColumns:
                 self._write_chunk()
         return chunks
 
-    def finish(self) -> Array:
-        """Write what is left and the checksums; returns what was left, shape (rows, m)."""
+    def finish(self) -> tuple[Array, list[str]]:
+        """Write what is left; returns that, shape (rows, m), and the digest of every series."""
         rest = self._buffer[:, : self._filled].copy()
         if self._filled or not self._columns:
             self._write_chunk()
-        for column, digest in zip(self._columns, self._digests, strict=True):
-            put_attribute(column.dataset, CHECKSUM, digest.hexdigest())
-        return rest
+        return rest, [digest.hexdigest() for digest in self._digests]
 
     def _write_chunk(self) -> None:
+        for row, digest in zip(self._buffer, self._digests, strict=True):
+            digest.update(row[: self._filled])
+        if self._group is not None:
+            self._store_chunk(self._group)
+        self._written, self._filled = self._written + self._filled, 0
+
+    def _store_chunk(self, group: h5py.Group) -> None:
         if not self._columns:
             # A short recording is one chunk of its own length, and its size is known.
             more = self._filled in (0, self._buffer.shape[1])
             self._columns = [
-                _create_column(self._group, name, attributes, row[: self._filled], more)
+                _create_column(group, name, attributes, row[: self._filled], more)
                 for (name, attributes), row in zip(
                     self._attributes.items(), self._buffer, strict=True
                 )
             ]
         length = self._written + self._filled
         self._buffer[:, self._filled :] = 0.0
-        for column, row, digest in zip(self._columns, self._buffer, self._digests, strict=True):
-            digest.update(row[: self._filled].data)
+        for column, row in zip(self._columns, self._buffer, strict=True):
             if self._filled:
                 column.write(row, self._written, length)
-        self._written, self._filled = length, 0
 
 
 @dataclass(frozen=True)
@@ -306,3 +333,22 @@ def pack(samples: Array, shuffled: bool) -> bytes:
     raw = raw.reshape(-1, samples.itemsize).T if shuffled else raw
     packed: bytes = isal_zlib.compress(raw.tobytes(), _LEVEL)
     return packed
+
+
+def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
+    """The `count` samples of a chunk that `pack` made; None when it holds something else.
+
+    No more memory is taken than so many samples need, whatever the chunk would expand to.
+    """
+    size = count * SAMPLE.itemsize
+    inflating = isal_zlib.decompressobj()
+    try:
+        raw = inflating.decompress(packed, size)
+    except zlib.error:  # isal's own is this one
+        return None
+    if len(raw) != size or (not inflating.eof and inflating.decompress(b"", 1)):
+        return None
+    if not shuffled:
+        return np.frombuffer(raw, dtype=SAMPLE)
+    planes = np.frombuffer(raw, dtype=np.uint8).reshape(SAMPLE.itemsize, count)
+    return np.ascontiguousarray(planes.T).view(SAMPLE).reshape(count)

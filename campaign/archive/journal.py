@@ -73,7 +73,10 @@ class Decision(_Line):
 
 
 class TrialFinished(_Line):
-    """A trial ended, however it ended, and its file is on the disk under its real name."""
+    """A trial ended, however it ended, and its file is on the disk under its real name.
+
+    `record` is the digest of the trial's record; before format 3 there was none.
+    """
 
     event: Literal["trial finished"] = "trial finished"
     at: str
@@ -81,6 +84,7 @@ class TrialFinished(_Line):
     attempt: int = Field(default=1, ge=1)
     file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs$")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    record: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
     bytes: int = Field(ge=0)
     outcome: Outcome
     reason: str

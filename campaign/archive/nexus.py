@@ -35,6 +35,9 @@ VERSION = "1.0"
 REQUIRED = (COMMAND, GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE, MOTOR_CURRENT, DRIVE_TORQUE)
 """The channels without which an entry does not follow the definition."""
 
+MEMBERS = ("definition", "instrument")
+"""What an entry that follows the definition has besides its samples."""
+
 _SENSORS = {"gyro": GYRO_RATE, "encoder": RELATIVE_ANGLE, "current_sensor": MOTOR_CURRENT}
 _GAIN_UNITS = {"rate": ("A s/rad", "A/rad"), "current": ("V/A", "V/(A s)")}
 
@@ -49,21 +52,18 @@ def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
     return {channel.name for channel in channels}.issuperset(REQUIRED)
 
 
-def write_definition(entry: h5py.Group, bench: Tree, channels: Iterable[ChannelInfo]) -> None:
-    """Say that `entry` follows the definition, and describe its bench; nothing when it does not."""
-    if not follows_definition(channels):
-        return
+def write_definition(entry: h5py.Group, bench: Described) -> None:
+    """Say that `entry` follows the definition, and describe its bench."""
     hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
-    # Copying costs a tenth of making, and the trials of a campaign share a few benches.
-    template = _template(_Described.of(bench))
-    h5o.copy(template.id, b"instrument", entry.id, b"instrument")
+    # Copying costs a tenth of making, and the runs of a process share a few benches.
+    h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
 
 
 _TEMPLATES = itertools.count(1)
 
 
 @dataclass(frozen=True)
-class _Described:
+class Described:
     """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
 
     An archive keeps benches of any origin, so nothing of their layout is taken for granted.
@@ -73,7 +73,7 @@ class _Described:
     gains: tuple[tuple[str, float, float], ...]
 
     @classmethod
-    def of(cls, bench: Tree) -> _Described:
+    def of(cls, bench: Tree) -> Described:
         loops = bench.get("controller")
         gains = (
             (loop, *found)
@@ -84,7 +84,7 @@ class _Described:
 
 
 @lru_cache(maxsize=32)
-def _template(bench: _Described) -> h5py.File:
+def _template(bench: Described) -> h5py.File:
     """A file in memory that holds the instrument."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(1 << 14, False)

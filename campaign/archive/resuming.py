@@ -7,16 +7,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from campaign.archive.files import PART, sha256_of, why
-from campaign.archive.header import PARTIAL, SEALED, RunStatus
+from campaign.archive.header import FORMAT, PARTIAL, SEALED, RunStatus
 from campaign.archive.journal import JOURNAL, Journal, Story, read_journal
+from campaign.archive.opening import read_sealed, sealed_format
+from campaign.archive.remnants import clear_remnants, is_own
 from campaign.archive.run_folder import read_format
 from campaign.archive.run_lock import RunLock
 from campaign.errors import ArchiveError, UsageError
 
 RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
 """How a run has to stand for somebody to go on with it."""
-
-_FIRST_FORMAT = 2  # before, an archive did not hold the trials that had not been executed
 
 
 def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
@@ -32,6 +32,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
     if path.suffix not in (PARTIAL, SEALED) or not path.exists():
         raise UsageError(f"{path}: is no run")
     with _locked(folder) as lock:
+        clear_remnants(folder.parent, folder.stem)
         if sealed.is_file():
             _check_sealed(sealed)
             from campaign.archive.unsealing import unseal
@@ -60,23 +61,19 @@ def _locked(folder: Path) -> Iterator[RunLock]:
 
 
 def _check_sealed(sealed: Path) -> None:
-    from campaign.archive import guarded
-
-    with guarded.open_file(sealed) as file, guarded.guarded(sealed, "/run"):
-        run = guarded.group_at(file, "run", "NXentry")
-        provenance = guarded.group_at(run, "provenance", "NXcollection")
-        _check_format(sealed, guarded.integer_at(provenance, "format"))
-        outcome = guarded.group_at(run, "outcome", "NXcollection")
-        status = RunStatus(guarded.text_at(outcome, "status"))
-    if status not in RESUMABLE:
-        raise UsageError(f"{sealed}: the run has ended ({status}); there is nothing to go on with")
+    _check_format(sealed, sealed_format(sealed))
+    run = read_sealed(sealed)
+    if run.status not in RESUMABLE:
+        raise UsageError(
+            f"{sealed}: the run has ended ({run.status}); there is nothing to go on with"
+        )
 
 
 def _check_format(path: Path, version: int) -> None:
-    if version < _FIRST_FORMAT:
+    if version < FORMAT:
         raise UsageError(
-            f"{path}: was begun by an earlier program, which did not keep the whole plan "
-            f"(format {version}); start a new run"
+            f"{path}: was begun by an earlier program (format {version}), and can be gone on with "
+            "by that one only; start a new run"
         )
 
 
@@ -93,5 +90,6 @@ def _read_folder(folder: Path) -> Story:
         if digest != finished.sha256:
             raise ArchiveError(f"{path}: is not what the journal says was written")
     for part in folder.glob(f"*{PART}"):
-        part.unlink()
+        if is_own(part.name):
+            part.unlink()
     return story

@@ -14,6 +14,8 @@ from campaign.trial import canonical_json
 
 HEADER = "run.json"
 PLAN = "plan.jsonl"
+SEALING = "sealed.nxs.part"
+"""The sealed file while it grows."""
 
 
 def read_header(folder: Path) -> RunHeader:

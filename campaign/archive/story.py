@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from campaign.archive.journal import Entry, RunEnded, RunResumed, TrialFinished
+from campaign.archive.journal import Entry, RunEnded, RunResumed, RunStarted, TrialFinished
 
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 _Kind = TypeVar("_Kind", bound=Entry)
@@ -30,6 +30,12 @@ class Lines:
     damaged: tuple[int, ...]
     torn: bool
     text: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether it begins as a journal does, and every line can be understood."""
+        begins = bool(self.entries) and isinstance(self.entries[0], RunStarted)
+        return begins and not self.damaged and not self.torn
 
     @property
     def finished(self) -> dict[int, TrialFinished]:

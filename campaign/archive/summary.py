@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive.damage import DamageList
 from campaign.archive.header import RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted
 from campaign.archive.run_folder import read_header
@@ -85,25 +84,21 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
 
 
 def _summarise_file(path: Path, size: int) -> RunSummary:
-    from campaign.archive import guarded
-    from campaign.archive.provenance import read_provenance
+    from campaign.archive import opening
 
-    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
-        run = guarded.group_at(file, "run", "NXentry")
-        header = read_provenance(run, DamageList(path))
-        outcome = guarded.group_at(run, "outcome", "NXcollection")
-        return RunSummary(
-            name=path.stem,
-            path=path,
-            bytes=size,
-            created=header.created,
-            ended=guarded.text_at(run, "end_time"),
-            status=RunStatus(guarded.text_at(outcome, "status")),
-            protocol=header.protocol_name,
-            backend=header.backend,
-            benches=_benches(header),
-            tags=header.tags,
-            planned=header.trials,
-            trials=guarded.integer_at(outcome, "trials_finished"),
-            failed=guarded.integer_at(outcome, "trials_failed"),
-        )
+    run = opening.read_glance(path)
+    return RunSummary(
+        name=path.stem,
+        path=path,
+        bytes=size,
+        created=run.header.created,
+        ended=run.ended,
+        status=run.status,
+        protocol=run.header.protocol_name,
+        backend=run.header.backend,
+        benches=_benches(run.header),
+        tags=run.header.tags,
+        planned=run.header.trials,
+        trials=run.finished,
+        failed=run.failed,
+    )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from campaign.archive.journal import Entry, TrialAbandoned, TrialFinished
+from campaign.estimate import Estimate, Window
 from campaign.trial import ChannelInfo, Ending, Event, Trial
 
 if TYPE_CHECKING:
@@ -52,18 +53,27 @@ class TrialWriter:
         """Whether it was neither finished nor abandoned."""
         return self._open
 
-    def finish(self, ending: Ending, started: str, ended: str) -> None:
+    def finish(
+        self,
+        ending: Ending,
+        started: str,
+        ended: str,
+        *,
+        windows: Iterable[Window] = (),
+        estimates: Iterable[Estimate] = (),
+    ) -> None:
         """Keep the trial. When this returns, no crash can lose it.
 
         Args:
             ending: however it ended: a failed trial is kept too.
             started, ended: ISO 8601 with a time zone.
+            windows, estimates: what was found of it meanwhile; kept with it.
 
         Raises:
             ArchiveError: it could not be written; nothing of it remains.
         """
         self._open = False
-        file = self._file.close(ending, started, ended)
+        file = self._file.close(ending, started, ended, windows, estimates)
         self._note(
             TrialFinished(
                 at=ended,
@@ -71,6 +81,7 @@ class TrialWriter:
                 attempt=self._attempt,
                 file=file.name,
                 sha256=file.sha256,
+                record=file.record,
                 bytes=file.bytes,
                 outcome=ending.outcome,
                 reason=ending.reason,

@@ -8,30 +8,31 @@ one whole run is on the disk, and it is clear which one.
 from __future__ import annotations
 
 import contextlib
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 
 from campaign.archive import guarded, hdf5
+from campaign.archive.checksums import text_digest
 from campaign.archive.damage import DamageList
-from campaign.archive.files import (
-    PART,
-    publish,
-    sha256_of,
-    sync_folder,
-    why,
-    write_atomically,
-)
+from campaign.archive.entries import entry_name, entry_names
+from campaign.archive.files import PART, publish, sha256_of, sync_folder, why, write_atomically
+from campaign.archive.folder import read_trial_file
 from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.header import PARTIAL
 from campaign.archive.journal import JOURNAL, Entry, Story, TrialFinished, parse_journal
-from campaign.archive.provenance import read_provenance
+from campaign.archive.record import Trees, TrialRecord, parse_trees
+from campaign.archive.remnants import remove_folder, take_over
 from campaign.archive.run_folder import HEADER, PLAN, header_document
-from campaign.archive.sample_reading import check_recordings
-from campaign.archive.trial_file import earlier_entry_name, entry_name, write_root
+from campaign.archive.seal import SealedTexts
+from campaign.archive.sealed import read_not_kept, read_sealed
+from campaign.archive.trial_file import write_record, write_root
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
+
+_MEMBERS = ("title", "start_time", "end_time", "record", "trees", "data", "preview")
+"""What a trial's own file has; the rest is made anew when the run is sealed."""
 
 
 def unseal(sealed: Path) -> Path:
@@ -43,18 +44,20 @@ def unseal(sealed: Path) -> Path:
     folder = sealed.with_suffix(PARTIAL)
     part = folder.with_name(folder.name + PART)
     try:
-        _remove(part)
+        _check_sealed(sealed)
+        if part.is_dir() and remove_folder(part):
+            raise ArchiveError(f"{part}: holds files that are not the program's; move them away")
         part.mkdir()
-        _check_hash(sealed)
         _fill(sealed, part)
-        _check(part)
-        _remove(folder)  # a remnant: where both are found, the sealed run counts
+        if folder.is_dir():  # a remnant: where both are found, the sealed run counts
+            take_over(folder, part)
+            remove_folder(folder)
         part.rename(folder)
         sync_folder(folder.parent)
         sealed.unlink()
     except (OSError, RuntimeError, ValueError, ArchiveError) as error:
         with contextlib.suppress(OSError):
-            _remove(part)
+            remove_folder(part)
         raise ArchiveError(
             f"{sealed}: could not be opened for going on: {why(error)}; it is as it was"
         ) from None
@@ -62,12 +65,7 @@ def unseal(sealed: Path) -> Path:
     return folder
 
 
-def _remove(folder: Path) -> None:
-    if folder.is_dir():
-        shutil.rmtree(folder)
-
-
-def _check_hash(sealed: Path) -> None:
+def _check_sealed(sealed: Path) -> None:
     with guarded.open_file(sealed) as file:
         digest, place = guarded.digest_at(file, "run/outcome/file_sha256")
     if sha256_of(sealed, place) != digest:
@@ -76,55 +74,67 @@ def _check_hash(sealed: Path) -> None:
 
 def _fill(sealed: Path, folder: Path) -> None:
     """Write everything that the run's folder had when it was sealed."""
+    run = read_sealed(sealed)
+    if run.damaged:
+        raise ArchiveError(str(run.damaged[0]))
     with guarded.open_file(sealed) as file, guarded.guarded(sealed, "/run"):
-        run = guarded.group_at(file, "run", "NXentry")
-        damaged = DamageList(sealed)
-        header = read_provenance(run, damaged)
-        if damaged.found:
-            raise ArchiveError(str(damaged.found[0]))
-        texts = {
-            PLAN: _note(run, "plan"),
-            PLAN_TRIALS: _note(run, "plan_trials"),
-            PLAN_TREES: _note(run, "plan_trees"),
-            HEADER: header_document(header),
-        }
-        for name, text in texts.items():
-            write_atomically(folder / name, text)
-        story = parse_journal(sealed, _note(run, "journal").encode())
-        written = {
-            finished.file: _write_trial(file, entry, finished, folder)
-            for finished, entry in _entries(story)
-        }
+        texts = SealedTexts(sealed, file, DamageList(sealed))
+        notes = {PLAN: "plan", PLAN_TRIALS: "plan_trials", PLAN_TREES: "trees"}
+        for name, note in notes.items():
+            write_atomically(folder / name, texts.text(f"{note}/data"))
+        write_atomically(folder / HEADER, header_document(run.header))
+        story = parse_journal(sealed, run.journal.encode())
+        lines = {text_digest(line): line for line in texts.text("index/data").splitlines()}
+        trees = parse_trees(texts.text("trees/data"))
+        not_kept = read_not_kept(texts)
+        written = {}
+        for entry, finished in entry_names(story.files).items():
+            with _trial_file(folder, finished) as target:
+                if entry in not_kept:
+                    _write_record(target, finished, lines[finished.record], trees, not_kept[entry])
+                else:
+                    _copy_back(file, entry, target, finished)
+            written[finished.file] = _publish(folder, finished)
     write_atomically(folder / JOURNAL, _journal(story, written))
 
 
-def _note(run: h5py.Group, name: str) -> str:
-    return guarded.text_at(guarded.group_at(run, name, "NXnote"), "data")
+def _part(folder: Path, finished: TrialFinished) -> Path:
+    return folder / (finished.file + PART)
 
 
-def _entries(story: Story) -> list[tuple[TrialFinished, str]]:
-    """Every attempt that is kept, and its group in the sealed run."""
-    last = [(finished, entry_name(number)) for number, finished in story.finished.items()]
-    return last + [
-        (finished, earlier_entry_name(number, finished.attempt))
-        for number, attempts in story.earlier.items()
-        for finished in attempts
-    ]
+@contextlib.contextmanager
+def _trial_file(folder: Path, finished: TrialFinished) -> Iterator[h5py.File]:
+    with hdf5.closing(hdf5.create_file(_part(folder, finished))) as file:
+        yield file
+        entry = file[entry_name(finished.trial)]
+        write_root(file, guarded.text_at(entry, "start_time"), entry)
 
 
-def _write_trial(
-    source: h5py.File, entry: str, finished: TrialFinished, folder: Path
-) -> TrialFinished:
-    """Write a trial's file; returns the journal's word of it, with the new file's hash."""
-    guarded.group_at(source, entry, "NXentry")
-    final = folder / finished.file
-    part = final.with_name(final.name + PART)
-    name = entry_name(finished.trial)
-    with hdf5.closing(hdf5.create_file(part)) as file:
-        hdf5.copy_entry_back(source, entry, file, name)
-        write_root(file, guarded.text_at(file[name], "start_time"), file[name])
+def _copy_back(source: h5py.File, entry: str, target: h5py.File, finished: TrialFinished) -> None:
+    there = guarded.group_at(source, entry, "NXentry")
+    members = [member for member in _MEMBERS if member in there]
+    hdf5.copy_entry_back(source, entry, target, entry_name(finished.trial), members)
+
+
+def _write_record(
+    target: h5py.File, finished: TrialFinished, line: str, trees: Trees, not_kept: str
+) -> None:
+    """The entry of a trial whose samples were not kept: it has no group in the sealed run."""
+    record = TrialRecord.model_validate_json(line)
+    entry = hdf5.make_group(target, entry_name(finished.trial), "NXentry")
+    hdf5.put_text(entry, "title", record.label)
+    hdf5.put_text(entry, "not_kept", not_kept)
+    write_record(entry, record, line, {name: trees[name] for name in record.tree_names})
+
+
+def _publish(folder: Path, finished: TrialFinished) -> TrialFinished:
+    """Read a trial's new file back and name it; returns the journal's word of it, with its hash."""
+    part = _part(folder, finished)
     digest, size = sha256_of(part), part.stat().st_size
-    publish(part, final)
+    problems = list(read_trial_file(part, finished).problems())
+    if problems:
+        raise ArchiveError("; ".join(problems[:3]))
+    publish(part, folder / finished.file)
     return finished.model_copy(update={"sha256": digest, "bytes": size})
 
 
@@ -140,12 +150,3 @@ def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
 
     lines = story.text.splitlines()
     return "".join(line(*both) + "\n" for both in zip(story.entries, lines, strict=True))
-
-
-def _check(folder: Path) -> None:
-    """Read every sample of the new folder against its checksum."""
-    for path in sorted(folder.glob("trial-*")):
-        number = int(path.stem.split("-")[1])
-        problems = list(check_recordings(path, [entry_name(number)]))
-        if problems:
-            raise ArchiveError("; ".join(problems[:3]))

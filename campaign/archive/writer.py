@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from campaign.archive.beginning import make_folder
 from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
@@ -25,6 +25,9 @@ from campaign.archive.trial_writer import TrialWriter
 from campaign.errors import UsageError
 from campaign.trial import Outcome, SafeState, Trial
 
+if TYPE_CHECKING:
+    from campaign.archive.sealing import Sealer
+
 __all__ = ["RunWriter", "TrialWriter"]
 
 
@@ -42,6 +45,7 @@ class RunWriter:
         self._writers: list[TrialWriter] = []
         self._last: dict[int, TrialFinished] = {}
         self._told: tuple[Entry, ...] = ()
+        self._sealer: Sealer | None = None
 
     @classmethod
     def create(cls, results: Path, header: RunHeader, trials: Sequence[Trial]) -> Self:
@@ -99,6 +103,8 @@ class RunWriter:
         folder, story, journal, lock = reopen(path)
         writer = cls(folder, journal, lock)
         writer._last = dict(story.finished)
+        for finished in story.files:
+            writer._seal_later(finished)
         writer._told = story.entries
         try:
             journal.append(
@@ -131,17 +137,18 @@ class RunWriter:
         """What the journal held when the run was resumed, in order; empty in a new run."""
         return self._told
 
-    def begin(self, trial: Trial) -> TrialWriter:
+    def begin(self, trial: Trial, *, not_kept: str = "") -> TrialWriter:
         """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
 
-        A trial is executed by one thread at a time.
+        A trial is executed by one thread at a time. `not_kept` says why its samples are not to be
+        kept: their digests are, and all else that there is to say of it.
         """
         from campaign.archive.trial_file import TrialFile
 
         with self._lock:
             last = self._last.get(trial.number)
         attempt = last.attempt + 1 if last else 1
-        file = TrialFile(self._folder, trial, attempt)
+        file = TrialFile(self._folder, trial, attempt, not_kept)
         writer = TrialWriter(trial, attempt, file, self._note)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
@@ -178,12 +185,16 @@ class RunWriter:
             self._abandon_open(ended)
             self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
-            return seal_folder(self._folder)
+            sealer, self._sealer = self._sealer, None
+            return sealer.seal() if sealer else seal_folder(self._folder)
         finally:
             self.close()
 
     def close(self) -> None:
         """Let go of the run as it is, unsealed: another process may go on with it."""
+        if self._sealer is not None:
+            self._sealer.discard()
+            self._sealer = None
         self._journal.close()
         self._run_lock.release()
 
@@ -198,6 +209,14 @@ class RunWriter:
         if isinstance(entry, TrialFinished):
             with self._lock:
                 self._last[entry.trial] = entry
+                self._seal_later(entry)
+
+    def _seal_later(self, finished: TrialFinished) -> None:
+        from campaign.archive.sealing import Sealer
+
+        if self._sealer is None:
+            self._sealer = Sealer(self._folder)
+        self._sealer.add(finished)
 
 
 def _now() -> str:

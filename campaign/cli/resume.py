@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
-from campaign.archive.full_plan import read_full_plan
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
 from campaign.cli.output import print_note
@@ -165,7 +164,7 @@ def _from_archive(run: RunReader) -> Remade:
         was.normalised, kind.name, options.model_dump(mode="json"), provenance.versions()
     )
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
-    trials = tuple(read_full_plan(run.path).trials())
+    trials = tuple(run.full_plan.trials())
     return Remade(kind, options, trials, (), policy, tuple(differences(was, now)))
 
 

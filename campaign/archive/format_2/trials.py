@@ -14,8 +14,9 @@ from pydantic import TypeAdapter
 from campaign.archive import guarded
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import DamageList
+from campaign.archive.entries import entry_name
+from campaign.archive.format_2.samples import StoredSamples
 from campaign.archive.run_folder import first_line
-from campaign.archive.trial_file import entry_name
 from campaign.errors import ArchiveError
 from campaign.trial import Ending, Fault, Outcome, SafeState, Tree, Trial, canonical_json
 
@@ -64,7 +65,7 @@ def read_trial(path: Path, file: h5py.File, number: int, place: str = "") -> Arc
         )
         started = guarded.text_at(entry, "start_time")
         ended = guarded.text_at(entry, "end_time")
-        return ArchivedTrial(trial, ending, started, ended, path, name)
+        return ArchivedTrial(trial, ending, started, ended, path, name, StoredSamples(path, name))
 
 
 def _fault(record: h5py.Group) -> Fault | None:

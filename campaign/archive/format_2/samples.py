@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,23 @@ from pydantic import BaseModel, TypeAdapter
 from campaign.archive import guarded
 from campaign.errors import ArchiveError
 from campaign.trial import Channel, ChannelInfo, Ending, Event, Recording
+
+
+@dataclass(frozen=True)
+class StoredSamples:
+    """The samples of a trial: of the group `entry` in a file."""
+
+    path: Path
+    entry: str
+
+    def recording(self, ending: Ending) -> Recording:
+        return read_recording(self.path, self.entry, ending)
+
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        return read_channels(self.path, self.entry)
+
+    def problems(self) -> Iterator[str]:
+        return check_recordings(self.path, [self.entry])
 
 
 class _Event(BaseModel):

@@ -9,8 +9,8 @@ from pathlib import Path
 from campaign.archive import guarded
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import DamageList
+from campaign.archive.format_2.trials import read_trial, read_trial_file
 from campaign.archive.journal import JOURNAL, read_journal
-from campaign.archive.trial_reading import read_trial, read_trial_file
 
 _ENTRY = re.compile(r"trial_([0-9]{5,10})_attempt_([0-9]{1,6})")
 

@@ -1,0 +1,328 @@
+"""Verifying a run of format 3: every text against the seal, every trial against its record.
+
+A damaged sample is named by trial and channel. Damage in what HDF5 keeps for itself may change
+nothing that can be read; the hash of the file finds it, and it is reported as structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+
+from campaign.archive import consistency, guarded, hdf5, nexus
+from campaign.archive.checksums import text_digest
+from campaign.archive.consistency import Executed
+from campaign.archive.damage import DamageList
+from campaign.archive.entries import ENTRY, entry_name, entry_names
+from campaign.archive.files import PART, sha256_of
+from campaign.archive.folder import open_folder
+from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
+from campaign.archive.journal import JOURNAL, TrialFinished
+from campaign.archive.record import Trees, TrialRecord
+from campaign.archive.recorded import check_unit, series_of
+from campaign.archive.run_folder import HEADER, PLAN, SEALING
+from campaign.archive.run_reader import RunReader
+from campaign.archive.seal import OUTSIDE, SealedTexts
+from campaign.archive.sealed import NOTES, read_entry, read_not_kept, read_sealed
+from campaign.archive.story import Lines, read_lines
+from campaign.archive.verification import (
+    STRUCTURE,
+    UNFINISHED,
+    UNREADABLE_HASH,
+    Progress,
+    Verification,
+)
+from campaign.errors import ArchiveError
+
+_HASH = "outcome/file_sha256"
+_NUMBERS = ("provenance/format", "outcome/trials_finished", "outcome/trials_failed")
+_REQUIRED = frozenset(
+    [
+        *("title", "entry_identifier", "start_time", "end_time", "program_name", *_NUMBERS),
+        *("provenance/name", "provenance/created"),
+        *("outcome/status", "outcome/reason", "outcome/safe_state"),
+        *(f"{note}/{name}" for note in NOTES for name in ("type", "file_name", "data")),
+    ]
+) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
+_OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}
+_TEXTS = frozenset(("title", "start_time", "end_time", "record", "trees"))
+
+
+def verify(path: Path, progress: Progress) -> Verification:
+    """Verify a sealed run or the folder of a run in progress of format 3."""
+    check = _Check(path, progress)
+    with check.problems.noting(), guarded.guarded(path):
+        if path.is_dir():
+            check.folder()
+        else:
+            check.sealed()
+    return Verification(
+        path,
+        tuple(dict.fromkeys(check.problems.found)),
+        tuple(check.remarks.found),
+        len(check.trials) + len(check.unreadable),
+        check.datasets,
+        check.root,
+    )
+
+
+class _Check:
+    """One verification; `problems` and what else was found grow as it goes."""
+
+    def __init__(self, path: Path, progress: Progress) -> None:
+        self.path = path
+        self.progress = progress
+        self.problems = DamageList(path)
+        self.remarks = DamageList(path)
+        self.trials: dict[str, Executed] = {}
+        self.unreadable: set[str] = set()
+        self.datasets = 0
+        self.root = ""
+
+    def sealed(self) -> None:
+        """A sealed file: its content first, so that the hash speaks of what that does not show."""
+        with self.problems.noting():
+            self._content()
+        self._hash()
+
+    def folder(self) -> None:
+        """The folder of a run in progress, as far as its journal tells."""
+        run = open_folder(self.path)
+        content = self.path / JOURNAL
+        story = read_lines(content.read_bytes() if content.is_file() else b"")
+        if story.torn:
+            self.remarks.add(JOURNAL, "has a last line that was torn by a crash and never reported")
+        for entry, finished in entry_names(story.attempts).items():
+            self._trial_file(entry, finished)
+        named = {finished.file for finished in story.attempts}
+        for file in sorted(self.path.iterdir()):
+            if file.name not in named | _OWN_FILES:
+                unfinished = file.suffix == PART and file.name != SEALING
+                kind = "was never finished" if unfinished else "is not part of the run"
+                self.remarks.add(file.name, kind)
+        self._agreement(run, story, HEADER, JOURNAL, PLAN)
+
+    def _content(self) -> None:
+        run = read_sealed(self.path)
+        self.root = run.root
+        story = read_lines(run.journal.encode())
+        with guarded.open_file(self.path) as file:
+            texts = SealedTexts(self.path, file, DamageList(self.path))
+            self._texts(file, texts)
+            not_kept: dict[str, str] = {}
+            with self.problems.noting():
+                not_kept = read_not_kept(texts)
+            self._index(texts, story)
+            told = entry_names(story.attempts)
+            for entry, finished in told.items():
+                if entry in not_kept:
+                    what = f"its samples are not kept: {not_kept[entry]}; their digests are"
+                    self.remarks.add(f"/{entry}", what)
+                    self._without_samples(run, entry, finished)
+                else:
+                    self._trial(file, entry, entry, finished)
+            for name in guarded.names(file):
+                if name not in told and name != "run":
+                    known = ENTRY.fullmatch(name) is not None
+                    note = self.problems if known else self.remarks
+                    what = "is there, and no line of the journal says that it finished"
+                    note.add(f"/{name}", what if known else "is nothing that the format knows")
+        self._agreement(run, story, "/run/provenance", "/run/journal", "/run/plan")
+        self._outcome(run, story)
+
+    def _texts(self, file: h5py.File, texts: SealedTexts) -> None:
+        """Every text of the run against the seal."""
+        if texts.seal is None:
+            return  # which was found when the run was opened
+        bound = texts.seal.texts.keys()
+        for place in sorted(_REQUIRED - bound):
+            self.problems.add(f"/run/{place}", "is missing from the seal")
+        for place in bound:
+            with self.problems.noting():
+                if place in _NUMBERS:
+                    texts.integer(place)
+                else:
+                    texts.text(place)
+            self.datasets += 1
+        for place in sorted(set(_places(file, "run")) - bound - OUTSIDE):
+            self.remarks.add(f"/run/{place}", "is nothing that the format knows")
+
+    def _index(self, texts: SealedTexts, story: Lines) -> None:
+        """The index has the records that the journal names, and no others."""
+        with self.problems.noting():
+            lines = {text_digest(line) for line in texts.text("index/data").splitlines()}
+            told = {finished.record for finished in story.attempts}
+            if lines != told:
+                count = len(lines ^ told)
+                self.problems.add("/run/index", f"differs from the journal in {count} records")
+
+    def _hash(self) -> None:
+        try:
+            with guarded.open_file(self.path) as file, guarded.guarded(self.path):
+                digest, place = guarded.digest_at(file, f"run/{_HASH}")
+        except ArchiveError:
+            if not self.problems.found:
+                self.problems.add("", UNREADABLE_HASH)
+            return
+        same = sha256_of(self.path, place, self.progress) == digest
+        if not same and not self.problems.found:
+            self.problems.add("", STRUCTURE)
+
+    def _trial_file(self, entry: str, finished: TrialFinished) -> None:
+        path = self.path / finished.file
+        inner = _Check(path, self.progress)
+        with inner.problems.noting(), guarded.open_file(path) as file:
+            inner._trial(file, entry_name(finished.trial), entry, finished)
+        self.trials |= inner.trials
+        self.datasets += inner.datasets
+        if entry not in self.trials:
+            self.unreadable.add(entry)
+        for damage in inner.problems.found:
+            self.problems.add(f"{path.name}{damage.place}", damage.reason)
+        for damage in inner.remarks.found:
+            self.remarks.add(f"{path.name}{damage.place}", damage.reason)
+        same = path.is_file() and sha256_of(path, progress=self.progress) == finished.sha256
+        if not same and not inner.problems.found:
+            self.problems.add(finished.file, UNFINISHED)
+
+    def _trial(self, file: h5py.File, name: str, entry: str, finished: TrialFinished) -> None:
+        """What a trial says of itself, and that its samples are those that were recorded."""
+        self.unreadable.add(entry)
+        with self.problems.noting(), guarded.guarded(self.path, f"/{name}"):
+            group = guarded.group_at(file, name, "NXentry")
+            record, trees = read_entry(self.path, file, name, finished.record)
+            self._record(f"/{name}", entry, record, trees)
+            self._says(group, f"/{name}", record)
+            for place in self._members(group, f"/{name}", record):
+                with self.problems.noting(), guarded.guarded(self.path, place):
+                    guarded.check_dataset(file[place.rpartition("/")[0]], place.rpartition("/")[2])
+                    self.datasets += 1
+            self._series(group, f"/{name}", record)
+
+    def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
+        """A trial that has no group: what the index says of it was read when the run was opened."""
+        attempts = run.earlier_attempts.get(finished.trial, ())
+        for archived in (*run.trials, *attempts):
+            if archived.entry == entry:
+                fingerprint = archived.trial.fingerprint
+                self.trials[entry] = Executed.of(entry, f"/{entry}", archived, fingerprint)
+
+    def _record(self, place: str, entry: str, record: TrialRecord, trees: Trees) -> None:
+        if record.fingerprint_of(trees) != record.fingerprint:
+            self.problems.add(f"{place}/record", "does not match its fingerprint")
+        self.trials[entry] = Executed(
+            entry=entry,
+            place=place,
+            number=record.number,
+            test=str(record.trial["test"]),
+            kind=str(record.trial["kind"]),
+            role=str(record.trial.get("role", "measurement")),
+            fingerprint=record.fingerprint,
+            outcome=record.outcome,
+            reason=record.reason,
+            safe_state=record.safe_state,
+        )
+        self.unreadable.discard(entry)
+
+    def _says(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+        """What viewers show beside the record is what the record says."""
+        says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
+        for name, wanted in says.items():
+            with self.problems.noting():
+                if guarded.text_at(group, name) != hdf5.storable(wanted):
+                    self.problems.add(f"{place}/{name}", "is not what the record says")
+
+    def _members(self, group: h5py.Group, place: str, record: TrialRecord) -> Iterator[str]:
+        """What else of an entry has checksums of its own; what is missing or unknown is told."""
+        wanted = set(_TEXTS)
+        if record.samples is not None and "not_kept" not in group:
+            wanted.add("data")
+        if record.preview is not None:
+            wanted.add("preview")
+        described = nexus.follows_definition(record.series) and "not_kept" not in group
+        if described and not self.path.name.startswith("trial-"):
+            wanted |= set(nexus.MEMBERS)
+        there = set(guarded.names(group))
+        for name in sorted(wanted - there):
+            self.problems.add(f"{place}/{name}", "is missing")
+        for name in sorted(there - wanted - {"not_kept"}):
+            self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
+        yield f"{place}/trees"
+        if "definition" in there & wanted:
+            yield f"{place}/definition"
+            yield from (f"{place}/{inner}" for inner in _places(group, "instrument", "instrument/"))
+
+    def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+        if "not_kept" in group:
+            return
+        told = {channel.name: channel for channel in record.channels}
+        wanted: dict[str, set[str]] = {}
+        for inner, name, length, digest in series_of(record):
+            wanted.setdefault(inner, {"title"}).add(name)
+            where = f"{place}/{inner}/{name}"
+            with self.problems.noting(), guarded.guarded(self.path, where):
+                data = guarded.group_at(group, inner, "NXdata")
+                self.progress(guarded.check_series(data, name, length, digest))
+                self.datasets += 1
+                if name in told:
+                    check_unit(data, told[name])
+                    label = guarded.attribute(guarded.samples_at(data, name), "long_name")
+                    if label != told[name].info.long_name:
+                        self.problems.add(f"{where}@long_name", "is not what was recorded")
+        for inner, names in wanted.items():
+            with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
+                data = guarded.group_at(group, inner, "NXdata")
+                for name in sorted(set(guarded.names(data)) - names):
+                    self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
+                shown = guarded.attribute(data, "signal")
+                if shown not in names:
+                    self.problems.add(f"{place}/{inner}@signal", "names no channel that is there")
+
+    def _agreement(
+        self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str
+    ) -> None:
+        """Whether the parts of the run agree; what cannot be read is told of once."""
+        known = {damage.place for damage in self.problems.found}
+        for damage in run.damaged:
+            if damage.place not in known:
+                self.problems.found.append(damage)
+        broken = {damage.place.split(":")[0] for damage in self.problems.found}
+        if not any(place.startswith(journal) for place in broken) or story.damaged:
+            consistency.check_journal(story, run.header, journal, self.problems)
+            consistency.check_trials(story, self.trials, self.unreadable, self.problems)
+        if not any(place.startswith(plan) for place in broken):
+            executed = self.trials.values()
+            consistency.check_plan(run.plan, run.header, executed, plan, self.problems)
+            with self.problems.noting():
+                consistency.check_full_plan(
+                    run.full_plan, run.plan, f"{plan} in full", self.problems
+                )
+        if not any(place.startswith(header_place) for place in broken):
+            consistency.check_protocol(run.header, header_place, self.problems)
+
+    def _outcome(self, run: RunReader, story: Lines) -> None:
+        """The end of a sealed run is the one of its journal."""
+        ended = story.ended
+        if ended is None:
+            if story.entries:
+                self.problems.add("/run/journal", "does not tell of the end of the run")
+            return
+        for what in ("status", "reason", "safe_state"):
+            mine, theirs = str(getattr(run, what)), str(getattr(ended, what))
+            if mine != theirs:
+                told = f"is {mine!r}, and the journal says {theirs!r}"
+                self.problems.add(f"/run/outcome/{what}", told)
+
+
+def _places(parent: h5py.Group, name: str, prefix: str = "") -> Iterator[str]:
+    """Every dataset in a group and the groups in it, by its path in the group."""
+    group = guarded.member(parent, name)
+    if group is None:
+        return
+    for inner in guarded.names(group):
+        if guarded.member(group, inner) is None:
+            yield f"{prefix}{inner}"
+        else:
+            yield from _places(group, inner, f"{prefix}{inner}/")

@@ -1,0 +1,65 @@
+"""The tree of checksums: what binds samples to their channel, a channel to its trial, and a trial
+to its run.
+
+Its leaves are logical: the samples of a series as numbers, in blocks, however HDF5 lays them out.
+A trial's record names every series with its unit and its leaf; the run's seal names the digest of
+every record and of every text. So whoever has the digest of the seal has the whole run, and nothing
+in it can change places. `docs/archive-format.md` defines each digest for other programs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+BLOCK = 32_768
+"""Samples of a block."""
+
+
+def text_digest(text: str) -> str:
+    """Of a text: SHA-256 of its UTF-8 bytes, hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class SeriesDigest:
+    """Of a series: SHA-256 over the SHA-256 of each of its blocks, in order.
+
+    Blocks hold `BLOCK` samples, but for the last one, as little-endian 64-bit floats.
+    """
+
+    def __init__(self) -> None:
+        self._blocks = hashlib.sha256()
+        self._block = hashlib.sha256()
+        self._filled = 0
+
+    def update(self, samples: Array) -> None:
+        """Add samples, shape (n,)."""
+        start = 0
+        while start < len(samples):
+            part = samples[start : start + BLOCK - self._filled]
+            self._block.update(np.ascontiguousarray(part, dtype="<f8").data)
+            self._filled += len(part)
+            start += len(part)
+            if self._filled == BLOCK:
+                self._end_block()
+
+    def hexdigest(self) -> str:
+        """Of all samples so far. Nothing may be added afterwards."""
+        if self._filled:
+            self._end_block()
+        return self._blocks.hexdigest()
+
+    def _end_block(self) -> None:
+        self._blocks.update(self._block.digest())
+        self._block, self._filled = hashlib.sha256(), 0
+
+
+def series_digest(samples: Array) -> str:
+    """Of a whole series, shape (n,)."""
+    digest = SeriesDigest()
+    digest.update(samples)
+    return digest.hexdigest()

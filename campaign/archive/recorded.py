@@ -1,0 +1,165 @@
+"""The samples of a trial, held against its record when they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from campaign.archive import guarded
+from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.record import SeriesRecord, Trees, TrialRecord
+from campaign.archive.run_folder import first_line
+from campaign.errors import ArchiveError
+from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording
+
+PLOTTED = ("data", "preview")
+"""The groups of an entry that hold samples."""
+
+
+@dataclass(frozen=True)
+class RecordedSamples:
+    """What a trial recorded: the group `entry` of a file, and the record that vouches for it.
+
+    Attributes:
+        not_kept: why the samples are not there, and were not lost; empty when they are.
+    """
+
+    path: Path
+    entry: str
+    record: TrialRecord = field(repr=False)
+    not_kept: str = ""
+
+    def recording(self, ending: Ending) -> Recording:
+        """Events and times, and each channel when it is asked for."""
+        events = tuple(Event(event.time, event.text) for event in self.record.events)
+        if self.record.samples is None:
+            return Recording(np.empty(0), {}, events, ending)
+        if self.not_kept:
+            raise ArchiveError(
+                f"{self.path}: /{self.entry}: its samples were not kept: {self.not_kept}"
+            )
+        return Recording(self._time(), _Channels(self), events, ending)
+
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        return self.record.series
+
+    def channel(self, told: SeriesRecord) -> Channel:
+        """One channel, read now. Raises ArchiveError."""
+        with guarded.open_file(self.path) as file, guarded.guarded(self.path, f"/{self.entry}"):
+            data = _data(file, self.entry)
+            length = self.record.samples or 0
+            samples = guarded.read_series(data, told.name, length, told.sha256)
+            check_unit(data, told)
+        return told.info.with_samples(samples)
+
+    def problems(self) -> Iterator[str]:
+        if self.record.samples is None or self.not_kept:
+            return
+        try:
+            with guarded.open_file(self.path) as file:
+                yield from _problems(self.path, file, self.entry, self.record)
+        except ArchiveError as error:
+            yield str(error)
+
+    def _time(self) -> Array:
+        with guarded.open_file(self.path) as file, guarded.guarded(self.path, f"/{self.entry}"):
+            data, length = _data(file, self.entry), self.record.samples or 0
+            return guarded.read_series(data, "time", length, self.record.time)
+
+
+class _Channels(Mapping[str, Channel]):
+    """Channels by name; the samples of each are read once, when it is first asked for."""
+
+    def __init__(self, samples: RecordedSamples) -> None:
+        self._samples = samples
+        self._told = {channel.name: channel for channel in samples.record.channels}
+        self._read: dict[str, Channel] = {}
+
+    def __getitem__(self, name: str) -> Channel:
+        if name not in self._read:
+            self._read[name] = self._samples.channel(self._told[name])
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._told
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._told)
+
+    def __len__(self) -> int:
+        return len(self._told)
+
+
+def archived_trial(
+    path: Path, entry: str, record: TrialRecord, trees: Trees, not_kept: str = ""
+) -> ArchivedTrial:
+    """The trial of a record. Raises ArchiveError when it cannot be restored."""
+    try:
+        trial = record.restored(trees)
+    except LookupError:
+        raise ArchiveError(f"{path}: /{entry}: its bench or its options cannot be read") from None
+    except ValueError as error:
+        raise ArchiveError(f"{path}: /{entry}: {first_line(error)}") from None
+    return ArchivedTrial(
+        trial=trial,
+        ending=record.ending,
+        started=record.started,
+        ended=record.ended,
+        path=path,
+        entry=entry,
+        samples=RecordedSamples(path, entry, record, not_kept),
+        windows=record.windows,
+        estimates=record.estimates,
+    )
+
+
+def parse_record(path: Path, place: str, text: str) -> TrialRecord:
+    """A record from its text. Raises ArchiveError."""
+    try:
+        return TrialRecord.model_validate_json(text)
+    except ValueError as error:
+        raise ArchiveError(f"{path}: {place}: {first_line(error)}") from None
+
+
+def check_unit(data: h5py.Group, told: SeriesRecord) -> None:
+    """ArchiveError unless a channel's dataset has the unit in which it was recorded."""
+    unit = guarded.attribute(guarded.samples_at(data, told.name), "units")
+    if unit != told.unit:
+        place = f"{data.file.filename}: {data.name}/{told.name}@units"
+        raise ArchiveError(f"{place}: is {unit!r}, and {told.unit!r} was recorded")
+
+
+def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
+    """Every series that an entry holds: its group, its name, its length, its digest."""
+    if record.samples is not None:
+        yield "data", "time", record.samples, record.time
+        for channel in record.channels:
+            yield "data", channel.name, record.samples, channel.sha256
+    if (preview := record.preview) is not None:
+        yield "preview", "time", preview.samples, preview.time
+        yield "preview", preview.channel, preview.samples, preview.values
+
+
+def _problems(path: Path, file: h5py.File, entry_name: str, record: TrialRecord) -> Iterator[str]:
+    units = {channel.name: channel for channel in record.channels}
+    for group, name, length, digest in series_of(record):
+        try:
+            with guarded.guarded(path, f"/{entry_name}/{group}/{name}"):
+                data = guarded.group_at(_entry(file, entry_name), group, "NXdata")
+                guarded.check_series(data, name, length, digest)
+                if name in units:
+                    check_unit(data, units[name])
+        except ArchiveError as error:
+            yield str(error)
+
+
+def _entry(file: h5py.File, name: str) -> h5py.Group:
+    return guarded.group_at(file, name, "NXentry")
+
+
+def _data(file: h5py.File, entry: str) -> h5py.Group:
+    return guarded.group_at(_entry(file, entry), "data", "NXdata")

@@ -1,0 +1,233 @@
+"""Reading a sealed run of format 3: from its index, without opening a trial."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+
+from campaign.archive import guarded
+from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.checksums import text_digest
+from campaign.archive.damage import DamageList
+from campaign.archive.entries import ENTRY, entry_names, file_name
+from campaign.archive.full_plan import FullPlan
+from campaign.archive.header import RunHeader, RunStatus
+from campaign.archive.journal import RunStarted, TrialFinished
+from campaign.archive.provenance import read_provenance
+from campaign.archive.record import Trees, TrialRecord, parse_trees
+from campaign.archive.recorded import archived_trial, parse_record
+from campaign.archive.run_folder import parse_plan
+from campaign.archive.run_reader import Glance, RunReader
+from campaign.archive.seal import SealedTexts
+from campaign.archive.story import Lines, read_lines
+from campaign.errors import ArchiveError
+from campaign.trial import SafeState, Tree
+
+NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
+"""The texts of `/run` that are notes, but for the sources."""
+
+
+def read_sealed(path: Path) -> RunReader:
+    """A sealed file of format 3, whatever its name; samples are held against it when read."""
+    damaged = DamageList(path)
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        header = _header(texts, damaged)
+        if texts.seal is not None and texts.seal.run != header.name:
+            damaged.add("/run/seal", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
+        story = read_lines(damaged.read(lambda: texts.text("journal/data"), "").encode())
+        note_journal(story, damaged)
+        trials, earlier = _Trials.read(path, file, texts, damaged).archived(story, damaged)
+        return RunReader(
+            path=path,
+            header=header,
+            status=RunStatus(texts.text("outcome/status")),
+            reason=texts.text("outcome/reason"),
+            safe_state=SafeState(texts.text("outcome/safe_state")),
+            ended=damaged.read(lambda: texts.text("end_time"), ""),
+            plan=damaged.read(lambda: parse_plan(path, texts.text("plan/data")), ()),
+            trials=trials,
+            journal=story.text,
+            full_plan=FullPlan(path, lambda: _plan_texts(path)),
+            damaged=tuple(damaged.found),
+            earlier_attempts=earlier,
+            root=texts.root,
+        )
+
+
+def read_glance(path: Path) -> Glance:
+    """What a listing tells of it."""
+    damaged = DamageList(path)
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        return Glance(
+            header=_header(texts, damaged),
+            status=RunStatus(texts.text("outcome/status")),
+            ended=texts.text("end_time"),
+            finished=texts.integer("outcome/trials_finished"),
+            failed=texts.integer("outcome/trials_failed"),
+        )
+
+
+def _header(texts: SealedTexts, damaged: DamageList) -> RunHeader:
+    names = texts.names("provenance")
+    sources = dict(_sources(texts, damaged))
+    return read_provenance(names, lambda name: texts.text(f"provenance/{name}"), sources, damaged)
+
+
+def _plan_texts(path: Path) -> tuple[str, str]:
+    damaged = DamageList(path)
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        return texts.text("plan_trials/data"), texts.text("trees/data")
+
+
+def note_journal(story: Lines, damaged: DamageList) -> None:
+    """What of a sealed journal cannot be understood."""
+    for number in story.damaged:
+        damaged.add(f"/run/journal:{number}", "is not a line of a journal")
+    if story.torn or not story.all(RunStarted):
+        damaged.add("/run/journal", "is not a whole journal")
+
+
+def _sources(texts: SealedTexts, damaged: DamageList) -> Iterator[tuple[str, str]]:
+    for name in texts.notes("source_"):
+        with damaged.noting():
+            yield texts.text(f"{name}/file_name"), texts.text(f"{name}/data")
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Where the records of a sealed run are looked for.
+
+    The journal has the digest of every record, so one that matches is good wherever it stands: in
+    the index, or again in the trial's own group should the index be damaged.
+
+    Attributes:
+        groups: names of what the file holds.
+        lines: of the index, by their digests.
+        whole: whether the index is as it was sealed: then it tells of a trial as the journal does.
+        trees: benches and options that could be read.
+        not_kept: why samples are not there, by entry.
+    """
+
+    path: Path
+    file: h5py.File
+    groups: frozenset[str]
+    lines: Mapping[str, str]
+    whole: bool
+    trees: Trees
+    not_kept: Mapping[str, str]
+
+    @classmethod
+    def read(cls, path: Path, file: h5py.File, texts: SealedTexts, damaged: DamageList) -> _Trials:
+        index, whole = _text_or_rest(texts, "index/data", damaged)
+        trees, _ = _text_or_rest(texts, "trees/data", damaged)
+        lines = {text_digest(line): line for line in index.splitlines()}
+        not_kept: dict[str, str] = {}
+        with damaged.noting(), guarded.guarded(path, "/run/not_kept"):
+            not_kept = read_not_kept(texts)
+        groups = frozenset(guarded.names(file))
+        return cls(path, file, groups, lines, whole, _good_trees(trees), not_kept)
+
+    def archived(
+        self, story: Lines, damaged: DamageList
+    ) -> tuple[tuple[ArchivedTrial, ...], dict[int, tuple[ArchivedTrial, ...]]]:
+        """The trials that count, and the attempts before them by number; the rest is noted."""
+        trials: list[ArchivedTrial] = []
+        earlier: dict[int, list[ArchivedTrial]] = {}
+        for entry, told in entry_names(self._told(story)).items():
+            with damaged.noting(), guarded.guarded(self.path, f"/{entry}"):
+                archived = self._archived(entry, told)
+                if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
+                    earlier.setdefault(told.trial, []).append(archived)
+                else:
+                    trials.append(archived)
+        return tuple(trials), {number: tuple(found) for number, found in earlier.items()}
+
+    def _told(self, story: Lines) -> list[TrialFinished]:
+        """Every finished attempt that the journal tells of; the index makes up for lost lines."""
+        told = {(each.trial, each.attempt): each for each in story.attempts}
+        if self.whole and not story.whole:
+            known = {each.record for each in told.values()}
+            for digest in self.lines.keys() - known:
+                finished = _as_finished(parse_record(self.path, "/run/index", self.lines[digest]))
+                told.setdefault((finished.trial, finished.attempt), finished)
+        return list(told.values())
+
+    def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
+        trees: Trees = self.trees
+        if (line := self.lines.get(told.record)) is not None:
+            record = parse_record(self.path, "/run/index", line)
+        if line is None or not record.tree_names <= trees.keys():
+            record, trees = read_entry(self.path, self.file, entry, told.record)
+        if (record.number, record.attempt) != (told.trial, told.attempt):
+            raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
+        not_kept = self.not_kept.get(entry, "")
+        if entry not in self.groups and not not_kept:
+            raise ArchiveError(f"{self.path}: /{entry}: is missing, and the journal tells of it")
+        return archived_trial(self.path, entry, record, trees, not_kept)
+
+
+def _as_finished(record: TrialRecord) -> TrialFinished:
+    """A line of the journal that was lost, as far as the index has it."""
+    return TrialFinished(
+        at=record.ended,
+        trial=record.number,
+        attempt=record.attempt,
+        file=file_name(record.number, record.attempt),
+        sha256="0" * 64,
+        record=record.sha256,
+        bytes=0,
+        outcome=record.outcome,
+        reason=record.reason,
+        safe_state=record.safe_state,
+    )
+
+
+def read_entry(
+    path: Path, file: h5py.File, name: str, digest: str | None = None
+) -> tuple[TrialRecord, Trees]:
+    """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
+    with guarded.guarded(path, f"/{name}"):
+        entry = guarded.group_at(file, name, "NXentry")
+        record = parse_record(path, f"/{name}/record", guarded.text_at(entry, "record", digest))
+        try:
+            return record, parse_trees(guarded.text_at(entry, "trees"))
+        except ValueError as error:
+            raise ArchiveError(f"{path}: /{name}/trees: {error}") from None
+
+
+def read_not_kept(texts: SealedTexts) -> dict[str, str]:
+    """Why samples are not there, by entry; nothing where all are."""
+    if "not_kept" not in texts.notes("not_kept"):
+        return {}
+    tree = json.loads(texts.text("not_kept/data"))
+    return {str(entry): str(reason) for entry, reason in tree.items()}
+
+
+def _good_trees(text: str) -> Trees:
+    """The trees whose lines are good; a damaged one is missed by the trials that need it."""
+    trees: dict[str, Tree] = {}
+    for line in text.splitlines():
+        try:
+            trees |= parse_trees(line)
+        except ValueError:
+            continue
+    return trees
+
+
+def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[str, bool]:
+    """A text and whether it is as it was sealed; where it is not, that is noted."""
+    try:
+        return texts.text(place), True
+    except ArchiveError as error:
+        damaged.note(error)
+    try:
+        return texts.unchecked(place), False
+    except ArchiveError:
+        return "", False
