@@ -47,7 +47,7 @@ _REQUIRED = frozenset(
     ]
 ) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
 _OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}
-_TEXTS = frozenset(("title", "start_time", "end_time", "record", "trees"))
+_MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
 
 
 def verify(path: Path, progress: Progress) -> Verification:
@@ -236,26 +236,29 @@ class _Check:
 
     def _members(self, group: h5py.Group, place: str, record: TrialRecord) -> Iterator[str]:
         """What else of an entry has checksums of its own; what is missing or unknown is told."""
-        wanted = set(_TEXTS)
-        if record.samples is not None and "not_kept" not in group:
+        wanted = set(_MEMBERS)
+        kept = "not_kept" not in group["record"]
+        if record.samples is not None and kept:
             wanted.add("data")
         if record.preview is not None:
             wanted.add("preview")
-        described = nexus.follows_definition(record.series) and "not_kept" not in group
+        described = nexus.follows_definition(record.series) and kept
         if described and not self.path.name.startswith("trial-"):
             wanted |= set(nexus.MEMBERS)
         there = set(guarded.names(group))
         for name in sorted(wanted - there):
             self.problems.add(f"{place}/{name}", "is missing")
-        for name in sorted(there - wanted - {"not_kept"}):
+        for name in sorted(there - wanted):
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
-        yield f"{place}/trees"
+        for name in sorted(set(guarded.names(group["record"])) - {"json", "trees", "not_kept"}):
+            self.remarks.add(f"{place}/record/{name}", "is nothing that the format knows")
+        yield f"{place}/record/trees"
         if "definition" in there & wanted:
             yield f"{place}/definition"
             yield from (f"{place}/{inner}" for inner in _places(group, "instrument", "instrument/"))
 
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
-        if "not_kept" in group:
+        if "not_kept" in group["record"]:
             return
         told = {channel.name: channel for channel in record.channels}
         wanted: dict[str, set[str]] = {}

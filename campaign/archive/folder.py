@@ -68,9 +68,8 @@ def read_trial_file(path: Path, finished: TrialFinished) -> ArchivedTrial:
     name = entry_name(finished.trial)
     with guarded.open_file(path) as file, guarded.guarded(path, f"/{name}"):
         record, trees = read_entry(path, file, name, finished.record)
-        entry = guarded.member(file, name)
-        there = entry is not None and "not_kept" in entry
-        not_kept = guarded.text_at(entry, "not_kept") if there else ""
+        kept = guarded.group_at(guarded.group_at(file, name, "NXentry"), "record", "NXcollection")
+        not_kept = guarded.text_at(kept, "not_kept") if "not_kept" in kept else ""
         return archived_trial(path, name, record, trees, not_kept)
 
 

@@ -186,6 +186,9 @@ def copy_entry_back(
     for member in members:
         h5o.copy(source[name].id, member.encode(), entry.id, member.encode())
     for data in _plotted(entry):
+        if "title" in data:  # a second name, of which copying made a second text
+            del data["title"]
+            link(entry, "title", data, "title")
         for item in data.values():
             for attribute in _SCALES:
                 if h5a.exists(item.id, attribute):

@@ -30,7 +30,7 @@ from campaign.channels import (
 from campaign.trial import ChannelInfo, Tree
 
 DEFINITION = "NXfriction_trial"
-VERSION = "1.0"
+VERSION = "2.0"
 
 REQUIRED = (COMMAND, GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE, MOTOR_CURRENT, DRIVE_TORQUE)
 """The channels without which an entry does not follow the definition."""

@@ -20,7 +20,7 @@ from campaign.archive.run_folder import first_line
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
 
-SEAL = "seal"
+SEAL = "outcome/seal"
 
 OUTSIDE = frozenset({SEAL, "outcome/file_sha256", "not_kept/type", "not_kept/file_name"}) | {
     "not_kept/data"
@@ -59,7 +59,7 @@ class SealedTexts:
         self._run = _group(file, "run")
         self.root, self.seal = "", None
         with damaged.noting(), guarded.guarded(path, f"/run/{SEAL}"):
-            text = guarded.text_at(self._run, SEAL)
+            text = guarded.text_at(*self._parent(SEAL))
             try:
                 self.seal = Seal.model_validate_json(text)
             except ValidationError as error:

@@ -22,7 +22,7 @@ from campaign.archive.record import Trees, TrialRecord, parse_trees
 from campaign.archive.recorded import archived_trial, parse_record
 from campaign.archive.run_folder import parse_plan
 from campaign.archive.run_reader import Glance, RunReader
-from campaign.archive.seal import SealedTexts
+from campaign.archive.seal import SEAL, SealedTexts
 from campaign.archive.story import Lines, read_lines
 from campaign.errors import ArchiveError
 from campaign.trial import SafeState, Tree
@@ -38,7 +38,7 @@ def read_sealed(path: Path) -> RunReader:
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
         if texts.seal is not None and texts.seal.run != header.name:
-            damaged.add("/run/seal", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
+            damaged.add(f"/run/{SEAL}", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
         story = read_lines(damaged.read(lambda: texts.text("journal/data"), "").encode())
         note_journal(story, damaged)
         trials, earlier = _Trials.read(path, file, texts, damaged).archived(story, damaged)
@@ -195,11 +195,12 @@ def read_entry(
     """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
     with guarded.guarded(path, f"/{name}"):
         entry = guarded.group_at(file, name, "NXentry")
-        record = parse_record(path, f"/{name}/record", guarded.text_at(entry, "record", digest))
+        kept = guarded.group_at(entry, "record", "NXcollection")
+        record = parse_record(path, f"/{name}/record", guarded.text_at(kept, "json", digest))
         try:
-            return record, parse_trees(guarded.text_at(entry, "trees"))
+            return record, parse_trees(guarded.text_at(kept, "trees"))
         except ValueError as error:
-            raise ArchiveError(f"{path}: /{name}/trees: {error}") from None
+            raise ArchiveError(f"{path}: /{name}/record/trees: {error}") from None
 
 
 def read_not_kept(texts: SealedTexts) -> dict[str, str]:

@@ -19,6 +19,7 @@ from campaign.archive.record import TrialRecord, parse_trees, trees_text
 from campaign.archive.recorded import check_unit, parse_record, series_of
 from campaign.archive.run_folder import PLAN, parse_plan, read_optional, read_plan_text
 from campaign.archive.seal import SEAL, SealedTexts, seal_text
+from campaign.archive.sealed import read_entry
 from campaign.archive.trial_file import write_root
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, Tree, canonical_json
@@ -59,8 +60,10 @@ class SealedFile:
         if sha256_of(path) != finished.sha256:
             raise ArchiveError(f"{path}: is not what the journal says was written")
         with guarded.open_file(path) as source:
-            own = guarded.group_at(source, name, "NXentry")
-            line = guarded.text_at(own, "record", finished.record)
+            own = guarded.group_at(
+                guarded.group_at(source, name, "NXentry"), "record", "NXcollection"
+            )
+            line = guarded.text_at(own, "json", finished.record)
             record = parse_record(path, f"/{name}/record", line)
             trees = parse_trees(guarded.text_at(own, "trees"))
             if "not_kept" in own:
@@ -88,7 +91,7 @@ class SealedFile:
                 not_kept = canonical_json(self._not_kept)
                 for name, text in _note("application/json", "not-kept.json", not_kept).items():
                     _put(run, f"not_kept/{name}", text, header)
-            hdf5.put_text(run, SEAL, seal_text(header.name, texts))
+            _put(run, SEAL, seal_text(header.name, texts), header)
             write_root(file, header.created, _shown(file, folder, story))
             self._hash_place = hdf5.blank_digest(run["outcome"], "file_sha256")
 
@@ -150,9 +153,7 @@ def check_sealed(part: Path, file: SealedFile) -> None:
             texts.integer(place)
         for entry, finished in file.copied.items():
             if entry in opened:
-                guarded.text_at(
-                    guarded.group_at(opened, entry, "NXentry"), "record", finished.record
-                )
+                read_entry(part, opened, entry, finished.record)
         for place, layout in file.layouts.items():
             entry, group, name = place.split("/")
             data = guarded.group_at(opened[entry], group, "NXdata")

@@ -138,7 +138,7 @@ class TrialFile:
                 windows=windows,
                 estimates=estimates,
             )
-            write_record(self._entry, record, record.text, trees)
+            write_record(self._entry, record, record.text, trees, self._not_kept)
             write_root(self._file, started, self._entry)
             self._file.close()
             digest, size = sha256_of(self._part), self._part.stat().st_size
@@ -163,7 +163,6 @@ class TrialFile:
         told = zip(self._channels, digests, strict=True)
         series = self._columns.length, time, [SeriesRecord.of(*both) for both in told]
         if self._not_kept:
-            hdf5.put_text(self._entry, "not_kept", self._not_kept)
             return series, None
         long = self._columns.length > PREVIEW_POINTS
         hdf5.put_attribute(self._entry, "default", "preview" if long else "data")
@@ -194,12 +193,17 @@ class TrialFile:
             ) from None
 
 
-def write_record(entry: h5py.Group, record: TrialRecord, text: str, trees: Trees) -> None:
-    """The record of a trial, as text, and the trees that it names."""
+def write_record(
+    entry: h5py.Group, record: TrialRecord, text: str, trees: Trees, not_kept: str = ""
+) -> None:
+    """The record of a trial, as text, the trees that it names, and why samples are not there."""
     hdf5.put_text(entry, "start_time", record.started)
     hdf5.put_text(entry, "end_time", record.ended)
-    hdf5.put_text(entry, "record", text)
-    hdf5.put_text(entry, "trees", trees_text(trees))
+    kept = hdf5.make_group(entry, "record", "NXcollection")
+    hdf5.put_text(kept, "json", text)
+    hdf5.put_text(kept, "trees", trees_text(trees))
+    if not_kept:
+        hdf5.put_text(kept, "not_kept", not_kept)
 
 
 def write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:

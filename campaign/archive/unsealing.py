@@ -31,7 +31,7 @@ from campaign.archive.trial_file import write_record, write_root
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
 
-_MEMBERS = ("title", "start_time", "end_time", "record", "trees", "data", "preview")
+_MEMBERS = ("title", "start_time", "end_time", "record", "data", "preview")
 """What a trial's own file has; the rest is made anew when the run is sealed."""
 
 
@@ -123,8 +123,7 @@ def _write_record(
     record = TrialRecord.model_validate_json(line)
     entry = hdf5.make_group(target, entry_name(finished.trial), "NXentry")
     hdf5.put_text(entry, "title", record.label)
-    hdf5.put_text(entry, "not_kept", not_kept)
-    write_record(entry, record, line, {name: trees[name] for name in record.tree_names})
+    write_record(entry, record, line, {name: trees[name] for name in record.tree_names}, not_kept)
 
 
 def _publish(folder: Path, finished: TrialFinished) -> TrialFinished:
