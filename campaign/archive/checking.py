@@ -26,6 +26,7 @@ from campaign.archive.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.run_reader import RunReader
 from campaign.archive.seal import OUTSIDE, SealedTexts
 from campaign.archive.sealed import NOTES, read_entry, read_not_kept, read_sealed
+from campaign.archive.series import series_at
 from campaign.archive.story import Lines, read_lines
 from campaign.archive.verification import (
     STRUCTURE,
@@ -266,12 +267,13 @@ class _Check:
             wanted.setdefault(inner, {"title"}).add(name)
             where = f"{place}/{inner}/{name}"
             with self.problems.noting(), guarded.guarded(self.path, where):
-                data = guarded.group_at(group, inner, "NXdata")
-                self.progress(guarded.check_series(data, name, length, digest))
+                series = series_at(guarded.inner_group(group, inner), name, length)
+                series.check(digest)
+                self.progress(series.stored)
                 self.datasets += 1
                 if name in told:
-                    check_unit(data, told[name])
-                    label = guarded.attribute(guarded.samples_at(data, name), "long_name")
+                    check_unit(series, told[name])
+                    label = guarded.attribute(h5py.Dataset(series.dataset), "long_name")
                     if label != told[name].info.long_name:
                         self.problems.add(f"{where}@long_name", "is not what was recorded")
         for inner, names in wanted.items():

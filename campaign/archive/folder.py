@@ -37,7 +37,7 @@ def open_folder(folder: Path) -> RunReader:
     earlier: dict[int, list[ArchivedTrial]] = {}
     for entry, finished in entry_names(story.attempts).items():
         with damaged.noting():
-            archived = _read_trial(folder / finished.file, finished, old)
+            archived = _read_trial(folder / finished.file, finished, entry, old)
             if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
                 earlier.setdefault(finished.trial, []).append(archived)
             else:
@@ -59,8 +59,11 @@ def open_folder(folder: Path) -> RunReader:
     )
 
 
-def read_trial_file(path: Path, finished: TrialFinished) -> ArchivedTrial:
-    """The trial in a file of its own, which must be the one that the journal tells of."""
+def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") -> ArchivedTrial:
+    """The trial in a file of its own, which must be the one that the journal tells of.
+
+    `sealed_as` is the group that it becomes when the run is sealed.
+    """
     from campaign.archive import guarded
     from campaign.archive.recorded import archived_trial
     from campaign.archive.sealed import read_entry
@@ -68,14 +71,14 @@ def read_trial_file(path: Path, finished: TrialFinished) -> ArchivedTrial:
     name = entry_name(finished.trial)
     with guarded.open_file(path) as file, guarded.guarded(path, f"/{name}"):
         record, trees = read_entry(path, file, name, finished.record)
-        kept = guarded.group_at(guarded.group_at(file, name, "NXentry"), "record", "NXcollection")
+        kept = guarded.inner_group(guarded.inner_group(file, name), "record")
         not_kept = guarded.text_at(kept, "not_kept") if "not_kept" in kept else ""
-        return archived_trial(path, name, record, trees, not_kept)
+        return archived_trial(path, name, record, trees, not_kept, sealed_as)
 
 
-def _read_trial(path: Path, finished: TrialFinished, old: bool) -> ArchivedTrial:
+def _read_trial(path: Path, finished: TrialFinished, entry: str, old: bool) -> ArchivedTrial:
     if not old:
-        return read_trial_file(path, finished)
+        return read_trial_file(path, finished, entry)
     from campaign.archive.format_2.trials import read_trial_file as read_old_trial_file
 
     return read_old_trial_file(path, finished.trial)

@@ -6,44 +6,34 @@ under the SHA-256 of their canonical JSON, and the trials (`plan-trials.jsonl`) 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from campaign.archive.files import write_lines_atomically
+from campaign.archive.record import SHARED, parse_trees, shared_trees, trees_text
 from campaign.archive.run_folder import first_line
 from campaign.errors import ArchiveError
-from campaign.trial import Trial, canonical_json
+from campaign.trial import Tree, Trial, canonical_json
 
 PLAN_TRIALS = "plan-trials.jsonl"
 PLAN_TREES = "plan-trees.jsonl"
 
-_SHARED = ("bench", "options")
-
 
 def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:
     """Write both files into a run's folder, line by line."""
-    trees: dict[str, str] = {}
+    trees: dict[str, Tree] = {}
 
     def lines() -> Iterator[str]:
         for trial in trials:
-            described = trial.model_dump(mode="json")
-            for name in _SHARED:
-                text = canonical_json(described[name])
-                digest = hashlib.sha256(text.encode()).hexdigest()
-                trees[digest] = text
-                described[name] = digest
+            described, own = shared_trees(trial)
+            trees.update(own)
             yield canonical_json(described) + "\n"
 
     write_lines_atomically(folder / PLAN_TRIALS, lines())
-    write_lines_atomically(
-        folder / PLAN_TREES,
-        (f'{{"sha256":"{digest}","tree":{text}}}\n' for digest, text in trees.items()),
-    )
+    write_lines_atomically(folder / PLAN_TREES, [trees_text(trees)])
 
 
 @dataclass(frozen=True)
@@ -67,19 +57,11 @@ class FullPlan:
         return self._both[0].splitlines()
 
     @cached_property
-    def _trees(self) -> dict[str, Any]:
-        trees = {}
-        for number, line in enumerate(self._both[1].splitlines(), start=1):
-            try:
-                entry = json.loads(line)
-                digest, tree = entry["sha256"], entry["tree"]
-                found = hashlib.sha256(canonical_json(tree).encode()).hexdigest()
-            except (ValueError, LookupError, TypeError, RecursionError) as error:
-                raise self._damaged(PLAN_TREES, number, first_line(error)) from None
-            if found != digest:
-                raise self._damaged(PLAN_TREES, number, "does not match its hash")
-            trees[digest] = tree
-        return trees
+    def _trees(self) -> dict[str, Tree]:
+        try:
+            return parse_trees(self._both[1])
+        except ValueError as error:
+            raise ArchiveError(f"{self.path}: {PLAN_TREES}: {error}") from None
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -90,7 +72,7 @@ class FullPlan:
             raise ArchiveError(f"{self.path}: the plan has no trial {number}")
         try:
             described = json.loads(self._lines[number - 1])
-            described |= {name: self._trees[described[name]] for name in _SHARED}
+            described |= {name: self._trees[described[name]] for name in SHARED}
             trial = Trial.model_validate_json(canonical_json(described))
         except (ValueError, LookupError, TypeError, RecursionError) as error:
             raise self._damaged(PLAN_TRIALS, number, first_line(error)) from None

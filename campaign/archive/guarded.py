@@ -21,8 +21,6 @@ import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5o, h5s
 from numpy.typing import NDArray
 
-from campaign.archive import hdf5
-from campaign.archive.checksums import SeriesDigest, series_digest
 from campaign.archive.files import why
 from campaign.archive.hdf5 import CHECKSUM, SAMPLE
 from campaign.archive.heaps import heaps_are_sound
@@ -76,7 +74,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     """The group `name`, stored in this very file, of the NeXus class."""
-    group = _own(parent, name)
+    group = own(parent, name)
     if not isinstance(group, h5py.Group):
         raise ArchiveError(f"{_place(parent, name)}: is not a group")
     if attribute(group, "NX_class") != nx_class:
@@ -84,9 +82,17 @@ def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     return group
 
 
+def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
+    """The group `name`, stored in this very file, of whatever class."""
+    group = member(parent, name)
+    if group is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+    return group
+
+
 def member(parent: h5py.Group, name: str) -> h5py.Group | None:
     """The group `name`, of whatever class; None when it is a dataset. No link is followed."""
-    found = _own(parent, name)
+    found = own(parent, name)
     if isinstance(found, h5py.Dataset):
         return None
     if not isinstance(found, h5py.Group):
@@ -139,7 +145,7 @@ def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
     """The file's own hash, and the offset and length of the place where it stands."""
     *groups, name = path.split("/")
     for group in groups:
-        parent = _own(parent, group)
+        parent = own(parent, group)
     dataset = _dataset_at(parent, name)
     offset = dataset.id.get_offset()
     if dataset.shape != () or dataset.dtype != np.dtype("S64") or offset is None:
@@ -200,54 +206,6 @@ def check_samples(dataset: h5py.Dataset) -> None:
     compare(dataset, digest.hexdigest())
 
 
-def blocks(dataset: h5py.Dataset) -> Iterator[Array]:
-    """The samples of `samples_at`, chunk by chunk, unpacked here: HDF5 takes half as long again."""
-    plan = dataset.id.get_create_plist()
-    filters = [plan.get_filter(number)[0] for number in range(plan.get_nfilters())]
-    length, (chunk,) = dataset.id.shape[0], dataset.chunks
-    shuffle, deflate = h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE
-    if filters not in ([shuffle, deflate], [deflate]):
-        raise ArchiveError(f"{_name(dataset)}: is not stored with shuffle and deflate")
-    for start in range(0, length, chunk):
-        skipped, packed = dataset.id.read_direct_chunk((start,))
-        samples = None if skipped else hdf5.unpack(packed, chunk, filters[0] == shuffle)
-        if samples is None:
-            raise ArchiveError(f"{_name(dataset)}: cannot be read: is not packed as it says")
-        yield samples[: length - start]
-
-
-def read_series(parent: h5py.Group, name: str, length: int, digest: str) -> Array:
-    """Samples of which length and digest (`checksums`) are known; shape (length,), float64."""
-    dataset = samples_at(parent, name)
-    if dataset.id.shape[0] != length:
-        told = f"has {dataset.id.shape[0]} samples, and {length} were recorded"
-        raise ArchiveError(f"{_name(dataset)}: {told}")
-    found = list(blocks(dataset))
-    values = found[0] if len(found) == 1 else np.concatenate(found or [np.empty(0)])
-    compare(dataset, series_digest(values), digest)
-    return values
-
-
-def check_series(parent: h5py.Group, name: str, length: int, digest: str) -> int:
-    """`read_series` in flat memory; returns the bytes it has in the file."""
-    dataset = samples_at(parent, name)
-    if dataset.id.shape[0] != length:
-        told = f"has {dataset.id.shape[0]} samples, and {length} were recorded"
-        raise ArchiveError(f"{_name(dataset)}: {told}")
-    found = SeriesDigest()
-    for block in blocks(dataset):
-        found.update(block)
-    compare(dataset, found.hexdigest(), digest)
-    return int(dataset.id.get_storage_size())
-
-
-def layout(parent: h5py.Group, name: str) -> tuple[tuple[int, int], ...]:
-    """Where in the file the chunks of a series lie: offset and bytes of each."""
-    dataset = samples_at(parent, name).id
-    chunks = (dataset.get_chunk_info(number) for number in range(dataset.get_num_chunks()))
-    return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)
-
-
 def attribute(item: h5py.HLObject, name: str) -> str:
     """A text attribute; ArchiveError when there is none."""
     identifier = _attribute(item, name)
@@ -282,7 +240,8 @@ def _attribute(item: h5py.HLObject, name: str) -> h5a.AttrID:
     return identifier
 
 
-def _own(parent: h5py.Group, name: str) -> Any:
+def own(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
+    """What `parent` itself holds under a name; no link is followed."""
     raw = name.encode()
     if "/" in name or name == ".":  # on a path, only the last link would be looked at
         raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
@@ -297,7 +256,7 @@ def _own(parent: h5py.Group, name: str) -> Any:
 
 
 def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
-    dataset = _own(parent, name)
+    dataset = own(parent, name)
     if not isinstance(dataset, h5py.Dataset):
         raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
     plan = dataset.id.get_create_plist()
@@ -323,10 +282,6 @@ def compare(dataset: h5py.Dataset, found: str, digest: str | None = None) -> Non
             f"{dataset.file.filename}: {dataset.name}: does not match its checksum; "
             "it was damaged or changed"
         )
-
-
-def _name(dataset: h5py.Dataset) -> str:
-    return f"{dataset.file.filename}: {dataset.name}"
 
 
 def _place(parent: h5py.Group, name: str) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from campaign.archive.files import PART
+from campaign.archive.files import PART, why
 from campaign.archive.folder import open_folder
+from campaign.archive.header import SEALED
 from campaign.archive.run_folder import check_format
 from campaign.archive.run_reader import Glance, RunReader
 from campaign.errors import ArchiveError
@@ -18,10 +19,24 @@ def open_run(path: Path) -> RunReader:
     when it is no run, or when what it was or how it ended cannot be read.
     """
     if path.is_dir():
-        return open_folder(path)
+        return _open_folder(path)
     if path.suffix == PART:
         raise ArchiveError(f"{path}: was never finished; what was is in the run's folder")
     return read_sealed(path)
+
+
+def _open_folder(folder: Path) -> RunReader:
+    """A folder, or what became of it: it may be sealed while it is read."""
+    sealed = folder.with_suffix(SEALED)
+    try:
+        run = open_folder(folder)
+    except (ArchiveError, OSError) as error:
+        if sealed.is_file():
+            return read_sealed(sealed)
+        if isinstance(error, OSError):
+            raise ArchiveError(f"{folder}: cannot be read: {why(error)}") from None
+        raise
+    return read_sealed(sealed) if run.damaged and sealed.is_file() else run
 
 
 def read_sealed(path: Path) -> RunReader:

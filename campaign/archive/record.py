@@ -184,7 +184,7 @@ def trees_text(trees: Trees) -> str:
 
 
 def parse_trees(text: str) -> dict[str, Tree]:
-    """Trees from JSON lines. Raises ValueError naming the line that does not match its digest."""
+    """Trees from JSON lines, each held against its digest. Raises ValueError naming a bad line."""
     trees = {}
     for number, line in enumerate(text.splitlines(), start=1):
         try:

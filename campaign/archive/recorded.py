@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,8 +12,10 @@ import numpy as np
 
 from campaign.archive import guarded
 from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.header import SEALED
 from campaign.archive.record import SeriesRecord, Trees, TrialRecord
 from campaign.archive.run_folder import first_line
+from campaign.archive.series import Series, series_at
 from campaign.errors import ArchiveError
 from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording
 
@@ -26,12 +29,14 @@ class RecordedSamples:
 
     Attributes:
         not_kept: why the samples are not there, and were not lost; empty when they are.
+        sealed_as: of a trial's own file, the group that it becomes when its run is sealed.
     """
 
     path: Path
     entry: str
     record: TrialRecord = field(repr=False)
     not_kept: str = ""
+    sealed_as: str = ""
 
     def recording(self, ending: Ending) -> Recording:
         """Events and times, and each channel when it is asked for."""
@@ -49,26 +54,39 @@ class RecordedSamples:
 
     def channel(self, told: SeriesRecord) -> Channel:
         """One channel, read now. Raises ArchiveError."""
-        with guarded.open_file(self.path) as file, guarded.guarded(self.path, f"/{self.entry}"):
-            data = _data(file, self.entry)
-            length = self.record.samples or 0
-            samples = guarded.read_series(data, told.name, length, told.sha256)
-            check_unit(data, told)
+        with self._data() as data:
+            series = series_at(data, told.name, self.record.samples or 0)
+            samples = series.read(told.sha256)
+            check_unit(series, told)
         return told.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
         if self.record.samples is None or self.not_kept:
             return
+        path, entry = self._place()
         try:
-            with guarded.open_file(self.path) as file:
-                yield from _problems(self.path, file, self.entry, self.record)
+            with guarded.open_file(path) as file:
+                yield from _problems(path, file, entry, self.record)
         except ArchiveError as error:
             yield str(error)
 
     def _time(self) -> Array:
-        with guarded.open_file(self.path) as file, guarded.guarded(self.path, f"/{self.entry}"):
-            data, length = _data(file, self.entry), self.record.samples or 0
-            return guarded.read_series(data, "time", length, self.record.time)
+        with self._data() as data:
+            return series_at(data, "time", self.record.samples or 0).read(self.record.time)
+
+    @contextmanager
+    def _data(self) -> Iterator[h5py.Group]:
+        path, entry = self._place()
+        with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry}"):
+            yield guarded.inner_group(guarded.inner_group(file, entry), "data")
+
+    def _place(self) -> tuple[Path, str]:
+        """Where the trial lies now: its run may have been sealed since it was opened."""
+        if self.sealed_as and not self.path.exists():
+            sealed = self.path.parent.with_suffix(SEALED)
+            if sealed.is_file():
+                return sealed, self.sealed_as
+        return self.path, self.entry
 
 
 class _Channels(Mapping[str, Channel]):
@@ -95,9 +113,14 @@ class _Channels(Mapping[str, Channel]):
 
 
 def archived_trial(
-    path: Path, entry: str, record: TrialRecord, trees: Trees, not_kept: str = ""
+    path: Path,
+    entry: str,
+    record: TrialRecord,
+    trees: Trees,
+    not_kept: str = "",
+    sealed_as: str = "",
 ) -> ArchivedTrial:
-    """The trial of a record. Raises ArchiveError when it cannot be restored."""
+    """The trial of a record; see `RecordedSamples`. Raises ArchiveError when it is not whole."""
     try:
         trial = record.restored(trees)
     except LookupError:
@@ -111,7 +134,7 @@ def archived_trial(
         ended=record.ended,
         path=path,
         entry=entry,
-        samples=RecordedSamples(path, entry, record, not_kept),
+        samples=RecordedSamples(path, entry, record, not_kept, sealed_as),
         windows=record.windows,
         estimates=record.estimates,
     )
@@ -125,11 +148,11 @@ def parse_record(path: Path, place: str, text: str) -> TrialRecord:
         raise ArchiveError(f"{path}: {place}: {first_line(error)}") from None
 
 
-def check_unit(data: h5py.Group, told: SeriesRecord) -> None:
+def check_unit(series: Series, told: SeriesRecord) -> None:
     """ArchiveError unless a channel's dataset has the unit in which it was recorded."""
-    unit = guarded.attribute(guarded.samples_at(data, told.name), "units")
+    unit = guarded.attribute(h5py.Dataset(series.dataset), "units")
     if unit != told.unit:
-        place = f"{data.file.filename}: {data.name}/{told.name}@units"
+        place = f"{series.place}@units"
         raise ArchiveError(f"{place}: is {unit!r}, and {told.unit!r} was recorded")
 
 
@@ -149,17 +172,10 @@ def _problems(path: Path, file: h5py.File, entry_name: str, record: TrialRecord)
     for group, name, length, digest in series_of(record):
         try:
             with guarded.guarded(path, f"/{entry_name}/{group}/{name}"):
-                data = guarded.group_at(_entry(file, entry_name), group, "NXdata")
-                guarded.check_series(data, name, length, digest)
+                data = guarded.inner_group(guarded.inner_group(file, entry_name), group)
+                series = series_at(data, name, length)
+                series.check(digest)
                 if name in units:
-                    check_unit(data, units[name])
+                    check_unit(series, units[name])
         except ArchiveError as error:
             yield str(error)
-
-
-def _entry(file: h5py.File, name: str) -> h5py.Group:
-    return guarded.group_at(file, name, "NXentry")
-
-
-def _data(file: h5py.File, entry: str) -> h5py.Group:
-    return guarded.group_at(_entry(file, entry), "data", "NXdata")

@@ -56,7 +56,7 @@ class SealedTexts:
 
     def __init__(self, path: Path, file: h5py.File, damaged: DamageList) -> None:
         self._path = path
-        self._run = _group(file, "run")
+        self._run = guarded.inner_group(file, "run")
         self.root, self.seal = "", None
         with damaged.noting(), guarded.guarded(path, f"/run/{SEAL}"):
             text = guarded.text_at(*self._parent(SEAL))
@@ -68,7 +68,7 @@ class SealedTexts:
 
     def names(self, group: str) -> list[str]:
         """What the group at `group` in `/run` holds."""
-        return guarded.names(_group(self._run, group))
+        return guarded.names(guarded.inner_group(self._run, group))
 
     def notes(self, prefix: str) -> list[str]:
         """The groups of `/run` whose names begin with `prefix`."""
@@ -93,7 +93,7 @@ class SealedTexts:
 
     def _parent(self, place: str) -> tuple[h5py.Group, str]:
         group, _, name = place.rpartition("/")
-        return (_group(self._run, group) if group else self._run), name
+        return (guarded.inner_group(self._run, group) if group else self._run), name
 
     def _digest(self, place: str) -> str | None:
         if self.seal is None or place in OUTSIDE:
@@ -101,10 +101,3 @@ class SealedTexts:
         if place not in self.seal.texts:
             raise ArchiveError(f"{self._path}: /run/{place}: was not there when the run was sealed")
         return self.seal.texts[place]
-
-
-def _group(parent: h5py.Group, name: str) -> h5py.Group:
-    group = guarded.member(parent, name)
-    if group is None:
-        raise ArchiveError(f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}: is no group")
-    return group

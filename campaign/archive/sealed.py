@@ -194,11 +194,11 @@ def read_entry(
 ) -> tuple[TrialRecord, Trees]:
     """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
     with guarded.guarded(path, f"/{name}"):
-        entry = guarded.group_at(file, name, "NXentry")
-        kept = guarded.group_at(entry, "record", "NXcollection")
+        entry = guarded.inner_group(file, name)
+        kept = guarded.inner_group(entry, "record")
         record = parse_record(path, f"/{name}/record", guarded.text_at(kept, "json", digest))
         try:
-            return record, parse_trees(guarded.text_at(kept, "trees"))
+            return record, parse_trees(guarded.unchecked_text_at(kept, "trees"))
         except ValueError as error:
             raise ArchiveError(f"{path}: /{name}/record/trees: {error}") from None
 

@@ -16,10 +16,11 @@ from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.header import FORMAT, RunHeader
 from campaign.archive.journal import JOURNAL, RunEnded, Story, TrialFinished
 from campaign.archive.record import TrialRecord, parse_trees, trees_text
-from campaign.archive.recorded import check_unit, parse_record, series_of
+from campaign.archive.recorded import PLOTTED, check_unit, parse_record, series_of
 from campaign.archive.run_folder import PLAN, parse_plan, read_optional, read_plan_text
 from campaign.archive.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.sealed import read_entry
+from campaign.archive.series import series_at
 from campaign.archive.trial_file import write_root
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, Tree, canonical_json
@@ -60,12 +61,10 @@ class SealedFile:
         if sha256_of(path) != finished.sha256:
             raise ArchiveError(f"{path}: is not what the journal says was written")
         with guarded.open_file(path) as source:
-            own = guarded.group_at(
-                guarded.group_at(source, name, "NXentry"), "record", "NXcollection"
-            )
+            own = guarded.inner_group(guarded.inner_group(source, name), "record")
             line = guarded.text_at(own, "json", finished.record)
             record = parse_record(path, f"/{name}/record", line)
-            trees = parse_trees(guarded.text_at(own, "trees"))
+            trees = parse_trees(guarded.unchecked_text_at(own, "trees"))
             if "not_kept" in own:
                 self._not_kept[entry] = guarded.text_at(own, "not_kept")
             else:
@@ -127,13 +126,11 @@ class SealedFile:
         self._instruments[described] = entry
 
     def _read_back(self, entry: str, record: TrialRecord) -> None:
-        units = {channel.name: channel for channel in record.channels}
+        groups = {name: self._file[entry][name] for name in PLOTTED if name in self._file[entry]}
         for group, name, length, digest in series_of(record):
-            data = self._file[entry][group]
-            guarded.check_series(data, name, length, digest)
-            if name in units:
-                check_unit(data, units[name])
-            self.layouts[f"{entry}/{group}/{name}"] = guarded.layout(data, name)
+            series = series_at(groups[group], name, length)
+            series.check(digest)
+            self.layouts[f"{entry}/{group}/{name}"] = series.layout()
 
 
 def check_sealed(part: Path, file: SealedFile) -> None:
@@ -153,12 +150,23 @@ def check_sealed(part: Path, file: SealedFile) -> None:
             texts.integer(place)
         for entry, finished in file.copied.items():
             if entry in opened:
-                read_entry(part, opened, entry, finished.record)
-        for place, layout in file.layouts.items():
-            entry, group, name = place.split("/")
-            data = guarded.group_at(opened[entry], group, "NXdata")
-            if guarded.layout(data, name) != layout:
-                raise ArchiveError(f"{part}: /{place}: does not lie where it was written")
+                record, _ = read_entry(part, opened, entry, finished.record)
+                _check_layout(opened, entry, record, file.layouts)
+
+
+def _check_layout(
+    file: h5py.File, entry: str, record: TrialRecord, layouts: Mapping[str, Layout]
+) -> None:
+    """The samples lie where they were read back, with their units."""
+    told = {channel.name: channel for channel in record.channels}
+    for group, name, length, _ in series_of(record):
+        with guarded.guarded(Path(file.filename), f"/{entry}/{group}/{name}"):
+            data = guarded.inner_group(guarded.inner_group(file, entry), group)
+            series = series_at(data, name, length)
+            if series.layout() != layouts[f"{entry}/{group}/{name}"]:
+                raise ArchiveError(f"{series.place}: does not lie where it was written")
+            if name in told:
+                check_unit(series, told[name])
 
 
 _NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/format")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive.header import RunHeader, RunStatus
+from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted
 from campaign.archive.run_folder import read_header
 from campaign.archive.story import read_lines
@@ -49,9 +49,12 @@ def summarise(path: Path) -> RunSummary:
             return _summarise_folder(path, size)
         size = path.stat().st_size
         return _summarise_file(path, size)
-    except ArchiveError as error:
-        return RunSummary(path.stem, path, size, problem=str(error))
-    except OSError as error:
+    except (ArchiveError, OSError) as error:
+        sealed = path.with_suffix(SEALED)
+        if path.suffix == PARTIAL and sealed.is_file():
+            return summarise(sealed)  # sealed while it was looked at
+        if isinstance(error, ArchiveError):
+            return RunSummary(path.stem, path, size, problem=str(error))
         return RunSummary(path.stem, path, size, problem=f"{path}: {error.strerror}")
 
 
