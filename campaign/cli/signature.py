@@ -57,6 +57,8 @@ def check_signature(run: Path, wanted: Wanted | None) -> Checked:
     file = signature_path(run).name if run.is_file() and has_signature(run) else ""
     if wanted is None:
         return _unchecked(run, file)
+    if not run.is_file():
+        return Checked("", False, f"{run}: is not signed: only a sealed run can be")
     try:
         signature = read_signature(run)
         key = signing.verify(run_statement(run), signature, wanted.signer, wanted.allowed)

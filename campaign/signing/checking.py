@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -68,7 +69,8 @@ def verify(text: str, signature: str, signer: str, allowed: AllowedSigners) -> s
         if made.code:
             raise _made_otherwise(made.err)
         found = ssh_keygen(["-Y", "find-principals", "-f", signers, "-s", sig], text)
-    by = found.out.split("\n")[0] if not found.code else ""
+    by = found.out.replace(",", "\n").split("\n") if not found.code else []
+    by = [principal.strip() for principal in by if principal.strip()]
     raise _not_by(signer, allowed, key_in(made.out), by, done.err)
 
 
@@ -84,11 +86,11 @@ def _made_otherwise(told: str) -> SignatureError:
 
 
 def _not_by(
-    signer: str, allowed: AllowedSigners, key: str, by: str, told: str
+    signer: str, allowed: AllowedSigners, key: str, by: Sequence[str], told: str
 ) -> SignatureError | UsageError:
-    """Of a signature of this text by the wrong one, who is `by` if that is known."""
-    if by and not any(fnmatchcase(signer, each) for each in by.split(",")):
-        return SignatureError(f"was made by {by} ({key}), not by {signer}")
+    """Of a signature of this text by the wrong one: the key is that of `by`, if of anybody."""
+    if by and not any(fnmatchcase(signer, each) for each in by):
+        return SignatureError(f"was made by {', '.join(by)} ({key}), not by {signer}")
     complaint = _COMPLAINT.search(told)
     if complaint and re.search("missing key|invalid key|bad options", complaint[2]):
         return UsageError(f"{allowed.path}:{complaint[1]}: {complaint[2]}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from campaign.signing.tool import (
 )
 
 _TEST = "campaign-test\n"
+_BEGINNING = "-----BEGIN SSH SIGNATURE-----"
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ def check_key(key: Path) -> None:
     """Raises UsageError when there is no ssh-keygen or no readable key file."""
     check_tool()
     try:
+        if not stat.S_ISREG(key.stat().st_mode):
+            raise UsageError(f"the key {key} is not a file")
         with key.open("rb"):
             pass
     except OSError as error:
@@ -67,6 +71,8 @@ def sign(text: str, key: Path, *, ask: bool) -> Signature:
         done = ssh_keygen(command, text, ask=True)
     if done.code:
         raise _sign_error(key, done.err, asked)
+    if not done.out.startswith(_BEGINNING):
+        raise UsageError(f"ssh-keygen made no signature with {key}")
     with tempfile.TemporaryDirectory() as folder:
         made = ssh_keygen(check_novalidate(copy_for_it(folder, "signature", done.out)), text)
     if made.code:
@@ -85,7 +91,11 @@ def _sign_error(key: Path, told: str, asked: bool) -> UsageError:
             f"agent have it: `ssh-add {key}`"
         )
     if "No private key found" in told:
-        why = "the agent does not have it" if os.environ.get("SSH_AUTH_SOCK") else "no agent runs"
+        why = (
+            "the agent at SSH_AUTH_SOCK does not have it"
+            if os.environ.get("SSH_AUTH_SOCK")
+            else "no agent runs"
+        )
         return UsageError(
             f"the key {key} is a public one: its private half is not beside it, and {why}; "
             "`ssh-add` hands a key to the agent"
