@@ -91,13 +91,9 @@ def _sign_error(key: Path, told: str, asked: bool) -> UsageError:
             f"agent have it: `ssh-add {key}`"
         )
     if "No private key found" in told:
-        why = (
-            "the agent at SSH_AUTH_SOCK does not have it"
-            if os.environ.get("SSH_AUTH_SOCK")
-            else "no agent runs"
-        )
+        agent = "the agent does not have it" if os.environ.get("SSH_AUTH_SOCK") else "no agent runs"
         return UsageError(
-            f"the key {key} is a public one: its private half is not beside it, and {why}; "
+            f"the key {key} is a public one: its private half is not beside it, and {agent}; "
             "`ssh-add` hands a key to the agent"
         )
     if "Couldn't load public key" in told:

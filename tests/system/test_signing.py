@@ -360,7 +360,7 @@ def test_an_agent_signs_for_a_public_key_and_for_a_locked_one(
     sealed: Path, tmp_path: Path, ada: Path, locked: Path, allowed: Path
 ):
     half = Path(shutil.copy(f"{ada}.pub", tmp_path / "half.pub"))
-    with pytest.raises(UsageError, match="the agent .* does not have it"):
+    with pytest.raises(UsageError, match="the agent does not have it"):
         sign(sealed, half)
     subprocess.run(["ssh-add", "-q", str(ada)], check=True, stdin=subprocess.DEVNULL)
     assert sign(sealed, half) is ExitCode.DONE
