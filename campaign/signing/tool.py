@@ -50,16 +50,13 @@ def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> Don
     UsageError when it is not there, too old, or silent.
     """
     tool = check_tool()
-    # The messages are told apart, so they have to be English.
-    how = "never" if ask else "force"
-    environment = {**os.environ, "LC_ALL": "C", "SSH_ASKPASS_REQUIRE": how}
     try:
         with subprocess.Popen(  # noqa: S603 - a list, never a shell
             [tool, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=environment,
+            env=_environment(ask=ask),
             start_new_session=not ask,
         ) as process:
             try:
@@ -77,6 +74,15 @@ def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> Don
             f"{tool} is too old: it knows no such signatures (`-Y`); OpenSSH 8.2 or newer does"
         )
     return Done(process.returncode, out.decode("utf-8", "replace"), told)
+
+
+def _environment(*, ask: bool) -> dict[str, str]:
+    """Whoever asks, asks at the terminal; else only a dialog that somebody has set up for that."""
+    environment = {**os.environ, "LC_ALL": "C"}  # messages are told apart: the plain English ones
+    environment["SSH_ASKPASS_REQUIRE"] = "never" if ask else "force"
+    if ask:
+        environment.pop("DISPLAY", None)  # what OpenSSH before 8.4 goes by
+    return environment
 
 
 def _kill(process: subprocess.Popen[bytes], *, group: bool) -> None:

@@ -19,6 +19,7 @@ from campaign import signing
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.run_lock import RunLock
 from campaign.archive.signature_file import signature_path
+from campaign.archive.statement import run_statement
 from campaign.archive.verification import verify_run
 from campaign.backends import sim
 from campaign.cli.prepare import Request
@@ -123,11 +124,18 @@ def test_a_signed_run_is_verified_by_name_key_and_what_that_proves(
 
 
 @needs_ssh_keygen
-def test_ssh_keygen_alone_can_check_it(sealed: Path, ada: Path, allowed: Path):
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("format-1.nxs", "2026-11-21T12-41-43-kept"), ("format-2.nxs", "2026-11-21T15-00-00-kept")],
+)
+def test_ssh_keygen_alone_can_check_it(
+    tmp_path: Path, ada: Path, allowed: Path, file: str, name: str
+):
     """The recipe of docs/reading-archives.md, with hashlib in place of sha256sum."""
+    sealed = Path(shutil.copy(KEPT / file, tmp_path))
     sign(sealed, ada)
     digest = hashlib.sha256(sealed.read_bytes()).hexdigest()
-    text = f"campaign-run\nrun {sealed.stem}\nfile sha256 {digest}\n"
+    text = f"campaign-run\nrun {name}\nfile sha256 {digest}\n"
     what = ["-n", "campaign-run@1", "-I", "ada@lab", "-f", str(allowed), "-s", f"{sealed}.sig"]
     subprocess.run(["ssh-keygen", "-Y", "verify", *what], input=text.encode(), check=True)
 
@@ -177,11 +185,9 @@ def test_a_renamed_run_keeps_its_signature(sealed: Path, ada: Path, allowed: Pat
 
 
 def signed_by_hand(sealed: Path, key: Path, namespace: str) -> None:
-    digest = hashlib.sha256(sealed.read_bytes()).hexdigest()
-    text = f"campaign-run\nrun {sealed.stem}\nfile sha256 {digest}\n"
     made = subprocess.run(
         ["ssh-keygen", "-Y", "sign", "-n", namespace, "-f", str(key)],
-        input=text.encode(),
+        input=run_statement(sealed).encode(),
         capture_output=True,
         check=True,
     )
