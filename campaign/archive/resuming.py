@@ -13,6 +13,7 @@ from campaign.archive.opening import read_sealed, sealed_format
 from campaign.archive.remnants import clear_remnants, is_own
 from campaign.archive.run_folder import read_format
 from campaign.archive.run_lock import RunLock
+from campaign.archive.signature_file import set_aside_signature
 from campaign.errors import ArchiveError, UsageError
 
 RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
@@ -38,6 +39,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
             from campaign.archive.unsealing import unseal
 
             unseal(sealed)
+        set_aside_signature(sealed)  # also one that a crash left when its file was gone
         story = _read_folder(folder)
         journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
         return folder, story, journal, lock

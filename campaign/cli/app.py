@@ -22,6 +22,7 @@ from campaign.cli.parameters import (
     ResultsOption,
     RunArgument,
     SetOption,
+    SignOption,
     TemplatesOption,
     WorkersOption,
     YesOption,
@@ -98,6 +99,7 @@ def run(
     ] = None,
     yes: YesOption = False,
     clear_stop: ClearStopOption = None,
+    sign: SignOption = None,
     allow_large: LargeOption = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
@@ -116,6 +118,7 @@ def run(
             yes=yes,
             clear_stop=clear_stop,
             remarks=remarks,
+            sign=sign,
         )
     )
 
@@ -136,6 +139,7 @@ def resume(
     port: PortOption = None,
     yes: YesOption = False,
     clear_stop: ClearStopOption = None,
+    sign: SignOption = None,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
     from campaign.cli.resume import resume_run
@@ -150,6 +154,7 @@ def resume(
             port=port,
             yes=yes,
             clear_stop=clear_stop,
+            sign=sign,
         )
     )
 
@@ -328,12 +333,57 @@ def verify(
         ),
     ],
     results: ResultsOption = RESULTS,
+    signer: Annotated[
+        str | None,
+        typer.Option(
+            "--signer",
+            metavar="NAME",
+            help="Who must have signed; needs --allowed-signers.",
+            show_default=False,
+        ),
+    ] = None,
+    allowed_signers: Annotated[
+        Path | None,
+        typer.Option(
+            "--allowed-signers",
+            metavar="FILE",
+            help="Which keys are whose, as ssh-keygen(1) describes it.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Check every byte of archives against checksums, journal, format and fingerprints."""
+    """Check every byte of archives against checksums, journal, format and fingerprints.
+
+    Whoever changes a run can compute its checksums anew: only a signature shows that.
+    """
+    from campaign.cli.signature import wanted_signature
     from campaign.cli.verify import verify_archives
 
-    raise typer.Exit(verify_archives(runs, results, as_json=as_json))
+    wanted = wanted_signature(signer, allowed_signers)
+    raise typer.Exit(verify_archives(runs, results, as_json=as_json, wanted=wanted))
+
+
+@app.command()
+def sign(
+    run: RunArgument,
+    key: Annotated[
+        Path,
+        typer.Option(
+            "--key",
+            metavar="FILE",
+            help="A private key of OpenSSH, or a public one whose other half the agent has.",
+        ),
+    ],
+    results: ResultsOption = RESULTS,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Set a signature that is there aside.")
+    ] = False,
+) -> None:
+    """Sign a sealed run that is sound: a file RUN.nxs.sig beside it proves who, not when."""
+    from campaign.cli.sign import sign_archive
+
+    raise typer.Exit(sign_archive(run, results, key, replace=replace))
 
 
 @app.command()

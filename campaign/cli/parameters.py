@@ -100,4 +100,14 @@ FromOption = Annotated[
         show_default=False,
     ),
 ]
+SignOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--sign",
+        metavar="FILE",
+        help="Sign the sealed run with this key of OpenSSH, or with its agent; tried before "
+        "anything moves.",
+        show_default=False,
+    ),
+]
 RESULTS = Path("results")

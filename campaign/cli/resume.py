@@ -14,6 +14,7 @@ from campaign.cli.output import print_note
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, choose_workers, conduct, print_warning
+from campaign.cli.sign import rehearse_signing
 from campaign.errors import ExitCode, UsageError
 from campaign.execution import provenance
 from campaign.execution.attempt import utc_now
@@ -55,10 +56,12 @@ def resume_run(
     port: str | None,
     yes: bool,
     clear_stop: int | None = None,
+    sign: Path | None = None,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.
 
     A `port` that is given is where the bench is today: no change that somebody has to accept.
+    With a key to `sign` the run with: that it can sign is known before anything moves.
     """
     path = find_run(results, name)
     run = open_run(path)
@@ -68,6 +71,8 @@ def resume_run(
     finished = not_repeated(run)
     left = [trial for trial in remade.trials if trial.number not in finished]
     workers = choose_workers(remade.kind, len(left), workers)
+    if sign is not None:
+        rehearse_signing(sign)
     backend = open_backend(remade.kind, remade.options, left)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
     allow_motion(remade.kind, left, remade.tests, yes=yes)
@@ -93,7 +98,7 @@ def resume_run(
         clear_stop,
         finished,
     )
-    return conduct(session, open_archive, report=report)
+    return conduct(session, open_archive, report=report, sign=sign)
 
 
 def remake(run: RunReader, port: str | None = None) -> Remade:

@@ -11,6 +11,7 @@ from campaign.cli.ask import allow_motion
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Prepared, Request, prepare
 from campaign.cli.session import Session, choose_workers, conduct
+from campaign.cli.sign import rehearse_signing
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.protocol import as_tree, check_limits, check_loops
@@ -39,14 +40,20 @@ def run_protocol(
     yes: bool = False,
     clear_stop: int | None = None,
     remarks: Remarks | None = None,
+    sign: Path | None = None,
 ) -> ExitCode:
-    """Execute a protocol; the archive's path is the last line of standard output."""
+    """Execute a protocol; the archive's path is the last line of standard output.
+
+    With a key to `sign` the run with: that it can sign is known before anything moves.
+    """
     prepared = prepare(request)
     plan = prepared.plan
     check_limits(plan)
     check_loops(plan)
     print_low_margins(plan)
     workers = choose_workers(prepared.kind, len(plan.trials), workers)
+    if sign is not None:
+        rehearse_signing(sign)
     backend = prepared.open_backend()
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
@@ -59,7 +66,7 @@ def run_protocol(
     session = Session(
         prepared.kind, backend, plan.trials, plan.policy, workers, name, yes, clear_stop
     )
-    return conduct(session, open_archive, report=report)
+    return conduct(session, open_archive, report=report, sign=sign)
 
 
 def run_header(

@@ -17,6 +17,7 @@ from campaign.cli.ask import attendance_of
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import check_channels
+from campaign.cli.sign import sign_new_run
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.naming import how_to_go_on, reference
@@ -65,16 +66,25 @@ class Session:
         return (trial for trial in self.trials if trial.number not in self.finished)
 
 
-def conduct(session: Session, open_archive: Callable[[], RunWriter], *, report: bool) -> ExitCode:
+def conduct(
+    session: Session,
+    open_archive: Callable[[], RunWriter],
+    *,
+    report: bool,
+    sign: Path | None = None,
+) -> ExitCode:
     """Execute a session; the archive's path is the last line of standard output.
 
     `open_archive` is called once the bench is connected: a bench that is not there leaves no run.
+    The sealed run is signed with the key `sign`, however it ended.
     """
     began = time.monotonic()
     outcome, code = execute(session, open_archive)
     codes = [code]
     say_outcome(outcome, time.monotonic() - began)
     try:
+        if sign is not None:
+            codes.append(sign_new_run(outcome.archive, sign))
         if report:
             with unwinding():
                 codes.append(_report(outcome))

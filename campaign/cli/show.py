@@ -10,6 +10,7 @@ from pathlib import Path
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
+from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
 from campaign.cli.output import print_line, print_table
 from campaign.trial import Outcome
@@ -112,6 +113,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("title", header.title),
         ("archive", str(run.path)),
         ("status", f"{run.status.value}{f': {run.reason}' if run.reason else ''}"),
+        ("signature", _signature(run)),
         ("safe state", run.safe_state.value),
         ("started", header.created),
         ("ended", run.ended),
@@ -126,6 +128,12 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("versions", versions),
         ("fingerprint", header.fingerprint),
     ]
+
+
+def _signature(run: RunReader) -> str:
+    if not (run.sealed and has_signature(run.path)):
+        return ""
+    return f"{signature_path(run.path).name} (not checked; campaign verify --signer ...)"
 
 
 def _tests(run: RunReader) -> list[tuple[str, ...]]:

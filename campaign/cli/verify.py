@@ -11,31 +11,42 @@ from campaign.archive import find_runs
 from campaign.archive.damage import Damage
 from campaign.archive.verification import Verification, verify_run
 from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.signature import Checked, Wanted, check_signature
 from campaign.errors import ExitCode
 
 
-def verify_archives(names: Sequence[str], results: Path, *, as_json: bool) -> ExitCode:
-    """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them."""
+def verify_archives(
+    names: Sequence[str], results: Path, *, as_json: bool, wanted: Wanted | None = None
+) -> ExitCode:
+    """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them.
+
+    A run without the signature that is `wanted` is wrong, too.
+    """
     paths = list(dict.fromkeys(path for name in names for path in find_runs(results, name)))
     found = []
     for path in paths:
         with _progress(path) as progress:
-            found.append(verify_run(path, progress))
+            found.append((verify_run(path, progress), check_signature(path, wanted)))
         if not as_json:
-            _print(found[-1])
+            _print(*found[-1])
     if as_json:
-        print_line(json.dumps([_tree(one) for one in found], indent=2))
-    return ExitCode.DONE if all(one.sound for one in found) else ExitCode.ARCHIVE
+        print_line(json.dumps([_tree(*one) for one in found], indent=2))
+    good = all(run.sound and signature.valid is not False for run, signature in found)
+    return ExitCode.DONE if good else ExitCode.ARCHIVE
 
 
-def _print(found: Verification) -> None:
-    """One line per problem on standard output; one in all when there is none."""
+def _print(found: Verification, signature: Checked) -> None:
+    """One line per problem on standard output; one when there is none; one for a signature."""
     for damage in found.problems:
         print_line(f"{found.path}: {_told(damage)}")
     if found.sound:
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets)")
     for damage in found.remarks:
         print_note(f"{found.path}: note: {damage}", style="yellow")
+    if signature.valid is not None:
+        print_line(signature.text)
+    elif signature.text:
+        print_note(signature.text)
 
 
 def _told(damage: Damage) -> str:
@@ -44,7 +55,7 @@ def _told(damage: Damage) -> str:
     return f"{damage.trial}: {damage}" if damage.trial else str(damage)
 
 
-def _tree(found: Verification) -> dict[str, object]:
+def _tree(found: Verification, signature: Checked) -> dict[str, object]:
     return {
         "path": str(found.path),
         "sound": found.sound,
@@ -52,6 +63,7 @@ def _tree(found: Verification) -> dict[str, object]:
         "datasets": found.datasets,
         "problems": [vars(damage) for damage in found.problems],
         "remarks": [vars(damage) for damage in found.remarks],
+        "signature": vars(signature),
     }
 
 

@@ -1,0 +1,129 @@
+"""`campaign sign`, and the signature that `run --sign` and `resume --sign` make at their end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from campaign import signing
+from campaign.archive import find_run
+from campaign.archive.files import why
+from campaign.archive.run_lock import RunLock
+from campaign.archive.signature_file import (
+    has_signature,
+    set_aside_signature,
+    signature_path,
+    write_signature,
+)
+from campaign.cli.ask import somebody_is_there
+from campaign.cli.output import print_line, print_note
+from campaign.errors import ArchiveError, CampaignError, ExitCode, UsageError
+from campaign.execution.naming import reference
+from campaign.interrupts import unwinding
+
+WHAT_IT_PROVES = "proves who, not when"
+
+
+@unwinding()
+def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitCode:
+    """Sign a run that is sealed and sound; the signature's path is the last line of the output.
+
+    Raises:
+        UsageError: it is not sealed, has a signature that nobody wants to replace, or the key
+            cannot be used.
+        ArchiveError: it is damaged, or the signature cannot be written.
+    """
+    sealed = find_run(results, name)
+    if not sealed.is_file():
+        raise UsageError(
+            f"{sealed}: is not sealed, and only a sealed run is signed; "
+            f"`campaign resume {reference(sealed)}` goes on to its end"
+        )
+    from campaign.archive.verification import verify_run
+
+    _check_free(sealed, replace=replace)
+    signing.check_key(key)  # before all of a large run is read
+    with _locked(sealed):
+        problems = verify_run(sealed).problems
+        if problems:
+            raise ArchiveError(
+                f"{sealed}: is not sound ({problems[0]}), and was not signed; "
+                f"`campaign verify {reference(sealed)}` lists everything"
+            )
+        _sign(sealed, key, replace=replace)
+    print_line(str(signature_path(sealed)))
+    return ExitCode.DONE
+
+
+def rehearse_signing(key: Path) -> None:
+    """Sign a test text, so that a key that cannot sign costs no bench time. Raises UsageError."""
+    made = signing.sign_test_text(key, ask=somebody_is_there())
+    if made.asked:
+        print_note(
+            "the passphrase is asked for again when the run is sealed; with an agent "
+            f"(`ssh-add {key}`) nobody has to be there",
+            "yellow",
+        )
+
+
+def sign_new_run(sealed: Path, key: Path) -> ExitCode:
+    """Sign what was just sealed; what goes wrong is said, and the run is kept: ARCHIVE then."""
+    try:
+        with unwinding():
+            if not sealed.is_file():
+                raise ArchiveError(f"{sealed}: is not sealed")
+            with _locked(sealed):
+                _sign(sealed, key, replace=True)
+    except CampaignError as error:
+        _say_unsigned(sealed, str(error))
+        return ExitCode.ARCHIVE
+    except KeyboardInterrupt:
+        _say_unsigned(sealed, "interrupted")
+        return ExitCode.INTERRUPTED
+    return ExitCode.DONE
+
+
+def _say_unsigned(sealed: Path, reason: str) -> None:
+    print_note(
+        f"NOT SIGNED: {reason}\n"
+        f"the run itself is kept; `campaign sign {reference(sealed)} --key FILE` signs it",
+        "yellow",
+    )
+
+
+@contextmanager
+def _locked(sealed: Path) -> Iterator[None]:
+    """Nobody goes on with the run while it is signed."""
+    try:
+        lock = RunLock.acquire(sealed.parent, sealed.stem)
+    except OSError as error:
+        raise ArchiveError(f"{sealed.parent}: cannot be written: {why(error)}") from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _check_free(sealed: Path, *, replace: bool) -> None:
+    if has_signature(sealed) and not replace:
+        raise UsageError(
+            f"{signature_path(sealed)}: the run is signed already; --replace sets that signature "
+            "aside, and removes nothing"
+        )
+
+
+def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
+    """The new signature is made before an old one is touched."""
+    from campaign.archive.statement import run_statement
+
+    made = signing.sign(run_statement(sealed), key, ask=somebody_is_there())
+    _check_free(sealed, replace=replace)
+    try:
+        old = set_aside_signature(sealed, "replaced")
+    except OSError as error:
+        raise ArchiveError(f"{signature_path(sealed)}: cannot be set aside: {why(error)}") from None
+    write_signature(sealed, made.text)
+    if old:
+        print_note(f"the earlier signature is now {old}")
+    print_note(f"signed with the key {made.key}; that {WHAT_IT_PROVES}")

@@ -1,0 +1,112 @@
+"""Running ssh-keygen: no shell, never a wait for ever, and a person is asked only at a terminal."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.errors import UsageError
+
+NAMESPACE = "campaign-run@1"
+PATIENCE = 60.0
+"""s for ssh-keygen, where no person is asked at the terminal; a token wants to be touched."""
+
+_TOO_OLD = ("unknown option", "illegal option", "Unsupported operation for -Y")
+_KEY = re.compile(r"with (\S+) key (\S+)\s*$")
+
+
+@dataclass(frozen=True)
+class Done:
+    """What ssh-keygen printed, and its exit status."""
+
+    code: int
+    out: str
+    err: str
+
+
+def check_tool() -> str:
+    """Path of ssh-keygen. Raises UsageError when there is none."""
+    found = shutil.which("ssh-keygen")
+    if found is None:
+        raise UsageError(
+            "signatures need ssh-keygen, which is not on the PATH; it comes with OpenSSH "
+            "(Debian and Ubuntu: the package openssh-client, Fedora: openssh-clients, Windows: the "
+            "optional feature OpenSSH Client)"
+        )
+    return found
+
+
+def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> Done:
+    """Run it with `text` as its input; with `ask` it may wait for a person at the terminal.
+
+    Without, it has no terminal, and must not take a passphrase from its input either. Raises
+    UsageError when it is not there, too old, or silent.
+    """
+    tool = check_tool()
+    try:
+        with subprocess.Popen(  # noqa: S603 - a list, never a shell
+            [tool, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=_environment(ask=ask),
+            start_new_session=not ask,
+        ) as process:
+            try:
+                out, err = process.communicate(text.encode(), None if ask else PATIENCE)
+            except BaseException:
+                _kill(process, group=not ask)
+                raise
+    except subprocess.TimeoutExpired:
+        raise UsageError(f"{tool} did not answer within {PATIENCE:g} s") from None
+    except OSError as error:
+        raise UsageError(f"{tool} cannot be executed: {error.strerror}") from None
+    told = err.decode("utf-8", "replace")
+    if process.returncode and any(sign in told for sign in _TOO_OLD):
+        raise UsageError(
+            f"{tool} is too old: it knows no such signatures (`-Y`); OpenSSH 8.2 or newer does"
+        )
+    return Done(process.returncode, out.decode("utf-8", "replace"), told)
+
+
+def _environment(*, ask: bool) -> dict[str, str]:
+    """Whoever asks, asks at the terminal; else only a dialog that somebody has set up for that."""
+    environment = {**os.environ, "LC_ALL": "C"}  # messages are told apart: the plain English ones
+    environment["SSH_ASKPASS_REQUIRE"] = "never" if ask else "force"
+    if ask:
+        environment.pop("DISPLAY", None)  # what OpenSSH before 8.4 goes by
+    return environment
+
+
+def _kill(process: subprocess.Popen[bytes], *, group: bool) -> None:
+    """It, and a dialog that it has opened."""
+    with suppress(OSError):
+        if group and os.name == "posix":
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+
+
+def check_novalidate(signature: str) -> list[str]:
+    """Whether the signature is one of the text, by whomever."""
+    return ["-Y", "check-novalidate", "-n", NAMESPACE, "-s", signature]
+
+
+def copy_for_it(folder: str, name: str, text: str) -> str:
+    """A copy for ssh-keygen: nobody changes it between two questions, and it is a plain file."""
+    path = Path(folder, name)
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    return str(path)
+
+
+def key_in(told: str) -> str:
+    """Kind and fingerprint of the key that ssh-keygen tells of, such as `ED25519 SHA256:...`."""
+    match = _KEY.search(told)
+    return f"{match[1]} {match[2]}" if match else "of an unknown kind"

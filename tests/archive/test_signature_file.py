@@ -1,0 +1,133 @@
+"""What is signed of a run, and what becomes of the file beside it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, find_run, list_runs
+from campaign.archive import resuming as resuming_module
+from campaign.archive.signature_file import (
+    LARGEST,
+    read_signature,
+    set_aside_signature,
+    signature_path,
+    write_signature,
+)
+from campaign.archive.statement import run_statement
+from campaign.errors import ArchiveError, UsageError
+
+KEPT = Path(__file__).parent / "kept"
+RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {}, "versions": {}, "command": []}
+
+
+@pytest.fixture
+def interrupted(tmp_path: Path, kit) -> Path:
+    """A sealed run whose second trial is still to be done, with a signature beside it."""
+    trials = [kit.trial(number) for number in (1, 2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    kit.record(writer, trials[0], 20)
+    sealed = writer.seal(RunStatus.INTERRUPTED, "stopped", ended="2026-11-21T09:40:00Z")
+    write_signature(sealed, "the first\n")
+    return sealed
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("format-1.nxs", "2026-11-21T12-41-43-kept"), ("format-2.nxs", "2026-11-21T15-00-00-kept")],
+)
+def test_the_statement_has_the_archived_name_and_the_hash_that_sha256sum_prints(file, name):
+    sums = dict(line.split()[::-1] for line in (KEPT / "sha256sums").read_text().splitlines())
+    assert run_statement(KEPT / file) == f"campaign-run\nrun {name}\nfile sha256 {sums[file]}\n"
+
+
+def test_what_is_not_sealed_has_no_statement(tmp_path: Path):
+    with pytest.raises(ArchiveError, match="not a sealed run"):
+        run_statement(KEPT / "format-2.partial")
+    (tmp_path / "run.nxs").write_bytes(b"nothing")
+    with pytest.raises(ArchiveError, match=r"run\.nxs"):
+        run_statement(tmp_path / "run.nxs")
+
+
+def test_a_resume_sets_the_signature_aside_and_the_next_one_takes_another_name(interrupted: Path):
+    for number in (1, 2):
+        writer = RunWriter.resume(interrupted, **RESUMED)
+        aside = interrupted.with_name(f"{interrupted.name}.sig.before-resume-{number}")
+        assert aside.read_text() == ("the first\n" if number == 1 else "the second\n")
+        assert not signature_path(interrupted).exists()
+        writer.seal(RunStatus.INTERRUPTED, "stopped", ended="2026-11-22T09:40:00Z")
+        write_signature(interrupted, "the second\n")
+    assert len(list(interrupted.parent.glob("*.before-resume-*"))) == 2
+
+
+def test_a_crash_before_the_signature_was_set_aside_is_made_good_by_the_next_resume(
+    interrupted: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def crash(sealed: Path) -> None:
+        assert not sealed.exists(), "the signature goes after its file"
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(resuming_module, "set_aside_signature", crash)
+        with pytest.raises(KeyboardInterrupt):
+            RunWriter.resume(interrupted, **RESUMED)
+    assert signature_path(interrupted).exists()
+    RunWriter.resume(interrupted.with_suffix(".partial"), **RESUMED).close()
+    assert not signature_path(interrupted).exists()
+
+
+def test_a_resume_that_fails_leaves_the_signature_where_it_was(interrupted: Path):
+    content = bytearray(interrupted.read_bytes())
+    content[len(content) // 2] ^= 1
+    interrupted.write_bytes(content)
+    with pytest.raises(ArchiveError, match="it is as it was"):
+        RunWriter.resume(interrupted, **RESUMED)
+    assert signature_path(interrupted).read_text() == "the first\n"
+
+
+def test_signatures_are_no_runs(interrupted: Path):
+    set_aside_signature(interrupted, "replaced")
+    write_signature(interrupted, "another\n")
+    assert [run.path for run in list_runs(interrupted.parent)] == [interrupted]
+    assert find_run(interrupted.parent, "2026-11") == interrupted
+
+
+def test_a_signature_that_is_there_is_not_overwritten(interrupted: Path):
+    with pytest.raises(UsageError, match="--replace"):
+        write_signature(interrupted, "another\n")
+    assert read_signature(interrupted) == "the first\n"
+    assert set_aside_signature(interrupted.with_name("other.nxs")) is None
+
+
+def make_large(path: Path) -> None:
+    path.write_bytes(b"x" * (LARGEST + 1))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files")
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda path: None, "is not signed"),
+        (lambda path: path.symlink_to("nowhere"), "is not signed"),
+        (make_large, f"more than {LARGEST} bytes"),
+        (lambda path: path.mkdir(), "is not a file|directory"),
+        (os.mkfifo if hasattr(os, "mkfifo") else None, "is not a file"),
+        (lambda path: path.symlink_to("/dev/zero"), "is not a file"),
+        (lambda path: path.symlink_to(path.name), "cannot be read"),
+    ],
+    ids=["none", "dangling", "large", "folder", "pipe", "device", "loop"],
+)
+def test_what_cannot_be_a_signature_is_said_and_read_in_bounds(tmp_path: Path, make, said):
+    sealed = tmp_path / "run.nxs"
+    make(signature_path(sealed))
+    with pytest.raises(ArchiveError, match=said):
+        read_signature(sealed)
+
+
+def test_a_signature_of_the_largest_size_is_read(tmp_path: Path):
+    text = "x" * LARGEST
+    write_signature(tmp_path / "run.nxs", text)
+    assert read_signature(tmp_path / "run.nxs") == text
