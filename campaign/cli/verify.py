@@ -40,7 +40,8 @@ def _print(found: Verification, signature: Checked) -> None:
     for damage in found.problems:
         print_line(f"{found.path}: {_told(damage)}")
     if found.sound:
-        print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets)")
+        root = f", seal {found.root}" if found.root else ""
+        print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets{root})")
     for damage in found.remarks:
         print_note(f"{found.path}: note: {damage}", style="yellow")
     if signature.valid is not None:
@@ -61,6 +62,7 @@ def _tree(found: Verification, signature: Checked) -> dict[str, object]:
         "sound": found.sound,
         "trials": found.trials,
         "datasets": found.datasets,
+        "seal": found.root,
         "problems": [vars(damage) for damage in found.problems],
         "remarks": [vars(damage) for damage in found.remarks],
         "signature": vars(signature),
