@@ -5,8 +5,9 @@ format is described in `docs/archive-format.md`. Importing this package does not
 """
 
 from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.header import PlannedTrial, RunHeader, RunStatus, new_run_name
+from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.listing import find_run, find_runs, list_runs
+from campaign.archive.naming import new_run_name, reserved_name
 from campaign.archive.opening import open_run
 from campaign.archive.run_reader import RunReader
 from campaign.archive.summary import RunSummary
@@ -26,4 +27,5 @@ __all__ = [
     "list_runs",
     "new_run_name",
     "open_run",
+    "reserved_name",
 ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from datetime import datetime
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -54,7 +53,7 @@ class RunHeader(_Record):
     """What is known about a run before its first trial. All of it is archived."""
 
     name: Annotated[str, AfterValidator(_run_name)]
-    """The run's name, unique in its results folder: see `new_run_name`."""
+    """The run's name, unique in its results folder: see `naming`."""
     created: Timestamp
     """When the run began, ISO 8601 with a time zone."""
     title: str = ""
@@ -114,12 +113,3 @@ class PlannedTrial(_Record):
             label=trial.label,
             fingerprint=trial.fingerprint,
         )
-
-
-def new_run_name(results: Path, protocol_stem: str, now: datetime) -> str:
-    """A sortable name that no run in `results` has, e.g. `2026-11-21T09-36-58-quickstart`."""
-    stem = re.sub(r"[^A-Za-z0-9._+-]+", "-", protocol_stem).strip("-.")[:120] or "run"
-    base = f"{now:%Y-%m-%dT%H-%M-%S}-{stem}"
-    taken = {path.stem for path in results.glob(f"{base}*")} if results.is_dir() else set()
-    candidates = (base if n == 1 else f"{base}-{n}" for n in range(1, len(taken) + 2))
-    return next(name for name in candidates if name not in taken)

@@ -15,9 +15,10 @@ from campaign.errors import UsageError
 
 
 class RunLock:
-    """The right to write one run; `acquire` it, `release` it."""
+    """The right to write the run `name`; `acquire` it, `release` it."""
 
-    def __init__(self, path: Path, descriptor: int) -> None:
+    def __init__(self, path: Path, name: str, descriptor: int) -> None:
+        self.name = name
         self._path = path
         self._descriptor = descriptor
 
@@ -38,7 +39,7 @@ class RunLock:
                     f"{results}: another process is writing the run {name!r}; wait for its end"
                 )
             if _is_still(path, descriptor):
-                return cls(path, descriptor)
+                return cls(path, name, descriptor)
             os.close(descriptor)  # its last owner removed the name while we waited for it
 
     def release(self) -> None:

@@ -48,22 +48,23 @@ class RunWriter:
         self._sealer: Sealer | None = None
 
     @classmethod
-    def create(cls, results: Path, header: RunHeader, trials: Sequence[Trial]) -> Self:
+    def create(
+        cls, results: Path, header: RunHeader, trials: Sequence[Trial], lock: RunLock | None = None
+    ) -> Self:
         """Begin a run in `results`, which is made if need be.
+
+        `lock` is the right to write it, where the caller has it already (`naming.reserved_name`).
 
         Raises:
             UsageError: the folder cannot be made or written, or has a run of that name.
         """
         folder = results / f"{header.name}{PARTIAL}"
-        taken = UsageError(f"{results}: there is a run {header.name!r} already")
         try:
             results.mkdir(parents=True, exist_ok=True)
-            if folder.exists() or folder.with_suffix(SEALED).exists():
-                raise taken
-            lock = RunLock.acquire(results, header.name)
+            lock = lock or RunLock.acquire(results, header.name)
             try:
                 if folder.exists() or folder.with_suffix(SEALED).exists():
-                    raise taken
+                    raise UsageError(f"{results}: there is a run {header.name!r} already")
                 journal = make_folder(folder, header, trials)
             except BaseException:
                 lock.release()

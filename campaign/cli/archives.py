@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from campaign.archive import RunSummary, list_runs
+from campaign.archive.remnants import find_remnants
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
 from campaign.cli.selection import Selection
 from campaign.interrupts import unwinding
@@ -29,6 +30,8 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
         print_note(f"{results}: none of {len(runs)} runs is like that")
     else:
         print_table(_HEADINGS, [_row(run) for run in shown])
+    for path, what in find_remnants(results).items():
+        print_note(f"{path}: is {what}; it can be removed", style="yellow")
     for run in runs:
         if run.problem:
             print_note(f"{run.name}: {run.problem}", style="yellow")

@@ -13,8 +13,8 @@ from campaign.archive import (
     RunStatus,
     RunWriter,
     find_run,
-    new_run_name,
     open_run,
+    reserved_name,
 )
 from campaign.cli.output import print_line, print_note
 from campaign.cli.prepare import find_backend, open_backend
@@ -38,10 +38,13 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     tree = run.header.backend_options if simulated else {}
     options = kind.options.model_validate(tree, context={"si": True})
     trial = archived.trial.model_copy(update={"number": 1})  # it is the only one of its run
-    header = _header(run, archived, results, options.model_dump(mode="json"))
     backend = open_backend(kind, options, [trial])
-    session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name)
-    outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial]))
+    now = datetime.now(UTC)
+    stem = f"rerun-{archived.trial.name}-{run.header.protocol_name or 'run'}"
+    with reserved_name(results, stem, now) as lock:
+        header = _header(run, archived, lock.name, now, options.model_dump(mode="json"))
+        session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name)
+        outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial], lock))
     if outcome.status is RunStatus.INTERRUPTED:
         print_note("interrupted: nothing was compared")
         print_line(str(outcome.archive))
@@ -84,14 +87,12 @@ def _say(what: str, before: Recording, again: Recording) -> ExitCode:
 
 
 def _header(
-    run: RunReader, archived: ArchivedTrial, results: Path, options: dict[str, object]
+    run: RunReader, archived: ArchivedTrial, name: str, now: datetime, options: dict[str, object]
 ) -> RunHeader:
-    now = datetime.now(UTC)
     trial, was = archived.trial, run.header
-    stem = f"rerun-{trial.name}-{was.protocol_name or 'run'}"
     return was.model_copy(
         update={
-            "name": new_run_name(results, stem, now),
+            "name": name,
             "created": now.isoformat(timespec="milliseconds"),
             "title": f"{trial.label}, repeated",
             "notes": f"repeats {trial.name} of {run.name}",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from campaign.archive import RunHeader, RunWriter, new_run_name
+from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.cli.ask import allow_motion
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Prepared, Request, prepare
@@ -57,16 +57,16 @@ def run_protocol(
     backend = prepared.open_backend()
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
-    name = new_run_name(results, prepared.path.stem, began)
+    with reserved_name(results, prepared.path.stem, began) as lock:
 
-    def open_archive() -> RunWriter:
-        header = run_header(prepared, request, name, began, remarks or Remarks())
-        return RunWriter.create(results, header, plan.trials)
+        def open_archive() -> RunWriter:
+            header = run_header(prepared, request, lock.name, began, remarks or Remarks())
+            return RunWriter.create(results, header, plan.trials, lock)
 
-    session = Session(
-        prepared.kind, backend, plan.trials, plan.policy, workers, name, yes, clear_stop
-    )
-    return conduct(session, open_archive, report=report, sign=sign)
+        session = Session(
+            prepared.kind, backend, plan.trials, plan.policy, workers, lock.name, yes, clear_stop
+        )
+        return conduct(session, open_archive, report=report, sign=sign)
 
 
 def run_header(
