@@ -142,8 +142,9 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
     except (AbortedError, NotSafeError):
         raise  # they say so themselves, after what matters more
     except Exception:
-        kept = folder if folder.is_dir() else folder.with_suffix(SEALED)
-        print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
+        there = (path for path in (folder, folder.with_suffix(SEALED)) if path.exists())
+        if kept := next(there, None):
+            print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
         raise
 
 
