@@ -12,7 +12,7 @@ from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
 from campaign.archive.story import Lines, read_lines
 from campaign.cli.output import print_line, print_table
-from campaign.trial import Outcome
+from campaign.trial import Outcome, Tree
 
 
 def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
@@ -124,8 +124,16 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("tags", ", ".join(header.tags)),
         ("revision", header.git_revision),
         ("versions", versions),
+        ("plug-ins", "; ".join(map(_plug_in, header.plugins))),
         ("fingerprint", header.fingerprint),
     ]
+
+
+def _plug_in(record: Tree) -> str:
+    """One kind of an installed package."""
+    sha256 = str(record.get("sha256", ""))[:12]
+    package = f"{record.get('distribution')} {record.get('version')}"
+    return f"{record.get('room')} {record.get('name')} of {package}, sources {sha256}"
 
 
 def _tests(run: RunReader) -> list[tuple[str, ...]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.errors import ArchiveError
+from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
 from campaign.published.scoreboard import Evidence, evidence_of
@@ -78,7 +78,7 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
     name, kind = str(test.get("name", "")), str(test.get("kind", ""))
     options, reproduces = test.get("options"), test.get("reproduces")
     trials = tuple(trial for trial in run.trials if trial.trial.test == name)
-    experiment = experiments.get(kind)
+    experiment, unusable = _experiment(kind, experiments)
     data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
     try:
         result, problem = _result(data, experiment)
@@ -103,8 +103,16 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
         experiment=experiment,
         bench=_bench(trials),
         result=result,
-        problem=problem,
+        problem=unusable or problem,
     )
+
+
+def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Experiment | None, str]:
+    """The experiment, or why a package that should provide it cannot."""
+    try:
+        return experiments.get(kind), ""
+    except UsageError as error:
+        return None, str(error)
 
 
 def _readable(
