@@ -65,10 +65,12 @@ def installed() -> Installed:
             text = distribution.read_text("entry_points.txt") or ""
             if not _GROUP.search(text):
                 continue
-            name = distribution.metadata["Name"]
+            name = distribution.metadata["Name"] or ""
+            if not name:
+                raise ValueError("its metadata has no name")
             # The first of a name on the path is the one that is imported.
-            if metadata.distribution(name).read_text("entry_points.txt") == text:
-                plug_ins.setdefault(name, tuple(_declared(distribution, name)))
+            same = re.sub(r"[-_.]+", "-", name).lower()
+            plug_ins.setdefault(same, tuple(_declared(distribution, name)))
         except Exception as error:  # noqa: BLE001 (whatever is wrong with it is its own business)
             which = name or f"with {', '.join(_VALUE.findall(text))}"
             where = distribution.locate_file("")
@@ -96,7 +98,8 @@ def _declared(distribution: metadata.Distribution, name: str) -> Iterator[PlugIn
         if entry.group.startswith("campaign."):
             own = entry.value.partition(":")[0].strip().partition(".")[0]
             packages = tuple(dict.fromkeys((own, *listed)))
-            yield PlugIn(entry.group, entry.name, name, distribution.version, entry.value, packages)
+            version = str(distribution.version)
+            yield PlugIn(entry.group, entry.name, name, version, entry.value, packages)
 
 
 def _top_level(distribution: metadata.Distribution) -> Iterator[str]:

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import pkgutil
+import re
+import shutil
+import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
+from pydantic import Field, TypeAdapter, ValidationError
 
 from campaign.backends import backends
 from campaign.experiments import experiments
 from campaign.export import exports
 from campaign.physics.compensation import compensation_methods
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.friction.lugre import LuGreOptions
+from campaign.physics.friction.stribeck import StribeckOptions
 from campaign.plugins import Kinds
-from tests.packages import FILM, GREASE, Packages
+from tests.packages import FILM, GREASE, ROOT, Packages
+from tests.physics.benches import bench
 
 ROOMS = {
     "campaign.experiments": (experiments, "EXPERIMENT"),
@@ -221,3 +229,87 @@ from campaign.physics.friction import friction_models
 print(json.dumps([list(friction_models()), friction_models().plug_in("grease").version]))
 """
     assert said(packages, code) == [["grease", "lugre", "stribeck"], "2.0"]
+
+
+PAGE = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def page(packages: Packages) -> Packages:
+    """The package of docs/plug-ins.md."""
+    found = re.findall(r"^```\w+ ([\w./]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    files = dict(found)
+    assert set(files) == {"pyproject.toml", "grease_film/model.py", "tests/test_model.py"}
+    project = tomllib.loads(files["pyproject.toml"])["project"]
+    points = {
+        f"{group}/{name}": value
+        for group, entries in project["entry-points"].items()
+        for name, value in entries.items()
+    }
+    files["grease_film/__init__.py"] = ""
+    packages.install(project["name"], files, points, project["version"])
+    return packages
+
+
+def test_the_page_s_own_test_passes(page: Packages) -> None:
+    shutil.rmtree(page.folder / "grease-film-1.0.dist-info")
+    code = """
+import sys, pytest
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_model.py"]))
+"""
+    done = page.python(code)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+
+
+def test_the_page_s_model_can_be_named_by_a_bench_and_compiles(page: Packages) -> None:
+    code = """
+import ctypes, json
+from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.step_function import address_of
+from pydantic import TypeAdapter
+tree = {"model": "grease", "yield_torque": "8 N m", "shear_rate": "0.1 rad/s"}
+options = TypeAdapter(FrictionField).validate_python(tree)
+model = friction_models()["grease"]
+doubles, double = ctypes.POINTER(ctypes.c_double), ctypes.c_double
+step = ctypes.CFUNCTYPE(None, doubles, doubles, double, double, double, double, doubles)
+line, none = (double * 2)(), (double * 1)()
+parameters = (double * 2)(*model.parameters(options))
+step(address_of(model.step))(parameters, none, 0.1, 0.1, 1e-3, 0.0, line)
+print(json.dumps([options.model_dump(mode="json")["model"], line[0], line[1]]))
+"""
+    name, torque, change = said(page, code)
+    assert name == "grease"
+    # (e - 1/e) / (e + 1/e), with e = exp(1)
+    assert torque == pytest.approx(8 * (math.e**2 - 1) / (math.e**2 + 1))
+    assert change == 0.0
+
+
+def test_a_choice_reports_as_a_union_of_tables_does() -> None:
+    """pydantic's own discriminated union, built of the same classes, is what it is held against."""
+    union = Annotated[LuGreOptions | StribeckOptions, Field(discriminator="model")]
+    ours, theirs = TypeAdapter(FrictionField), TypeAdapter(union)
+    good = bench().friction["load"]
+    for value in [
+        {"model": "lugri"},
+        {"model": 3},
+        {"model": "lugre"},
+        {"model": "stribeck", "coulomb_torque": "2 A", "odd": 1},
+        {"coulomb_torque": 1},
+        {},
+        7,
+        None,
+        [good],
+    ]:
+        assert errors(ours, value) == errors(theirs, value)
+    assert ours.validate_python(good) is theirs.validate_python(good) is good
+    tree = good.model_dump(mode="json")
+    assert ours.validate_python(tree, context={"si": True}) == good
+    assert ours.dump_python(good, mode="json") == tree
+    assert ours.dump_json(good) == theirs.dump_json(good)
+
+
+def errors(adapter: TypeAdapter[Any], value: Any) -> list[tuple[Any, ...]]:
+    with pytest.raises(ValidationError) as caught:
+        adapter.validate_python(value)
+    return [(e["type"], e["loc"], e["msg"]) for e in caught.value.errors()]

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from pydantic import ValidationError
+
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
@@ -68,7 +70,9 @@ def published_of(run: RunReader) -> Published:
 
 
 def one_line(error: BaseException) -> str:
-    """An error without its traceback."""
+    """An error without its traceback; of options that are not valid, the first that is wrong."""
+    if isinstance(error, ValidationError):
+        return str(error.errors(include_url=False)[0]["msg"])[:600]
     lines = str(error).strip().splitlines()
     text = lines[0] if lines else "no message"
     return f"{type(error).__name__}: {text}"[:300]

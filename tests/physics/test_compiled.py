@@ -58,6 +58,12 @@ HELPERS = {
         "grease_film/film.py": FILM.replace("FACTOR = 1.0", "from grease_film.deep import FACTOR"),
         "grease_film/deep.py": "FACTOR = 1.0\n",
     },
+    "a module that a helper kept on disk calls": {
+        "grease_film/film.py": FILM.replace("FACTOR = 1.0", "from grease_film.deep import FACTOR")
+        .replace("import numba", "from campaign.physics.compiled import compiled")
+        .replace("numba.njit", "compiled"),
+        "grease_film/deep.py": "FACTOR = 1.0\n",
+    },
     "another folder on the path": {
         "grease_film/film.py": FILM.replace("FACTOR = 1.0", "from films.thin import FACTOR"),
         "films/thin.py": "FACTOR = 1.0\n",

@@ -164,14 +164,20 @@ def test_a_report_says_which_test_it_cannot_analyse_and_analyses_the_others(
 ) -> None:
     points = {"campaign.experiments/borrowed": "borrowed:EXPERIMENT"}
     lab.install("borrower", {"borrowed.py": BORROWED}, points)
+    lab.grease()
     again = SEA.partition("\n\n")[2].replace('"sea"', '"again"')
-    lab.write("two.toml", SEA + "\n" + again.replace('"stabilization"', '"borrowed"'))
-    lab.does("run", "two.toml")
+    third = GREASED_SEA.partition("\n\n")[2].replace('"sea"', '"third"')
+    again = again.replace('"stabilization"', '"borrowed"')
+    lab.write("three.toml", f"{SEA}\n{again}\n{third}")
+    lab.does("run", "three.toml")
     lab.install("borrower", {"borrowed.py": "1 / 0\n"}, points, "1.1")
+    lab.grease("1.2", "import no_such_film")
     done = lab.does("report", lab.archive.name)
     told = " ".join(done.stderr.split())
     assert "the experiment 'borrowed' of the package borrower 1.1" in told
     assert "ZeroDivisionError" in told
+    assert "the friction model 'grease' of the package grease_film 1.2" in told
+    assert "No module named 'no_such_film'" in told
     page = Path(lab.folder.parent, done.stdout.splitlines()[-1]).read_text(encoding="utf-8")
     assert "borrower 1.1" in page
     assert page.count("<figure") > 0
