@@ -102,6 +102,7 @@ def _header(
             "backend": SIM,
             "backend_options": options,
             "versions": provenance.versions(),
+            "plugins": provenance.plug_ins([trial], SIM),
             "host": provenance.host(),
             "command": provenance.command(),
             "protocol_path": "",

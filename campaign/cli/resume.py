@@ -143,6 +143,7 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
         prepared.kind.name,
         prepared.options.model_dump(mode="json"),
         provenance.versions(),
+        provenance.plug_ins(plan.trials, prepared.kind.name),
     )
     changes = differences(archived_conditions(run), now)
     if not same_list(run.plan, plan.trials):
@@ -165,11 +166,15 @@ def _from_archive(run: RunReader) -> Remade:
     kind = find_backend(header.backend)
     options = kind.options.model_validate(header.backend_options, context={"si": True})
     was = archived_conditions(run)
-    now = Conditions(
-        was.normalised, kind.name, options.model_dump(mode="json"), provenance.versions()
-    )
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
     trials = tuple(run.full_plan.trials())
+    now = Conditions(
+        was.normalised,
+        kind.name,
+        options.model_dump(mode="json"),
+        provenance.versions(),
+        provenance.plug_ins(trials, kind.name),
+    )
     return Remade(kind, options, trials, (), policy, tuple(differences(was, now)))
 
 

@@ -13,7 +13,7 @@ from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFi
 from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
 from campaign.cli.output import print_line, print_table
-from campaign.trial import Outcome
+from campaign.trial import Outcome, Tree
 
 
 def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
@@ -126,6 +126,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("tags", ", ".join(header.tags)),
         ("revision", header.git_revision),
         ("versions", versions),
+        ("plug-ins", "; ".join(map(_plug_in, header.plugins))),
         ("fingerprint", header.fingerprint),
     ]
 
@@ -134,6 +135,13 @@ def _signature(run: RunReader) -> str:
     if not (run.sealed and has_signature(run.path)):
         return ""
     return f"{signature_path(run.path).name} (not checked; campaign verify --signer ...)"
+
+
+def _plug_in(record: Tree) -> str:
+    """One kind of an installed package."""
+    sha256 = str(record.get("sha256", ""))[:12]
+    package = f"{record.get('distribution')} {record.get('version')}"
+    return f"{record.get('room')} {record.get('name')} of {package}, sources {sha256}"
 
 
 def _tests(run: RunReader) -> list[tuple[str, ...]]:

@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from pydantic import ValidationError
+
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.errors import ArchiveError
+from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
 from campaign.published.scoreboard import Evidence, evidence_of
@@ -68,7 +70,9 @@ def published_of(run: RunReader) -> Published:
 
 
 def one_line(error: BaseException) -> str:
-    """An error without its traceback."""
+    """An error without its traceback; of options that are not valid, the first that is wrong."""
+    if isinstance(error, ValidationError):
+        return str(error.errors(include_url=False)[0]["msg"])[:600]
     lines = str(error).strip().splitlines()
     text = lines[0] if lines else "no message"
     return f"{type(error).__name__}: {text}"[:300]
@@ -78,7 +82,7 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
     name, kind = str(test.get("name", "")), str(test.get("kind", ""))
     options, reproduces = test.get("options"), test.get("reproduces")
     trials = tuple(trial for trial in run.trials if trial.trial.test == name)
-    experiment = experiments.get(kind)
+    experiment, unusable = _experiment(kind, experiments)
     data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
     try:
         result, problem = _result(data, experiment)
@@ -103,8 +107,16 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
         experiment=experiment,
         bench=_bench(trials),
         result=result,
-        problem=problem,
+        problem=unusable or problem,
     )
+
+
+def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Experiment | None, str]:
+    """The experiment, or why a package that should provide it cannot."""
+    try:
+        return experiments.get(kind), ""
+    except UsageError as error:
+        return None, str(error)
 
 
 def _readable(
