@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from campaign.archive import find_runs
-from campaign.archive.damage import Damage
+from campaign.archive.damage_words import in_words
 from campaign.archive.verification import Verification, verify_run
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.errors import ExitCode
@@ -31,17 +31,11 @@ def verify_archives(names: Sequence[str], results: Path, *, as_json: bool) -> Ex
 def _print(found: Verification) -> None:
     """One line per problem on standard output; one in all when there is none."""
     for damage in found.problems:
-        print_line(f"{found.path}: {_told(damage)}")
+        print_line(f"{found.path}: {in_words(damage)}")
     if found.sound:
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets)")
     for damage in found.remarks:
         print_note(f"{found.path}: note: {damage}", style="yellow")
-
-
-def _told(damage: Damage) -> str:
-    if damage.trial and damage.channel:
-        return f"{damage.trial}, {damage.channel}: {damage}"
-    return f"{damage.trial}: {damage}" if damage.trial else str(damage)
 
 
 def _tree(found: Verification) -> dict[str, object]:

@@ -65,8 +65,9 @@ def test_the_drift_of_the_checks(made_up: ModuleType, tmp_path: object) -> None:
     done = Ending(Outcome.COMPLETED)
     roles = {1: Role.MEASUREMENT, 21: Role.CHECK, 42: Role.CHECK}
     run = replace(run, trials=tuple(of(run, n, role, done) for n, role in roles.items()))
-    (drift,), problems = drifts_of(run)
+    (drift,), problems, damaged = drifts_of(run)
     assert not problems
+    assert not damaged
     rows = drift_table(drift).rows
     assert [row["trial"] for row in rows] == [1, 21, 42]
     assert math.isclose(float(rows[0]["rms"]), 1.01 / math.sqrt(2), rel_tol=1e-2)
