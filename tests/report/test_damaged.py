@@ -49,3 +49,4 @@ def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
     assert (damage.trial, damage.channel) == ("trial-00002", "gyro_rate")
     assert "does not match its checksum" in damage.reason
     assert test.problem == ""
+    assert test.evidence().failed  # what it did not find is not merely "not run"

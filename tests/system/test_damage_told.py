@@ -7,6 +7,8 @@ import json
 import random
 import shutil
 from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -14,10 +16,11 @@ import numpy as np
 import pytest
 
 import campaign
-from campaign.archive import find_run, open_run
+from campaign.archive import ArchivedTrial, RunWriter, find_run, open_run
 from campaign.archive.damage import Damage
 from campaign.archive.damage_words import in_one_line
 from campaign.archive.journal import Decision
+from campaign.archive.sound_samples import readable, without_damaged
 from campaign.archive.story import read_lines
 from campaign.errors import ArchiveError
 from campaign.export import exports
@@ -191,6 +194,19 @@ def test_of_chosen_trials_the_damaged_ones_are_left_out(archive: Path, tmp_path:
     assert (tmp_path / "out" / "trial-00001.csv").exists()
 
 
+def test_an_error_that_only_names_the_file_is_still_its_trials(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def broken(trial: ArchivedTrial) -> Recording:
+        raise ArchiveError(f"{trial.path}: cannot be read: Input/output error")
+
+    monkeypatch.setattr(ArchivedTrial, "recording", broken)
+    run = open_run(archive)
+    good, damaged = readable(run.path, run.trials)
+    assert good == ()
+    assert [damage.trial for damage in damaged] == ["trial-00001", "trial-00002"]
+
+
 class Lazy(Mapping[str, Channel]):
     """Channels that are checked when they are asked for, one of which is damaged."""
 
@@ -216,13 +232,54 @@ def test_of_a_trial_the_good_channels_are_exported(
     channels = {n: Channel(n, "A", n, "A", np.arange(3.0)) for n in names}
     lazy = Lazy(archive, channels, "gyro_rate")
     late = Recording(np.arange(3.0), lazy, (), Ending(Outcome.COMPLETED))
-    monkeypatch.setattr("campaign.archive.ArchivedTrial.recording", lambda trial: late)
+    monkeypatch.setattr(ArchivedTrial, "recording", lambda trial: late)
     done = export_run(campaign.open(archive), exports()["csv"], tmp_path / "out", numbers=[2])
     assert [(damage.trial, damage.channel) for damage in done.damaged] == [
         ("trial-00002", "gyro_rate")
     ]
     heading = (tmp_path / "out" / "trial-00002.csv").read_text(encoding="utf-8").splitlines()[0]
     assert heading == "time (s),motor_current (A)"
+
+
+def test_a_channel_that_turns_out_damaged_when_it_is_read_is_never_served(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    read = ArchivedTrial.recording
+
+    def lazily(trial: ArchivedTrial) -> Recording:
+        whole = read(trial)
+        bad = "gyro_rate" if trial.path == archive and trial.trial.number == 2 else ""
+        return replace(whole, channels=Lazy(archive, whole.channels, bad))
+
+    monkeypatch.setattr(ArchivedTrial, "recording", lazily)
+    assert replayed(archive, tmp_path / "replay").exit_code == 3
+    good, bad = open_run(find_run(tmp_path / "replay")).trials
+    assert good.ending.outcome is Outcome.COMPLETED
+    assert "/trial_00002/data/gyro_rate" in bad.ending.reason
+    lost = told.run_campaign("rerun", archive, "2", "--results", tmp_path / "rerun")
+    assert told.code_of(lost) == 4
+    assert not (tmp_path / "rerun").exists()  # known before anything was executed
+    run = open_run(archive)
+    names, trials, damaged = without_damaged(
+        run.path, run.trials, lambda trials: [t.recording()["gyro_rate"].size > 0 for t in trials]
+    )
+    assert names == [True]
+    assert [trial.trial.number for trial in trials] == [1]
+    assert [(damage.trial, damage.channel) for damage in damaged] == [("trial-00002", "gyro_rate")]
+
+
+def test_a_run_that_was_killed_is_told_of_alike(archive: Path, tmp_path: Path):
+    trials = [trial.trial for trial in open_run(archive).trials]
+    header = open_run(archive).header.model_copy(update={"name": "killed"})
+    with closing(RunWriter.create(tmp_path, header, trials)) as writer:
+        for trial in trials:
+            recorder = writer.begin(trial)
+            recorder.finish(Ending(Outcome.COMPLETED), "2026-11-21T09:37:00Z", header.created)
+    (tmp_path / "killed.partial" / "trial-00002.nxs").unlink()
+    for command in (("show",), ("export", "--to", "csv")):
+        done = told.run_campaign(command[0], "killed", *command[1:], "--results", tmp_path)
+        assert done.exit_code == 4
+        assert "trial-00002: trial-00002.nxs: there is no such file" in done.stderr
 
 
 def test_a_report_says_so_above_everything_else(archive: Path, tmp_path: Path):
