@@ -12,17 +12,24 @@ from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
 from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
+from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_table
+from campaign.errors import ExitCode
 from campaign.trial import Outcome, Tree
 
 
-def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
+def show_archive(name: str | None, results: Path, *, as_json: bool) -> ExitCode:
     """What a run was, how it ended, its tests, and all that did not go as planned."""
     run = open_run(find_run(results, name))
     story = read_lines(run.journal.encode())
     if as_json:
         print_line(json.dumps(_tree(run, story), indent=2))
-        return
+    else:
+        _print(run, story)
+    return say_damaged(run.path, run.damaged)
+
+
+def _print(run: RunReader, story: Lines) -> None:
     for label, value in _facts(run):
         if value:
             print_line(f"{label + ':':<13}{value}")
