@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 from campaign.archive.files import write_lines_atomically
-from campaign.archive.record import SHARED, parse_trees, shared_trees, trees_text
+from campaign.archive.record import parse_trees, restored_trial, shared_trees, trees_text
 from campaign.archive.run_folder import first_line
 from campaign.errors import ArchiveError
 from campaign.trial import Tree, Trial, canonical_json
@@ -71,9 +71,7 @@ class FullPlan:
         if not 1 <= number <= len(self._lines):
             raise ArchiveError(f"{self.path}: the plan has no trial {number}")
         try:
-            described = json.loads(self._lines[number - 1])
-            described |= {name: self._trees[described[name]] for name in SHARED}
-            trial = Trial.model_validate_json(canonical_json(described))
+            trial = restored_trial(json.loads(self._lines[number - 1]), self._trees)
         except (ValueError, LookupError, TypeError, RecursionError) as error:
             raise self._damaged(PLAN_TRIALS, number, first_line(error)) from None
         if trial.number != number:

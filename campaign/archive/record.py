@@ -141,10 +141,7 @@ class TrialRecord(_Part):
 
     def restored(self, trees: Trees) -> Trial:
         """The trial itself. Raises LookupError when a tree is missing, ValueError."""
-        own: dict[str, JsonValue] = {**self.trial, **{name: {} for name in SHARED}}
-        shared = {name: trees[str(self.trial[name])] for name in SHARED}
-        # The trees were checked against their digests, and validating them again costs most.
-        return Trial.model_validate(own).model_copy(update=shared)
+        return restored_trial(self.trial, trees)
 
     def fingerprint_of(self, trees: Trees) -> str:
         """The fingerprint of the trial as it was stored.
@@ -164,6 +161,14 @@ class TrialRecord(_Part):
     @property
     def sha256(self) -> str:
         return text_digest(self.text)
+
+
+def restored_trial(described: Tree, trees: Trees) -> Trial:
+    """A trial from what `shared_trees` made of it. Raises LookupError, ValueError."""
+    own: dict[str, JsonValue] = {**described, **{name: {} for name in SHARED}}
+    shared = {name: trees[str(described[name])] for name in SHARED}
+    # The trees were checked against their digests, and validating them again costs most.
+    return Trial.model_validate(own).model_copy(update=shared)
 
 
 def shared_trees(trial: Trial) -> tuple[Tree, dict[str, Tree]]:
