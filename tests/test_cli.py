@@ -22,7 +22,7 @@ from campaign.errors import (
 )
 from campaign.resources import protocols_folder
 
-HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "pint", "scipy", "tree_sitter")
+HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "scipy", "tree_sitter")
 COMMANDS = (
     "plan",
     "run",

@@ -16,16 +16,19 @@ from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
+from campaign.unit_grammar import listed
 from campaign.units import convert
 
 EXPERIMENT = "experiment"
 CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
+UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
 def list_kinds() -> None:
     """One line per kind."""
-    print_table(("room", "name", "what it is"), [*(k[:3] for k in _all_kinds()), CHANNELS])
+    rows = [*(kind[:3] for kind in _all_kinds()), CHANNELS, UNITS_KIND]
+    print_table(("room", "name", "what it is"), rows)
 
 
 def show_kind(name: str) -> None:
@@ -33,10 +36,13 @@ def show_kind(name: str) -> None:
     if name == CHANNELS[1]:
         _show_channels()
         return
+    if name == UNITS_KIND[1]:
+        _show_units()
+        return
     kinds = list(_all_kinds())
     chosen = [kind for kind in kinds if kind[1] == name]
     if not chosen:
-        names = {CHANNELS[1], *(kind[1] for kind in kinds)}
+        names = {CHANNELS[1], UNITS_KIND[1], *(kind[1] for kind in kinds)}
         close = difflib.get_close_matches(name, sorted(names), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
@@ -68,6 +74,14 @@ def _show_channels() -> None:
         units = [UNITS[axis][what.quantity][0] or what.quantity.value for axis in AxisKind]
         rows.append((name, *units, what.side.value, what.known_by.value, what.meaning))
     print_table(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
+
+
+def _show_units() -> None:
+    """The table of units; docs/protocols.md has the grammar of what is made of them."""
+    print_line(f"{UNITS_KIND[1]} ({UNITS_KIND[0]}): {UNITS_KIND[2]}")
+    print_line()
+    rows = [(name, " ".join(prefixes), "  ".join(others)) for name, prefixes, others in listed()]
+    print_table(("unit", "prefixes", "or"), rows)
 
 
 def _all_kinds() -> Iterator[tuple[str, str, str, Any]]:

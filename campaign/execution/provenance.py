@@ -10,7 +10,7 @@ from pathlib import Path
 
 import campaign
 
-LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "pint")
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic")
 
 
 def versions() -> dict[str, str]:
