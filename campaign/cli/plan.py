@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
-from campaign.cli.output import bytes_text, print_line, print_note, print_table
+from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.prepare import Prepared, Request, lacking, prepare
 from campaign.execution.display import clock
 from campaign.experiments import experiments
@@ -38,7 +37,7 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
     if as_json:
         tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
-        print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(tree)
     else:
         _print(prepared, results, losses)
     check_limits(prepared.plan)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
 from campaign.archive.story import Lines, read_lines
-from campaign.cli.output import print_line, print_table
+from campaign.cli.output import print_json, print_line, print_table
 from campaign.trial import Outcome
 
 
@@ -20,7 +19,7 @@ def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
     run = open_run(find_run(results, name))
     story = read_lines(run.journal.encode())
     if as_json:
-        print_line(json.dumps(_tree(run, story), indent=2))
+        print_json(_tree(run, story))
         return
     for label, value in _facts(run):
         if value:

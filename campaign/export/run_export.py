@@ -13,6 +13,7 @@ from campaign.access import RunView, TrialView
 from campaign.access.tables import trials_table
 from campaign.errors import ArchiveError, UsageError
 from campaign.export.interface import ExportKind
+from campaign.plain_text import on_a_page
 
 TABLE = "trials.csv"
 """The table of what was exported; its column `file` says which file a trial's recording is in."""
@@ -91,7 +92,8 @@ def _write(trials: Sequence[TrialView], kind: ExportKind, part: Path, folder: Pa
             kind.write(view, recording, part / files[view.number])
     table = trials_table(view.archived for view in trials)
     table["file"] = [files.get(view.number, "") for view in trials]
-    table.to_csv(part / TABLE, lineterminator="\n", encoding="utf-8")
+    text = on_a_page(table.to_csv(lineterminator="\n"))
+    (part / TABLE).write_text(text, encoding="utf-8", newline="\n")
     return Exported(folder, len(files), tuple(problems))
 
 

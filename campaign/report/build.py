@@ -11,6 +11,7 @@ from typing import Any
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
+from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.report import page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
@@ -55,7 +56,7 @@ def build_report(
         for name, text in {"report.html": html, **folder.files}.items():
             path = new / name
             path.parent.mkdir(exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
+            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
     return Report(output / "report.html", problems)
 
 
