@@ -15,6 +15,8 @@ from campaign.protocol.positions import Aim, Keys, Position, Positions
 
 LARGEST_FILE = 4 * 1024 * 1024
 """bytes; a protocol of hand-written tests has some kilobytes."""
+MOST_VALUES = 200_000
+"""of a protocol with its includes, of a bench; 100 000 trials have fewer."""
 DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
 
@@ -112,6 +114,8 @@ def read_source(file: Path, name: str) -> Source | list[Problem]:
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     except ValueError as error:  # a number of thousands of digits
         return [Problem(file, 0, 0, f"not readable as TOML: {error}")]
+    if count_values(tree) > MOST_VALUES:
+        return [Problem(file, 0, 0, TOO_MANY)]
     if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     source = Source(file, name, text, tree)
@@ -121,6 +125,24 @@ def read_source(file: Path, name: str) -> Source | list[Problem]:
         if isinstance(value, int) and not -(2**63) <= value < 2**63
     ]
     return oversized or source
+
+
+TOO_MANY = (
+    f"more than {MOST_VALUES} values, the most that is read; "
+    "{ start, stop, num } sweeps many, and a CSV file holds a series"
+)
+
+
+def count_values(tree: Any) -> int:
+    """Values and tables of a document; as many as make it too many, where there are more."""
+    count, stack = 0, [tree]
+    while stack and count <= MOST_VALUES:
+        value = stack.pop()
+        if isinstance(value, dict | list):
+            count += len(value)
+            inside = value.values() if isinstance(value, dict) else value
+            stack.extend(item for item in inside if isinstance(item, dict | list))
+    return count
 
 
 def read_text(file: Path) -> str:
