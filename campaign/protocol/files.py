@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
+import campaign
 from campaign.errors import Problem
 from campaign.protocol.positions import Aim, Keys, Position, Positions
 
@@ -103,8 +104,11 @@ class Patched:
         return self.base.problem(keys, aim, message)
 
 
-def read_source(file: Path, name: str) -> Source | list[Problem]:
-    """The TOML file, or what is wrong with its text; UnreadableError when there is no text."""
+def read_source(file: Path, name: str, newest: int = 0) -> Source | list[Problem]:
+    """The TOML file, or what is wrong with its text; UnreadableError when there is no text.
+
+    `newest`: the schema that this program reads, of a kind of file that may say which it has.
+    """
     text = read_text(file)
     try:
         tree = tomllib.loads(text)
@@ -119,12 +123,29 @@ def read_source(file: Path, name: str) -> Source | list[Problem]:
     if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     source = Source(file, name, text, tree)
+    if newest and (problem := _other_schema(source, newest)) is not None:
+        return [problem]
     oversized = [
         source.problem(keys, "value", "an integer of more than 64 bits")
         for keys, value in _leaves(tree)
         if isinstance(value, int) and not -(2**63) <= value < 2**63
     ]
     return oversized or source
+
+
+def _other_schema(source: Source, newest: int) -> Problem | None:
+    """Take `schema` out of the tree; the problem of one that this program does not know."""
+    given = source.tree.pop("schema", 1)
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        message = f"{given!r} is no schema; they are whole numbers, the present one is {newest}"
+    elif given > newest:
+        message = (
+            f"written for schema {given}; campaign {campaign.__version__} reads up to {newest}: "
+            "install a newer campaign (`campaign --version` names what it reads)"
+        )
+    else:
+        return None
+    return source.problem(("schema",), "value", message)
 
 
 TOO_MANY = (
