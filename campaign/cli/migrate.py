@@ -74,7 +74,7 @@ def _say(file: Path, change: Change, *, planned: bool) -> None:
     if change.by_hand:
         print_line(f"{file}: {change.place}: BY HAND: {change.what}")
     else:
-        print_line(f"{file}: {change.place}: {'would be: ' if planned else ''}{change.what}")
+        print_line(f"{file}: {change.place}: {'to do: ' if planned else ''}{change.what}")
 
 
 def _write(file: Path, text: str) -> None:
