@@ -1,8 +1,41 @@
-"""Text from elsewhere, fit for a terminal."""
+"""Text from elsewhere, fit for a terminal or for a page."""
 
 from __future__ import annotations
 
+import json
+import unicodedata
+from typing import Any
+
+REPLACEMENT = "?"
+
 
 def printable(text: str, keep: str = "") -> str:
-    """`text` with `?` for what a terminal would obey or not show, but for the letters of `keep`."""
-    return "".join(letter if letter.isprintable() or letter in keep else "?" for letter in text)
+    """`text` with `?` for what a terminal would obey or not show, but for the letters of `keep`.
+
+    That is control characters, those that turn the direction of writing, lone surrogates and what
+    has no meaning; a space of any width becomes a space.
+    """
+    if text.isprintable():
+        return text
+    strange = {letter for letter in set(text) if not (letter.isprintable() or letter in keep)}
+    return text.translate({ord(letter): _instead(letter) for letter in strange})
+
+
+def on_a_page(text: str) -> str:
+    """`text` as a file may hold it that people open: HTML, SVG, CSV. Lines and spaces stay."""
+    spaces = {letter for letter in set(text) if unicodedata.category(letter) == "Zs"}
+    return printable(text, keep="\n\t" + "".join(spaces))
+
+
+def json_text(tree: Any) -> str:
+    """Indented JSON in which every letter that is not printable is escaped: nothing is lost."""
+    text = json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False)
+    strange = {letter for letter in set(text) if not letter.isprintable() and letter != "\n"}
+    return text.translate({ord(letter): json.dumps(letter)[1:-1] for letter in strange} | _DELETE)
+
+
+_DELETE = {0x7F: "\\u007f"}  # which `json.dumps` takes for a letter
+
+
+def _instead(letter: str) -> str:
+    return " " if unicodedata.category(letter) == "Zs" else REPLACEMENT

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +127,12 @@ class Trial(Options):
         """SHA-256 of what determines the samples: bench, task and seed, in canonical JSON."""
         what = {"bench": self.bench, "task": self.task.model_dump(mode="json"), "seed": self.seed}
         return hashlib.sha256(canonical_json(what).encode()).hexdigest()
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with some fields changed, which works its fingerprint out anew."""
+        copy = super().model_copy(update=update, deep=deep)
+        copy.__dict__.pop("fingerprint", None)
+        return copy
 
 
 @dataclass(frozen=True)

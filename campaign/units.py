@@ -1,9 +1,9 @@
 """Text quantities to SI and back.
 
 Inside the program every number is SI. Text such as ``"18 deg/s^2"`` becomes a float when a
-protocol or a bench is validated, and becomes text in a reader's unit again on the page. Each
-physical quantity names the units it accepts: pint alone would take ``1 Hz`` for ``1 rad/s`` and
-``1 N m`` for ``1 J``, so a whitelist decides and pint only converts.
+protocol or a bench is validated, and becomes text in a reader's unit again on the page. What a
+unit may look like and what it is worth is in `unit_grammar`; a quantity accepts every unit of its
+own dimensions, where angles, cycles and energy have one of their own.
 """
 
 from __future__ import annotations
@@ -12,44 +12,58 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import lru_cache
+from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
-if TYPE_CHECKING:
-    import pint
+from campaign.unit_grammar import Unit, parse_unit
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity: its SI unit, the unit people read, and every unit it accepts.
+    """A physical quantity: its SI unit, the unit people read, and units it is usually given in.
 
     Used as pydantic metadata: ``inertia: Annotated[float, INERTIA]``. The field then takes text
     with a unit. A bare number is an error, except under the validation context
     ``{"si": True}`` with which normalised (already SI) trees are read back.
+
+    Attributes:
+        accepts: what messages and `campaign kinds units` name; any unit of the dimensions will do.
+        also: (unit, what it means here): `1/min` is `rpm` where a speed is meant.
     """
 
     name: str
     si: str
     display: str
     accepts: tuple[str, ...]
+    also: tuple[tuple[str, str], ...] = ()
 
     def parse(self, text: str) -> float:
         """SI value of `text`; ValueError with a message for the user when it has none."""
         number, unit = split_quantity(text)
         if not unit:
             raise ValueError(f"{text!r} has no unit; expected a {self.name} such as {self.example}")
-        if not math.isfinite(number):
-            raise ValueError(f"{text!r} is not a finite number")
         try:
-            parsed = _unit(unit)
-        except Exception:  # noqa: BLE001 - pint raises whatever its parser meets
-            raise ValueError(f"{unit!r} is not a unit; {self._allowed()}") from None
-        if parsed not in _accepted(self.accepts):
-            raise ValueError(f"{unit!r} is not a unit of {self.name}; {self._allowed()}")
-        return float(_registry().Quantity(number, parsed).to(self.si).magnitude)
+            value = number * self._factor(parse_unit(unit))
+        except LookupError:
+            raise ValueError(f"{unit!r} is not a unit of {self.name}; {self._allowed()}") from None
+        except ValueError as error:
+            raise ValueError(f"{unit!r} is not a unit; {self._allowed()}; {error}") from None
+        if not math.isfinite(value):
+            raise ValueError(f"{text!r} is not a finite number")
+        return value
+
+    def _factor(self, unit: Unit) -> float:
+        """How many SI units `unit` is; LookupError when it measures something else."""
+        for spelled, meant in self.also:
+            if unit == parse_unit(spelled):
+                unit = parse_unit(meant)
+        si = parse_unit(self.si)
+        if unit.dimensions != si.dimensions:
+            raise LookupError
+        return float(unit.factor / si.factor)
 
     @property
     def example(self) -> str:
@@ -81,20 +95,27 @@ class Quantity:
 
 
 _NUMBER = re.compile(
-    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?))\s*(.*?)\s*\Z",
+    r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?(?:nan|inf(?:inity)?)\b)"
+    r"\s*(.*?)\s*\Z",
     re.I | re.S,
 )
+LONGEST = 100
+"""characters of a quantity."""
 
 
 def split_quantity(text: str) -> tuple[float, str]:
     """Number and unit text of ``"0.05 deg/s"``; ValueError when it does not begin with a number."""
-    if len(text) > 100:
-        raise ValueError("a quantity is a number and a unit, not a text of over 100 characters")
+    if len(text) > LONGEST:
+        raise ValueError(
+            f"a quantity is a number and a unit, not a text of over {LONGEST} characters"
+        )
     match = _NUMBER.match(text)
     if match is None:
         raise ValueError(f"{text!r} does not begin with a number")
     if match[2].startswith(","):
         raise ValueError(f"{text!r}: the decimal sign is a point, as in {text.replace(',', '.')!r}")
+    if match[2].startswith("_"):
+        raise ValueError(f"{text!r}: digits are not grouped, as in {text.replace('_', '')!r}")
     return float(match[1]), match[2]
 
 
@@ -106,61 +127,57 @@ def convert(value: Any, unit: str, to: str) -> Any:
 
 
 def to_si(text: str) -> float:
-    """SI value of `text` in any unit (`"18 deg/s^2"`), where no one field's whitelist applies.
+    """SI value of `text` in any unit (`"18 deg/s^2"`), where no one field's dimensions apply.
 
     Raises ValueError when it is not a number with a known unit.
     """
     number, unit = split_quantity(text)
-    registry = _registry()
     try:
-        return float(registry.Quantity(number, _unit(unit)).to_base_units().magnitude)
-    except Exception:  # noqa: BLE001 - pint raises whatever its parser meets
-        raise ValueError(f"{unit!r} is not a unit") from None
+        return number * float(parse_unit(unit).factor)
+    except ValueError as error:
+        raise ValueError(f"{unit!r} is not a unit: {error}") from None
 
 
-@cache
+@lru_cache(maxsize=1024)
 def factor(unit: str, to: str) -> float:
-    """How many `to` one `unit` is. Purely multiplicative units only."""
-    return float(_registry().Quantity(1.0, _unit(unit)).to(_unit(to)).magnitude)
+    """How many `to` one `unit` is. Raises ValueError when they measure different things."""
+    one, other = parse_unit(unit), parse_unit(to)
+    if one.dimensions != other.dimensions:
+        raise ValueError(f"{unit!r} is no multiple of {to!r}")
+    return float(one.factor / other.factor)
 
 
-@cache
-def _registry() -> pint.UnitRegistry[Any]:
-    import pint
-
-    return pint.UnitRegistry(cache_folder=None)
-
-
-@cache
-def _unit(text: str) -> Any:
-    for symbol, spelled in (("°", "deg"), ("Ω", "ohm"), ("·", " "), ("²", "^2")):
-        text = text.replace(symbol, spelled)
-    return _registry().Unit(text)
-
-
-@cache
-def _accepted(units: tuple[str, ...]) -> frozenset[Any]:
-    return frozenset(_unit(unit) for unit in units)
-
-
-def _quantity(name: str, si: str, display: str, *others: str) -> Quantity:
-    return Quantity(name, si, display, tuple(dict.fromkeys((display, si, *others))))
+def _quantity(
+    name: str, si: str, display: str, *others: str, also: tuple[tuple[str, str], ...] = ()
+) -> Quantity:
+    return Quantity(name, si, display, tuple(dict.fromkeys((display, si, *others))), also)
 
 
 ANGLE = _quantity("angle", "rad", "deg", "mrad", "urad", "arcmin", "arcsec")
-ANGULAR_RATE = _quantity("angular rate", "rad/s", "deg/s", "mrad/s", "deg/min", "deg/hour", "rpm")
+ANGULAR_RATE = _quantity(
+    "angular rate",
+    "rad/s",
+    "deg/s",
+    "mrad/s",
+    "deg/min",
+    "deg/hour",
+    "rpm",
+    also=(("1/min", "rpm"),),  # as data sheets print a speed
+)
 ANGULAR_ACCELERATION = _quantity("angular acceleration", "rad/s^2", "deg/s^2", "mrad/s^2")
 TIME = _quantity("time", "s", "s", "ms", "us", "min", "hour", "h")
 FREQUENCY = _quantity("frequency", "Hz", "Hz", "mHz", "kHz", "MHz")
-TORQUE = _quantity("torque", "N m", "N m", "mN m", "kN m")
+TORQUE = _quantity("torque", "N m", "N m", "mN m", "kN m", "ozf in", "lbf in")
 TORQUE_RATE = _quantity("torque rate", "N m/s", "N m/s", "mN m/s")
 CURRENT = _quantity("current", "A", "A", "mA")
 VOLTAGE = _quantity("voltage", "V", "V", "mV")
 RESISTANCE = _quantity("resistance", "ohm", "ohm", "mohm")
 INDUCTANCE = _quantity("inductance", "H", "mH", "uH")
-INERTIA = _quantity("moment of inertia", "kg m^2", "kg m^2", "g m^2", "g cm^2")
+INERTIA = _quantity("moment of inertia", "kg m^2", "kg m^2", "kg cm^2", "g m^2", "g cm^2")
 TORQUE_CONSTANT = _quantity("torque constant", "N m/A", "N m/A", "mN m/A")
-BACK_EMF_CONSTANT = _quantity("back-EMF constant", "V s/rad", "V s/rad", "mV s/rad", "V/rpm")
+BACK_EMF_CONSTANT = _quantity(
+    "back-EMF constant", "V s/rad", "V s/rad", "mV s/rad", "V/rpm", "V/krpm"
+)
 ROTATIONAL_STIFFNESS = _quantity(
     "rotational stiffness", "N m/rad", "N m/rad", "kN m/rad", "N m/mrad", "N m/deg"
 )

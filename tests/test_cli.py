@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ from campaign.errors import (
 )
 from campaign.resources import protocols_folder
 
-HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "pint", "scipy", "tree_sitter")
+HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "scipy", "tree_sitter")
 COMMANDS = (
     "plan",
     "run",
@@ -124,3 +125,13 @@ def test_the_kind_of_a_bench_tells_its_tables_of_paths(capsys):
     assert told["gear.preload.shares"] == ["table of number", "{ static_torque = 1.0 }"]
     assert told["variation.day_to_day"] == ["table", "none"]
     assert told["variation.trial_to_trial.paths"] == ["list of text", "none"]
+
+
+def test_the_version_names_what_is_numbered_for_itself(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["campaign", "--version"])
+    with pytest.raises(SystemExit):
+        command_line()
+    first, second = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"campaign \d+\.\d+\.\d+.*", first)
+    names = r"engine \d+, format \d+, wire \d+, bench schema \d+, protocol schema \d+"
+    assert re.fullmatch(names, second)

@@ -107,10 +107,8 @@ def make_target(cell: Cell, weight: str | float) -> Target:
             raise ValueError(f"{cell.path} is 0, so its weight cannot be relative")
         return Target(cell, number / 100, relative=True)
     try:
-        if unit != cell.unit and {unit, cell.unit} & {"", "dB"}:
-            raise ValueError(unit)  # pint takes an angle for a number, and a level for a ratio
         sigma = float(convert(number, unit, cell.unit))
-    except Exception:  # noqa: BLE001 (pint raises whatever its parser meets)
+    except ValueError:
         wanted = f"in {cell.unit}" if cell.unit else "a bare number"
         raise ValueError(
             f"{weight!r} is no standard deviation of {cell.path}; write it {wanted} or in %"

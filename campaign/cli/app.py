@@ -36,13 +36,17 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # its consoles would be none of ours: `cli.output`
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from campaign.execution.provenance import own_versions
+
         typer.echo(f"campaign {campaign.__version__}")
+        typer.echo(", ".join(f"{name} {number}" for name, number in own_versions().items()))
         raise typer.Exit
 
 
@@ -412,3 +416,28 @@ def init(
     from campaign.cli.archives import init_folder
 
     init_folder(folder)
+
+
+@app.command()
+def migrate(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Protocols and benches.", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="FILE",
+            help="A new file to write it to, instead of the one that is read.",
+            show_default=False,
+        ),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit code 1 if anything would change.")
+    ] = False,
+) -> None:
+    """Bring protocols and benches of an older schema forward, or say what a person must decide."""
+    from campaign.cli.migrate import migrate_files
+
+    raise typer.Exit(migrate_files(files, output, check=check))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from datetime import datetime
 from pathlib import Path
 
 from campaign.archive import RunSummary, list_runs
 from campaign.archive.remnants import find_remnants
-from campaign.cli.output import bytes_text, print_line, print_note, print_table
+from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.selection import Selection
 from campaign.interrupts import unwinding
 from campaign.resources import copy_shipped
@@ -23,7 +22,7 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     runs = list_runs(results)
     shown = selection.of(runs)[::-1]
     if as_json:
-        print_line(json.dumps([_tree(run) for run in shown], indent=2))
+        print_json([_tree(run) for run in shown])
     elif not runs:
         print_note(f"{results}: there are no runs; `campaign run` makes one")
     elif not shown:

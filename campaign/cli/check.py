@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from campaign.cli.output import print_line, print_note, print_table
+from campaign.cli.output import print_json, print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import Fact, facts_of
@@ -67,7 +66,7 @@ def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode
     _write_picture(bench, picture)
     if as_json:
         tree = {"bench": bench.name, **_tree(loops, facts), "picture": str(picture)}
-        print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(tree)
     else:
         _print(bench, loops, facts)
         print_line(f"Bode picture: {picture}")

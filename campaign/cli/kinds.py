@@ -20,9 +20,11 @@ from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
 from campaign.plugins import Kinds, stray_entries
+from campaign.unit_grammar import listed
 from campaign.units import convert
 
 CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
+UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
@@ -36,7 +38,7 @@ def list_kinds() -> None:
                 problems.append(kind)
             else:
                 rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
-    print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS])
+    print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
         print_note(problem, style="yellow")
 
@@ -49,12 +51,20 @@ def show_kind(name: str) -> None:
     if name == CHANNELS[1]:
         _show_channels()
         return
+    if name == UNITS_KIND[1]:
+        _show_units()
+        return
     if name == BENCH[1]:
         _show(*BENCH)
         return
     rooms = [room for room in _rooms() if name in room]
     if not rooms:
-        names = {CHANNELS[1], BENCH[1], *(each for room in _rooms() for each in room)}
+        names = {
+            CHANNELS[1],
+            UNITS_KIND[1],
+            BENCH[1],
+            *(each for room in _rooms() for each in room),
+        }
         close = difflib.get_close_matches(name, sorted(names), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
@@ -103,6 +113,14 @@ def _whose(room: Kinds[Any], name: str) -> str:
     """The installed package that a kind is of; nothing for the program's own."""
     plug_in = room.plug_in(name)
     return f" (of {plug_in.distribution} {plug_in.version})" if plug_in is not None else ""
+
+
+def _show_units() -> None:
+    """The table of units; docs/protocols.md has the grammar of what is made of them."""
+    print_line(f"{UNITS_KIND[1]} ({UNITS_KIND[0]}): {UNITS_KIND[2]}")
+    print_line()
+    rows = [(name, " ".join(prefixes), "  ".join(others)) for name, prefixes, others in listed()]
+    print_table(("unit", "prefixes", "or"), rows)
 
 
 def _row(info: OptionInfo) -> tuple[str, str, str, str]:

@@ -8,11 +8,14 @@ import threading
 import traceback
 
 from campaign.cli.bench_commands import app  # with all commands
-from campaign.cli.output import print_note
+from campaign.cli.output import plain_streams, print_note
 from campaign.errors import CampaignError, ExitCode, ProtocolError
 
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
 DEBUG = "CAMPAIGN_DEBUG"
+
+for _command in app.registered_commands:  # the whole sentence; the list of commands would cut it
+    _command.short_help = getattr(_command.callback, "__doc__", None)
 
 
 def main() -> None:
@@ -20,6 +23,11 @@ def main() -> None:
     # Our matrices are tiny, and trials already take a thread each: threads inside BLAS would only
     # wait for one another (8 ms for an exponential that takes 15 us). Read when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with plain_streams():
+        _run()
+
+
+def _run() -> None:
     try:
         app(prog_name="campaign")
     except SystemExit as leaving:

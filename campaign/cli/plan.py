@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -10,7 +9,7 @@ from pathlib import Path
 
 from campaign.archive import new_run_name
 from campaign.cli.damage import archive_of, say_damaged
-from campaign.cli.output import bytes_text, print_line, print_note, print_table
+from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.prepare import Prepared, Request, lacking, prepare
 from campaign.errors import ExitCode
 from campaign.execution.display import clock
@@ -44,7 +43,7 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
     if as_json:
         tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
-        print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(tree)
     else:
         _print(prepared, results, losses)
     code = say_damaged(source.path, source.damaged) if source else ExitCode.DONE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFi
 from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import print_line, print_table
+from campaign.cli.output import print_json, print_line, print_table
 from campaign.errors import ExitCode
 from campaign.trial import Outcome, Tree
 
@@ -23,7 +22,7 @@ def show_archive(name: str | None, results: Path, *, as_json: bool) -> ExitCode:
     run = open_run(find_run(results, name))
     story = read_lines(run.journal.encode())
     if as_json:
-        print_line(json.dumps(_tree(run, story), indent=2))
+        print_json(_tree(run, story))
     else:
         _print(run, story)
     return say_damaged(run.path, run.damaged)

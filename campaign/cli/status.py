@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass, field
 
 from campaign.cli.latch import told
-from campaign.cli.output import print_line
+from campaign.cli.output import print_json, print_line
 from campaign.errors import BackendError, ExitCode
 from campaign.execution.display import clock
 from campaign.link.panic import panic_stop_of
@@ -92,7 +91,7 @@ def _show(answers: Answers, *, as_json: bool) -> None:
             "latched": latch.latched,
             "stop": None if stop is None else vars(stop),
         }
-        print_line(json.dumps(tree, indent=2, ensure_ascii=False))
+        print_json(tree)
         return
     drive, rest = ("on" if status.drive_on else "off"), ("at rest" if status.at_rest else "moving")
     print_line(f"state:  {status.state.text}, drive {drive}, {rest}")

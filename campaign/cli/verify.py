@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from campaign.archive import find_runs
 from campaign.archive.damage_words import in_words
 from campaign.archive.verification import Verification, verify_run
-from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.output import error_console, print_json, print_line, print_note
 from campaign.cli.signature import Checked, Wanted, check_signature
 from campaign.errors import ExitCode
 
@@ -30,7 +29,7 @@ def verify_archives(
         if not as_json:
             _print(*found[-1])
     if as_json:
-        print_line(json.dumps([_tree(*one) for one in found], indent=2))
+        print_json([_tree(*one) for one in found])
     good = all(run.sound and signature.valid is not False for run, signature in found)
     return ExitCode.DONE if good else ExitCode.ARCHIVE
 
@@ -72,7 +71,7 @@ def _progress(path: Path) -> Iterator[Callable[[int], object]]:
         return
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), DownloadColumn())
     with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
         task = bar.add_task(path.name, total=2 * _bytes(path))
         yield lambda count: bar.advance(task, count)

@@ -5,27 +5,56 @@ from __future__ import annotations
 import platform
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import campaign
+from campaign.archive.header import FORMAT
 from campaign.backends import backends
 from campaign.entry_points import PlugIn
 from campaign.experiments import experiments
 from campaign.physics.compensation import compensation_methods
+from campaign.physics.engine_version import ENGINE
 from campaign.physics.friction import friction_models
 from campaign.plugins import Kinds
+from campaign.protocol.schema import BENCH_SCHEMA, PROTOCOL_SCHEMA
 from campaign.source_hash import digest, sources_of
 from campaign.trial import Tree, Trial
+from campaign.wire.codes import VERSION
 
-LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "pint")
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic")
+
+
+SHAPING = ("campaign", "python", "engine", *LIBRARIES)
+"""What may change a sample when it changes; a resumed run is asked about these."""
+
+
+def own_versions() -> dict[str, str]:
+    """What of this program is numbered for itself; each rises with what changes in it."""
+    numbers = {
+        "engine": ENGINE,
+        "format": FORMAT,
+        "wire": VERSION,
+        "bench schema": BENCH_SCHEMA,
+        "protocol schema": PROTOCOL_SCHEMA,
+    }
+    return {name: str(number) for name, number in numbers.items()}
+
+
+def shaping(versions: Mapping[str, str]) -> dict[str, str]:
+    """Those of `versions` that may change a sample."""
+    return {name: versions[name] for name in SHAPING if name in versions}
 
 
 def versions() -> dict[str, str]:
-    """Versions of this program, Python, and the libraries that shape the samples."""
-    found = {"campaign": campaign.__version__, "python": platform.python_version()}
+    """Versions of this program and its parts, Python, and the libraries that shape the samples."""
+    found = {
+        "campaign": campaign.__version__,
+        **own_versions(),
+        "python": platform.python_version(),
+    }
     for name in LIBRARIES:
         try:
             found[name] = version(name)

@@ -11,6 +11,7 @@ from campaign.archive import PlannedTrial, RunReader
 from campaign.archive.journal import Decision, TrialFinished, parse_journal
 from campaign.archive.resuming import RESUMABLE
 from campaign.errors import UsageError
+from campaign.execution.provenance import shaping
 from campaign.trial import Outcome, Tree, Trial, canonical_json
 
 SHOWN = 20
@@ -106,7 +107,7 @@ def differences(was: Conditions, now: Conditions) -> list[str]:
     found += _of_tests(_by_name(was.normalised), _by_name(now.normalised))
     found += [
         _line(f"versions.{path}", *values)
-        for path, *values in _compare(dict(was.versions), dict(now.versions))
+        for path, *values in _compare(shaping(was.versions), shaping(now.versions))
     ]
     found += [
         _line(f"plugins.{path}", *values)

@@ -22,6 +22,7 @@ from typing import NoReturn
 from campaign.errors import ExitCode
 from campaign.execution.guardian import MAKING_SAFE, NOTE, Asked
 from campaign.execution.safety import NOT_SAFE, SAFE
+from campaign.plain_text import printable
 
 _NOTICE = (
     "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
@@ -163,7 +164,8 @@ class StopSwitch:
         unsafe = code is ExitCode.NOT_SAFE
         state = f"{NOT_SAFE if unsafe else SAFE}\n" if unsafe or self._moves else ""
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
-        _say(f"{cursor}\n{state}{self._note()}\n")
+        note = printable(self._note(), keep="\n")
+        _say(f"{cursor}\n{state}{note}\n")
         os._exit(code)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from campaign.access import TrialView
 from campaign.export.interface import ExportKind
+from campaign.plain_text import on_a_page
 from campaign.trial import Recording
 
 
@@ -22,7 +23,7 @@ def _write(trial: TrialView, recording: Recording, path: Path) -> None:
 
 
 def _heading(name: str, unit: str) -> str:
-    return f"{name} ({unit})" if unit else name
+    return on_a_page(f"{name} ({unit})" if unit else name)
 
 
 EXPORT = ExportKind("csv", "text, one line per sample, units in the heading", ".csv", _write)

@@ -16,6 +16,7 @@ from campaign.archive.damage_words import FILE, damaged_csv, lost_trials
 from campaign.archive.sound_samples import sound_part
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
+from campaign.plain_text import on_a_page
 
 TABLE = "trials.csv"
 """The table of what was exported; its column `file` says which file a trial's recording is in."""
@@ -98,9 +99,10 @@ def _write(
         files, damaged = _write_recordings(run, trials, kind, part, damaged)
     table = trials_table(view.archived for view in trials)
     table["file"] = [files.get(view.number, "") for view in trials]
-    table.to_csv(part / TABLE, lineterminator="\n", encoding="utf-8")
+    text = on_a_page(table.to_csv(lineterminator="\n"))
+    (part / TABLE).write_text(text, encoding="utf-8", newline="\n")
     if damaged:
-        (part / FILE).write_text(damaged_csv(damaged), encoding="utf-8", newline="\n")
+        (part / FILE).write_text(on_a_page(damaged_csv(damaged)), encoding="utf-8", newline="\n")
     return len(files), damaged
 
 

@@ -9,6 +9,7 @@ from campaign.errors import ProtocolError, UsageError
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
 from campaign.protocol.problems import validate
+from campaign.protocol.schema import BENCH_SCHEMA
 from campaign.resources import protocols_folder
 
 
@@ -19,7 +20,7 @@ def load_bench(written: str) -> Bench:
     """
     file = _find(written)
     try:
-        source = read_source(file, written)
+        source = read_source(file, written, BENCH_SCHEMA)
     except UnreadableError as error:
         raise UsageError(f"{written}: {error}") from None
     if not isinstance(source, Source):

@@ -8,12 +8,22 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from campaign.errors import Problem
-from campaign.protocol.files import Origin, Patched, Source, UnreadableError, Within, read_source
+from campaign.protocol.files import (
+    MOST_VALUES,
+    TOO_MANY,
+    Origin,
+    Patched,
+    Source,
+    UnreadableError,
+    Within,
+    count_values,
+    read_source,
+)
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, nearest, validate
-from campaign.protocol.schema import ProtocolFile, replaced
+from campaign.protocol.schema import PROTOCOL_SCHEMA, ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
@@ -72,6 +82,7 @@ class Collected:
     sources: dict[str, Source] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     chains: dict[Path, tuple[str, ...]] = field(default_factory=dict)
+    values: int = 0
 
 
 def collect(path: Path, collected: Collected) -> Source | None:
@@ -129,9 +140,13 @@ def sibling(source: Source, written: str) -> tuple[Path, str]:
 
 
 def _collect(file: Path, name: str, chain: tuple[str, ...], collected: Collected) -> Source | None:
-    source = read_source(file, name)
+    source = read_source(file, name, PROTOCOL_SCHEMA)
     if not isinstance(source, Source):
         collected.problems += source
+        return None
+    collected.values += count_values(source.tree)
+    if collected.values > MOST_VALUES:
+        collected.problems.append(Problem(file, 0, 0, f"with what was included before: {TOO_MANY}"))
         return None
     chain = (*chain, name)
     collected.sources[name] = source

@@ -10,6 +10,7 @@ from typing import Any
 
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
+from campaign.protocol import memory
 from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
@@ -19,8 +20,11 @@ from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 Names = tuple[str, ...]
 
+CHANNELS = 11
+"""A backend records, besides the time; for the estimate of what would be written."""
 LARGEST_RECORDING = 200_000_000
-"""samples of one trial; more fills a disk, and is a slip of units."""
+"""samples of one trial; more is a slip of units. They are recorded in flat memory, and an analysis
+holds the channels that it reads."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +32,13 @@ class Expanded:
     """The trials of one test in order of execution, each with its bench as an object.
 
     `first_measurement` is the index of the first as written, whatever the order; None without one.
+    `memory` is what all of it takes (bytes).
     """
 
     trials: tuple[Trial, ...]
     benches: tuple[Bench, ...]
     first_measurement: int | None
+    memory: int = 0
 
 
 @dataclass(frozen=True)
@@ -47,16 +53,31 @@ class _Place:
     bench_tree: Tree
 
 
-def expand(test: Test, seed: int, before: int, allow_large: bool) -> Expanded:
-    """The trials of `test`, numbered from `before` + 1. Raises PointError."""
+def expand(
+    test: Test, seed: int, before: int, allow_large: bool, left: int = memory.MOST
+) -> Expanded:
+    """The trials of `test`, numbered from `before` + 1, in `left` bytes. Raises PointError."""
     places: list[_Place] = []
+    if memory.least(test) > left:
+        raise PointError([memory_problem(test, memory.least(test))])
     points = list(points_of(test))
     own_benches: dict[str, tuple[Bench, Tree]] = {}
-    for repeat, point in itertools.product(range(1, test.entry.repeat + 1), points):
+    benches = memory.BENCH * len({id(point.bench) for point in points})
+    whole = len(points) * test.entry.repeat
+    asked = 0
+    for done, (repeat, point) in enumerate(
+        itertools.product(range(1, test.entry.repeat + 1), points), start=1
+    ):
         for index, (request, bench, tree) in enumerate(_requests(test, point, own_benches)):
             places.append(_Place(point, request, index, repeat, bench, tree))
+            asked += memory.of_task(request.task)
             if len(places) + before > LARGEST_PLAN and not allow_large:
                 raise PointError([size_problem(test, "the plan has")])
+            if asked + benches + len(own_benches) * memory.BENCH > left:
+                raise PointError([memory_problem(test, asked * whole // done + benches)])
+        if asked * whole // done > memory.SURELY * left:
+            raise PointError([memory_problem(test, asked * whole // done + benches)])
+    spent = asked + benches + len(own_benches) * memory.BENCH
     ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
     numbers = itertools.count(before + 1)
     set_by_hand = set_by_operator(test)
@@ -68,7 +89,7 @@ def expand(test: Test, seed: int, before: int, allow_large: bool) -> Expanded:
     measured = (place for place in places if place.request.role is Role.MEASUREMENT)
     first = next(measured, None)
     at = next((i for i, place in enumerate(ordered) if place is first), None)
-    return Expanded(trials, tuple(place.bench for place in ordered), at)
+    return Expanded(trials, tuple(place.bench for place in ordered), at, spent)
 
 
 def _setup(test: Test, point: Point) -> tuple[str, ...]:
@@ -176,9 +197,18 @@ def channels_of(experiment: ExperimentKind, request: TrialRequest) -> tuple[Name
     return tuple(sorted(requires)), tuple(sorted(can_use))
 
 
+def memory_problem(test: Test, needed: int) -> Problem:
+    """The problem of a plan that takes `needed` bytes, at what multiplies its trials in `test`."""
+    return _at_the_multiplier(test, memory.refusal(test, needed))
+
+
 def size_problem(test: Test, what: str) -> Problem:
     """The problem of a plan with too many trials, at what multiplies them in `test`."""
     message = f"{what} over {LARGEST_PLAN} trials; sweep less, or allow large plans explicitly"
+    return _at_the_multiplier(test, message)
+
+
+def _at_the_multiplier(test: Test, message: str) -> Problem:
     keys = ("matrix",) if test.axes else ("repeat",)
     return test.origin.problem(keys, "key", message)
 

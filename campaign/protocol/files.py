@@ -10,11 +10,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
+import campaign
 from campaign.errors import Problem
 from campaign.protocol.positions import Aim, Keys, Position, Positions
 
 LARGEST_FILE = 4 * 1024 * 1024
 """bytes; a protocol of hand-written tests has some kilobytes."""
+MOST_VALUES = 200_000
+"""of a protocol with its includes, of a bench; 100 000 trials have fewer."""
 DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
 
@@ -101,8 +104,11 @@ class Patched:
         return self.base.problem(keys, aim, message)
 
 
-def read_source(file: Path, name: str) -> Source | list[Problem]:
-    """The TOML file, or what is wrong with its text; UnreadableError when there is no text."""
+def read_source(file: Path, name: str, newest: int = 0) -> Source | list[Problem]:
+    """The TOML file, or what is wrong with its text; UnreadableError when there is no text.
+
+    `newest`: the schema that this program reads, of a kind of file that may say which it has.
+    """
     text = read_text(file)
     try:
         tree = tomllib.loads(text)
@@ -112,15 +118,52 @@ def read_source(file: Path, name: str) -> Source | list[Problem]:
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     except ValueError as error:  # a number of thousands of digits
         return [Problem(file, 0, 0, f"not readable as TOML: {error}")]
+    if count_values(tree) > MOST_VALUES:
+        return [Problem(file, 0, 0, TOO_MANY)]
     if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     source = Source(file, name, text, tree)
+    if newest and (problem := _other_schema(source, newest)) is not None:
+        return [problem]
     oversized = [
         source.problem(keys, "value", "an integer of more than 64 bits")
         for keys, value in _leaves(tree)
         if isinstance(value, int) and not -(2**63) <= value < 2**63
     ]
     return oversized or source
+
+
+def _other_schema(source: Source, newest: int) -> Problem | None:
+    """Take `schema` out of the tree; the problem of one that this program does not know."""
+    given = source.tree.pop("schema", 1)
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        message = f"{given!r} is no schema; they are whole numbers, the present one is {newest}"
+    elif given > newest:
+        message = (
+            f"written for schema {given}; campaign {campaign.__version__} reads up to {newest}: "
+            "install a newer campaign (`campaign --version` names what it reads)"
+        )
+    else:
+        return None
+    return source.problem(("schema",), "value", message)
+
+
+TOO_MANY = (
+    f"more than {MOST_VALUES} values, the most that is read; "
+    "{ start, stop, num } sweeps many, and a CSV file holds a series"
+)
+
+
+def count_values(tree: Any) -> int:
+    """Values and tables of a document; as many as make it too many, where there are more."""
+    count, stack = 0, [tree]
+    while stack and count <= MOST_VALUES:
+        value = stack.pop()
+        if isinstance(value, dict | list):
+            count += len(value)
+            inside = value.values() if isinstance(value, dict) else value
+            stack.extend(item for item in inside if isinstance(item, dict | list))
+    return count
 
 
 def read_text(file: Path) -> str:

@@ -38,6 +38,7 @@ from campaign.protocol.points import PointError, points_of
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.protocol.schema import (
+    BENCH_SCHEMA,
     Check,
     CheckEntry,
     ExperimentKind,
@@ -220,18 +221,18 @@ class _Loader:
             return None
         if "/" in written or "\\" in written or written.endswith(".toml"):
             file, name = sibling(source, written)
-            return self._read(file, name, origin, keys, written)
+            return self._read(file, name, origin, keys, written, BENCH_SCHEMA)
         shipped = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
         if written in shipped:
             file = self.shipped / "benches" / f"{written}.toml"
-            return self._read(file, written, origin, keys, written)
+            return self._read(file, written, origin, keys, written, BENCH_SCHEMA)
         message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
         message += nearest(written, shipped) + ", or the path of a .toml file"
         self._report(origin.problem(keys, "value", message))
         return None
 
     def _read(
-        self, file: Path, name: str, origin: Origin, keys: Keys, written: str
+        self, file: Path, name: str, origin: Origin, keys: Keys, written: str, newest: int = 0
     ) -> Source | None:
         """A further file, read once; a missing one is a problem of the text that names it."""
         known = self.collected.sources.get(name)
@@ -240,7 +241,7 @@ class _Loader:
         if known is not None:  # a protocol file that is called like a shipped bench
             name = str(file)
         try:
-            source = read_source(file, name)
+            source = read_source(file, name, newest)
         except UnreadableError as error:
             hint = nearest(file.name, _toml_files(file.parent))
             message = f"{shown(written)}: {error} (looked for {file}){hint}"

@@ -13,17 +13,23 @@ from campaign.physics.limits import Margin, margins
 from campaign.physics.loops_used import LoopUse, loops_used
 from campaign.physics.resolution import CLOSE, resolution_margins
 from campaign.policy import Policy
+from campaign.protocol import memory
 from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.check_trials import nothing_to_check, with_checks
-from campaign.protocol.expand import Expanded, expand, samples_of, seed_of, size_problem
+from campaign.protocol.expand import (
+    CHANNELS,
+    Expanded,
+    expand,
+    memory_problem,
+    samples_of,
+    seed_of,
+    size_problem,
+)
 from campaign.protocol.matrix import count_points
 from campaign.protocol.points import PointError, points_of
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import Protocol, Test
 from campaign.trial import Task, Tree, Trial, canonical_json
-
-CHANNELS = 11
-"""A backend records, besides the time; for the estimate of what would be written."""
 
 STRUCTURE = 32_000
 """Bytes that a trial's archive takes at most besides its samples, preview and description."""
@@ -188,14 +194,16 @@ def _expanded(
     """Every chosen test's trials, the checks among them. Raises ProtocolError."""
     expansions: list[Expanded] = []
     problems: list[Problem] = []
-    before = 0
+    before, left = 0, memory.MOST
     for test in chosen:
         try:
-            expansions.append(expand(test, seed_of(test, master), before, allow_large))
+            seed = seed_of(test, master)
+            expansions.append(expand(test, seed, before, allow_large, left))
         except PointError as error:
             problems += error.problems
             continue
         before += len(expansions[-1].trials)
+        left -= expansions[-1].memory
     if problems:
         raise ProtocolError(list(dict.fromkeys(problems)))
     check, names = protocol.check, [test.entry.name for test in chosen]
@@ -300,4 +308,6 @@ def _too_large(test: Test, allow_large: bool) -> list[Problem]:
     if not allow_large:
         trials = count_points(test.axes) * test.entry.repeat
         return [size_problem(test, f"test '{test.entry.name}' alone has {trials}, the plan")]
+    if memory.least(test) > memory.MOST:
+        return [memory_problem(test, memory.least(test))]
     return list(value_problems(test))  # loading left them out

@@ -25,10 +25,17 @@ class Position(NamedTuple):
     column: int
 
 
-@dataclass(frozen=True)
+class _Point(NamedTuple):
+    """Line and byte of it, both from 0: what tree-sitter tells."""
+
+    row: int
+    byte: int
+
+
+@dataclass(frozen=True, slots=True)
 class _Entry:
-    key: Position
-    value: Position
+    key: _Point
+    value: _Point
 
 
 class Positions:
@@ -47,7 +54,8 @@ class Positions:
         for length in range(len(keys), 0, -1):
             entry = self._entries.get(keys[:length])
             if entry is not None:
-                return entry.value if aim == "value" and length == len(keys) else entry.key
+                whole = aim == "value" and length == len(keys)
+                return self._position(entry.value if whole else entry.key)
         return Position(1, 1)
 
     def span(self, keys: Keys) -> tuple[int, int] | None:
@@ -65,11 +73,11 @@ class Positions:
                     self._read_table(node, self._next_element(self._header(node)))
 
     def _read_table(self, node: Any, keys: Keys) -> None:
-        here = self._position(node)
+        here = _point(node)
         name = next((child for child in node.children if child.type in _KEYS), node)
         last = list(_key_parts(name))[-1][1] if name is not node else node
         # An element of an array of tables is named by nothing but its own header.
-        key = here if keys and isinstance(keys[-1], int) else self._position(last)
+        key = here if keys and isinstance(keys[-1], int) else _point(last)
         self._entries[keys] = _Entry(key, here)
         for child in node.children:
             if child.type == "pair":
@@ -81,9 +89,9 @@ class Positions:
         value_node = next((c for c in node.children[1:] if c.type in _VALUES), node.children[-1])
         for part, part_node in _key_parts(key_node):
             keys = (*keys, part)
-            here = self._position(part_node)
+            here = _point(part_node)
             self._entries.setdefault(keys, _Entry(here, here))
-        self._entries[keys] = _Entry(self._entries[keys].key, self._position(value_node))
+        self._entries[keys] = _Entry(self._entries[keys].key, _point(value_node))
         self._spans[keys] = (value_node.start_byte, value_node.end_byte)
         self._read_value(value_node, keys)
 
@@ -95,7 +103,7 @@ class Positions:
         elif node.type == "array":
             elements = (child for child in node.children if child.type in _VALUES)
             for index, child in enumerate(elements):
-                here = self._position(child)
+                here = _point(child)
                 self._entries[(*keys, index)] = _Entry(here, here)
                 self._read_value(child, (*keys, index))
 
@@ -108,7 +116,7 @@ class Positions:
         keys: Keys = ()
         for part, node in parts:
             keys = (*keys, part)
-            here = self._position(node)
+            here = _point(node)
             self._entries.setdefault(keys, _Entry(here, here))
             if keys in self._lengths:
                 keys = (*keys, self._lengths[keys] - 1)
@@ -117,17 +125,22 @@ class Positions:
     def _next_element(self, parts: list[tuple[str, Any]]) -> Keys:
         keys = (*self._resolve(parts[:-1]), *(part for part, _ in parts[-1:]))
         if parts:
-            here = self._position(parts[-1][1])
+            here = _point(parts[-1][1])
             self._entries.setdefault(keys, _Entry(here, here))
         index = self._lengths.get(keys, 0)
         self._lengths[keys] = index + 1
         return (*keys, index)
 
-    def _position(self, node: Any) -> Position:
-        # tree-sitter counts bytes, people count characters.
-        row, column = node.start_point
-        before = self._lines[row][:column].decode(errors="replace")
-        return Position(row + 1, len(before) + 1)
+    def _position(self, point: _Point) -> Position:
+        # tree-sitter counts bytes, people count characters. Only what is asked for is counted: a
+        # line may be as long as the file.
+        before = self._lines[point.row][: point.byte].decode(errors="replace")
+        return Position(point.row + 1, len(before) + 1)
+
+
+def _point(node: Any) -> _Point:
+    row, byte = node.start_point
+    return _Point(row, byte)
 
 
 _KEYS = frozenset({"bare_key", "quoted_key", "dotted_key"})

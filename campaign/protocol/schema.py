@@ -23,6 +23,10 @@ from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
 from campaign.trial import TrialRequest
 
+PROTOCOL_SCHEMA = 2
+BENCH_SCHEMA = 2
+"""Raised when a key is renamed, removed or means something else; `migrations` has how to follow."""
+
 Slug = Annotated[str, Field(pattern=r"^[a-z0-9]+([-_][a-z0-9]+)*$", max_length=60)]
 
 

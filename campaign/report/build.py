@@ -13,6 +13,7 @@ from campaign.archive.damage import Damage
 from campaign.archive.damage_words import listed, lost_trials
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
+from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.report import page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
@@ -62,7 +63,7 @@ def build_report(
         for name, text in {"report.html": html, **folder.files}.items():
             path = new / name
             path.parent.mkdir(exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
+            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
     return report
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from campaign.options import Options
+from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Line, Scoreboard, Status, to_csv
 from campaign.published.values import Published, PublishedTable
 from campaign.report import tables
@@ -120,6 +121,7 @@ class Folder:
     def table(self, text: str, *candidates: str) -> Download:
         """Add a CSV file and say where its link leads."""
         file = f"tables/{self.table_names.unique(*candidates)}.csv"
+        text = on_a_page(text)
         self.files[file] = text
         return Download(file, tables.data_link(text) if len(text) <= LINKED else file)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.execution.provenance import git_revision, versions
+from campaign.execution.provenance import git_revision, own_versions, shaping, versions
 
 
 def git(folder: Path, *arguments: str) -> str:
@@ -38,3 +38,15 @@ def test_without_git_there_is_no_revision(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_what_shapes_the_samples_is_versioned():
     assert {"campaign", "python", "numpy", "numba", "llvmlite", "h5py"} <= versions().keys()
+
+
+def test_what_of_the_program_is_numbered_is_in_every_archive():
+    own = {"engine", "format", "wire", "bench schema", "protocol schema"}
+    assert own == own_versions().keys() <= versions().keys()
+    assert all(number.isdigit() for number in own_versions().values())
+
+
+def test_a_resume_compares_what_may_change_a_sample_and_no_more():
+    was = {"engine": "1", "numba": "0.61", "format": "2", "pint": "0.25", "wire": "1"}
+    assert shaping(was) == {"engine": "1", "numba": "0.61"}
+    assert {"campaign", "python", "engine", "numba"} <= shaping(versions()).keys()

@@ -1,0 +1,63 @@
+"""What a plan takes in memory, known before it is made: counted in whole numbers, not expanded.
+
+The bytes are measured (trial, margins, seed, place; a bench with its tree and its loops) and
+rounded up. What a protocol asks for beyond the bound is refused, whatever `--allow-large` says: a
+slip of a digit must not take the machine that moves a bench.
+"""
+
+from __future__ import annotations
+
+import math
+
+from campaign.protocol.schema import Test
+from campaign.signals import MultiSine, Polyline, Signal
+from campaign.trial import Task
+
+MOST = 10**9
+"""bytes of a plan."""
+SURELY = 10
+"""times what is left: so far beyond it need no further point be looked at."""
+TRIAL = 7_000
+"""bytes of a trial that shares bench and options with others."""
+BENCH = 50_000
+"""bytes of a bench of its own."""
+KNOT = 64
+"""bytes of a point of a command."""
+
+
+def least(test: Test) -> int:
+    """Bytes that the plan of `test` takes at least; an experiment may ask for more trials."""
+    benches = math.prod(len(axis) for axis in test.axes if axis.of_bench)
+    points = math.prod(len(axis) for axis in test.axes)
+    return points * test.entry.repeat * TRIAL + benches * BENCH
+
+
+def of_task(task: Task) -> int:
+    """Bytes of a trial with `task`."""
+    signals = (task.command, task.base_acceleration, task.disturbance)
+    return TRIAL + KNOT * sum(map(_knots, signals))
+
+
+def _knots(signal: Signal) -> int:
+    match signal:
+        case Polyline(times=times):
+            return len(times)
+        case MultiSine(amplitudes=amplitudes):
+            return len(amplitudes)
+    return 0
+
+
+def refusal(test: Test, bytes_needed: int) -> str:
+    """What to say of a test whose plan would take too much."""
+    points = math.prod(len(axis) for axis in test.axes)
+    repeated = f", {test.entry.repeat} times" if test.entry.repeat > 1 else ""
+    whole = f"{points} point{'s' if points != 1 else ''} of its matrix{repeated}"
+    return (
+        f"test '{test.entry.name}' ({whole}) would take about {_amount(bytes_needed)} of memory to "
+        f"plan; a plan may take {_amount(MOST)}, about {MOST // TRIAL} trials: sweep less, lower "
+        "'repeat', or make several protocols of it"
+    )
+
+
+def _amount(count: int) -> str:
+    return f"{count / 1e9:.3g} GB" if count < 10**15 else f"10^{len(str(count // 10**9)) - 1} GB"

@@ -1,0 +1,308 @@
+"""What a unit may look like, and what it is worth: a small grammar over a table of its own.
+
+    unit    = ["1"] factor { separator factor }
+    factor  = ( name | "(" unit ")" ) [ power ]
+    power   = ("^" | "**") integer | integer | superscripts        as in s^-1, cm2, min-1, m²
+    separator = " " | "*" | "·" | "." | "/"
+
+A quotient divides by the next factor alone, from left to right: `V/A/s` is `V/(A s)`, and `V/A s`
+is `(V/A) s`. Length, depth and powers are bounded, so that any text is decided at once. Nothing is
+computed but a product of exact fractions.
+
+What the SI calls one is kept apart where it would hide a mistake: an angle is no pure number (`N m`
+is no `N m/rad`), nor is a cycle (`1 Hz` is no `1 1/s` and no `1 rad/s`), and energy is no torque.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from types import MappingProxyType
+
+LONGEST = 60
+"""characters of a unit."""
+DEEPEST = 3
+"""parentheses within each other."""
+LARGEST_POWER = 6
+SMALLEST = Fraction(1, 10**40)
+"""SI units; and the largest unit is as many times one of them."""
+
+PI = Fraction("3.1415926535897932384626433832795028841971693993751")
+"""To 50 digits, so that a product with it is right to the last bit of a double."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as a multiple of a product of base units.
+
+    Attributes:
+        factor: how many SI units it is.
+        dimensions: base unit and its power, sorted, none zero: (("kg", 1), ("m", 2)).
+    """
+
+    factor: Fraction
+    dimensions: tuple[tuple[str, int], ...] = ()
+
+    def __mul__(self, other: Unit) -> Unit:
+        powers = dict(self.dimensions)
+        for base, power in other.dimensions:
+            powers[base] = powers.get(base, 0) + power
+        return Unit(_bounded(self.factor * other.factor), _sorted(powers))
+
+    def __pow__(self, power: int) -> Unit:
+        powers = {base: own * power for base, own in self.dimensions}
+        return Unit(_bounded(self.factor**power), _sorted(powers))
+
+
+def _bounded(factor: Fraction) -> Fraction:
+    """`factor`; ValueError outside of what anybody measures, before powers of powers grow."""
+    if not SMALLEST < factor < 1 / SMALLEST:
+        raise ValueError("it is out of any scale")
+    return factor
+
+
+def _sorted(powers: Mapping[str, int]) -> tuple[tuple[str, int], ...]:
+    return tuple(sorted((base, power) for base, power in powers.items() if power))
+
+
+ONE = Unit(Fraction(1))
+
+PREFIXES = MappingProxyType(
+    {
+        "n": Fraction(1, 10**9),
+        "u": Fraction(1, 10**6),
+        "m": Fraction(1, 1000),
+        "c": Fraction(1, 100),
+        "k": Fraction(1000),
+        "M": Fraction(10**6),
+        "G": Fraction(10**9),
+    }
+)
+
+POUND = Fraction("0.45359237")  # kg, international yard and pound agreement of 1959
+GRAVITY = Fraction("9.80665")  # m/s^2, standard; what a pound-force and a kilogram-force weigh
+
+# Name: value in SI, base units, prefixes that data sheets put before it, other spellings.
+_TABLE: tuple[tuple[str, Fraction | int, Mapping[str, int], str, tuple[str, ...]], ...] = (
+    ("rad", 1, {"rad": 1}, "mun", ("radian", "radians")),
+    ("deg", PI / 180, {"rad": 1}, "m", ("°", "degree", "degrees")),
+    ("arcmin", PI / 10800, {"rad": 1}, "", ("'", "′")),
+    ("arcsec", PI / 648000, {"rad": 1}, "m", ('"', "″")),
+    ("rev", 2 * PI, {"rad": 1}, "k", ("r", "revolution", "revolutions", "turn")),
+    ("rpm", PI / 30, {"rad": 1, "s": -1}, "k", ()),
+    ("s", 1, {"s": 1}, "mun", ("sec", "second", "seconds")),
+    ("min", 60, {"s": 1}, "", ("minute", "minutes")),
+    ("hour", 3600, {"s": 1}, "", ("h", "hours")),
+    ("Hz", 1, {"cycle": 1, "s": -1}, "umkMG", ("hertz",)),
+    ("m", 1, {"m": 1}, "numck", ("meter", "meters", "metre", "metres")),
+    ("in", Fraction("0.0254"), {"m": 1}, "", ("inch",)),
+    ("ft", Fraction("0.3048"), {"m": 1}, "", ("foot", "feet")),
+    ("g", Fraction(1, 1000), {"kg": 1}, "umk", ("gram", "grams")),
+    ("ozm", POUND / 16, {"kg": 1}, "", ()),
+    ("lbm", POUND, {"kg": 1}, "", ()),
+    ("N", 1, {"kg": 1, "m": 1, "s": -2}, "umckM", ("newton", "newtons")),
+    ("kgf", GRAVITY, {"kg": 1, "m": 1, "s": -2}, "", ("kp",)),
+    ("gf", GRAVITY / 1000, {"kg": 1, "m": 1, "s": -2}, "", ()),
+    ("ozf", POUND / 16 * GRAVITY, {"kg": 1, "m": 1, "s": -2}, "", ()),
+    ("lbf", POUND * GRAVITY, {"kg": 1, "m": 1, "s": -2}, "", ()),
+    ("A", 1, {"A": 1}, "umk", ("ampere", "amperes", "amp", "amps")),
+    ("V", 1, {"kg": 1, "m": 2, "s": -3, "A": -1}, "umk", ("volt", "volts")),
+    ("ohm", 1, {"kg": 1, "m": 2, "s": -3, "A": -2}, "umkM", ("Ω", "ohms")),
+    ("H", 1, {"kg": 1, "m": 2, "s": -2, "A": -2}, "num", ("henry",)),
+    ("F", 1, {"kg": -1, "m": -2, "s": 4, "A": 2}, "num", ("farad",)),
+    ("Pa", 1, {"kg": 1, "m": -1, "s": -2}, "kMG", ("pascal",)),
+    ("J", 1, {"J": 1}, "umkM", ("joule", "joules")),
+    ("W", 1, {"J": 1, "s": -1}, "umkM", ("watt", "watts")),
+    ("K", 1, {"K": 1}, "m", ("kelvin",)),
+    ("degC", 1, {"degC": 1}, "", ("°C",)),  # a temperature, from which no factor leads to K
+    ("dB", 1, {"dB": 1}, "", ()),  # a level, from which no factor leads to a ratio
+    ("count", 1, {"count": 1}, "", ("counts",)),
+    ("percent", Fraction(1, 100), {}, "", ("%",)),
+    ("ppm", Fraction(1, 10**6), {}, "", ()),
+)
+
+# As data sheets join them; a power belongs to the last, as in `kgm²`.
+_JOINED = MappingProxyType(
+    {
+        **{f"{p}Nm": (f"{p}N", "m") for p in ("", "u", "m", "c", "k", "M")},
+        **{f"{p}Nms": (f"{p}N", "m", "s") for p in ("", "u", "m")},
+        "Ncm": ("N", "cm"),
+        "Nmm": ("N", "mm"),
+        "kgm": ("kg", "m"),
+        "kgcm": ("kg", "cm"),
+        "gcm": ("g", "cm"),
+        "Vs": ("V", "s"),
+        "mVs": ("mV", "s"),
+        **{
+            spelled: (force, length)
+            for force in ("ozf", "lbf")
+            for length in ("in", "ft")
+            for spelled in (
+                f"{force}-{length}",
+                f"{force[:2]}-{length}",  # joined by a hyphen with a length, a force is meant
+                f"{length}-{force}",
+                f"{length}-{force[:2]}",
+            )
+        },
+    }
+)
+
+_RMS = "an rms value; say its peak (for a sine, rms times 1.4142) in {}"
+_FORCE = "a force or a mass; write {0}f for the force, {0}m for the mass, or {0}-in for the torque"
+_REASONS = MappingProxyType(
+    {
+        **dict.fromkeys(("Arms", "A_rms", "Aeff"), _RMS.format("A")),
+        **dict.fromkeys(("Vrms", "V_rms", "Veff"), _RMS.format("V")),
+        "oz": _FORCE.format("oz"),
+        "lb": _FORCE.format("lb"),
+        "lbs": _FORCE.format("lb"),
+        "mil": "a length or an angle; write in, mrad or deg",
+        "cps": "cycles or counts per second; write Hz or count/s",
+    }
+)
+
+_CHARACTERS = str.maketrans(
+    {"\u00b5": "u", "\u03bc": "u", "\u2126": "Ω", "·": "*", "⋅": "*", ".": "*"}
+)
+"""Micro sign and Greek mu, the ohm sign that is no Omega, and the signs of a product."""
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
+_TOKEN = re.compile(
+    r"""\s*(?:
+        (?P<name>[A-Za-zΩ°%]+(?:[-_][A-Za-z]+)*|['"′″])
+      | (?P<power>(?:\^|\*\*)\s*[-+]?[0-9]+|[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)
+      | (?P<bare>-?[0-9]+)
+      | (?P<sign>[*/()])
+    )""",
+    re.X,
+)
+
+
+@cache
+def names() -> Mapping[str, Unit]:
+    """Every name with its unit, prefixes included."""
+    found: dict[str, Unit] = {}
+    for name, factor, bases, prefixes, others in _TABLE:
+        unit = Unit(Fraction(factor), _sorted(bases))
+        found |= dict.fromkeys((name, *others), unit)
+        for prefix in prefixes:
+            scaled = Unit(PREFIXES[prefix] * unit.factor, unit.dimensions)
+            symbols = (name, *(other for other in others if other in ("Ω", "r")))
+            found |= {prefix + symbol: scaled for symbol in symbols}
+    return MappingProxyType(found)
+
+
+def listed() -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Each unit of the table: name, the prefixes it takes, other spellings."""
+    for name, _, _, prefixes, others in _TABLE:
+        yield name, prefixes, others
+
+
+def parse_unit(text: str) -> Unit:
+    """The unit that `text` is. Raises ValueError saying what of it is not understood.
+
+    An empty text is the unit of pure numbers.
+    """
+    if len(text) > LONGEST:
+        raise ValueError(f"a unit has at most {LONGEST} characters")
+    return _parse(text)
+
+
+@lru_cache(maxsize=1024)
+def _parse(text: str) -> Unit:
+    tokens = _tokens(text)
+    if not tokens:
+        return ONE
+    unit, end = _product(tokens, 0, 0)
+    if end != len(tokens):
+        raise ValueError("a ')' too many")
+    return unit
+
+
+def _tokens(text: str) -> list[tuple[str, str]]:
+    text = text.strip().translate(_CHARACTERS)
+    tokens: list[tuple[str, str]] = []
+    place = 0
+    while place < len(text):
+        match = _TOKEN.match(text, place)
+        if match is None:
+            raise ValueError(f"{text[place:].lstrip()[:1]!r} stands in no unit")
+        kind = str(match.lastgroup)
+        if kind == "bare":
+            kind = _bare(match, text, tokens)
+        tokens.append((kind, match[match.lastgroup or 0]))
+        place = match.end()
+    return tokens
+
+
+def _bare(match: re.Match[str], text: str, tokens: list[tuple[str, str]]) -> str:
+    """A number right behind a name is its power (`cm2`); elsewhere only the 1 of `1/s` stands."""
+    joined = match.start() == match.start("bare")
+    if joined and tokens and (tokens[-1][0] == "name" or tokens[-1][1] == ")"):
+        return "power"
+    if match["bare"] == "1" and text[match.end() :].lstrip().startswith("/"):
+        return "one"
+    raise ValueError(f"a unit has no number in it but powers; {match['bare']!r} is none")
+
+
+def _product(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Unit, int]:
+    """The product that begins at `place`, and where it ends: at the end, or at a `)`."""
+    result, place = _factor(tokens, place, depth)
+    while place < len(tokens) and tokens[place][1] != ")":
+        divided = tokens[place][1] == "/"
+        if divided or tokens[place][1] == "*":
+            place += 1
+        unit, place = _factor(tokens, place, depth)
+        result *= unit**-1 if divided else unit
+    return result, place
+
+
+def _factor(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Unit, int]:
+    if place >= len(tokens):
+        raise ValueError("a name is missing at its end")
+    kind, text = tokens[place]
+    place += 1
+    before = ONE
+    if kind == "one":
+        unit = ONE
+    elif kind == "name":
+        before, unit = _named(text)
+    elif text == "(":
+        if depth >= DEEPEST:
+            raise ValueError(f"parentheses are more than {DEEPEST} deep")
+        unit, place = _product(tokens, place, depth + 1)
+        if place >= len(tokens):
+            raise ValueError("a ')' is missing")
+        place += 1
+    else:
+        raise ValueError(f"a name is missing before {text!r}")
+    if place < len(tokens) and tokens[place][0] == "power":
+        unit **= _power(tokens[place][1])
+        place += 1
+    return before * unit, place
+
+
+def _power(text: str) -> int:
+    digits = text.translate(_SUPERSCRIPTS).lstrip("^* \t\n\r\f\v")
+    if len(digits) > 3 or not 0 < abs(int(digits)) <= LARGEST_POWER:
+        raise ValueError(f"powers are from 1 to {LARGEST_POWER}, or the negative of that")
+    return int(digits)
+
+
+def _named(name: str) -> tuple[Unit, Unit]:
+    """What comes before the last unit of a joined name, and that last one."""
+    known = names()
+    if name in known:
+        return ONE, known[name]
+    if name in _JOINED:
+        *first, last = (known[part] for part in _JOINED[name])
+        before = ONE
+        for unit in first:
+            before *= unit
+        return before, last
+    if name in _REASONS:
+        raise ValueError(f"{name!r} may be {_REASONS[name]}")
+    near = [other for other in (*known, *_JOINED) if other.casefold() == name.casefold()]
+    raise ValueError(f"did you mean {near[0]!r}?" if near else f"there is no {name!r}")
