@@ -222,3 +222,42 @@ def test_no_two_units_are_spelled_alike():
     spelled = [name for name, _, others in listed() for name in (name, *others)]
     prefixed = [prefix + name for name, prefixes, _ in listed() for prefix in prefixes]
     assert len({*spelled, *prefixed}) == len(spelled) + len(prefixed)
+
+
+@pytest.fixture(scope="module")
+def pint():
+    """Another table of units, which others wrote and keep."""
+    return pytest.importorskip("pint").UnitRegistry()
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        ("deg", "degree"),
+        ("arcmin", "arcminute"),
+        ("arcsec", "arcsecond"),
+        ("rev", "turn"),
+        ("rpm", "rpm"),
+        ("hour", "hour"),
+        ("in", "inch"),
+        ("ft", "foot"),
+        ("ozm", "ounce"),
+        ("lbm", "pound"),
+        ("kgf", "kilogram_force"),
+        ("ozf", "ounce_force"),
+        ("lbf", "pound_force"),
+        ("V", "volt"),
+        ("ohm", "ohm"),
+        ("H", "henry"),
+        ("Pa", "pascal"),
+        ("ozf in", "ounce_force * inch"),
+        ("lbf ft", "pound_force * foot"),
+        ("V/krpm", "volt / (1000 rpm)"),
+        ("kg cm^2", "kilogram * centimeter**2"),
+        ("mN m/A", "millinewton * meter / ampere"),
+        ("N m s/deg", "newton * meter * second / degree"),
+    ],
+)
+def test_the_table_agrees_with_another_one(pint, ours, theirs):
+    expected = pint.parse_expression(theirs).to_base_units().magnitude
+    assert to_si(f"1 {ours}") == pytest.approx(expected, rel=1e-14)
