@@ -49,6 +49,8 @@ _REQUIRED = frozenset(
 ) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
 _OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}
 _MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
+_PLOT = frozenset(("axes", "time_indices"))
+"""Attributes by which viewers plot a group, besides its signal."""
 
 
 def verify(path: Path, progress: Progress) -> Verification:
@@ -138,6 +140,7 @@ class _Check:
         if texts.seal is None:
             return  # which was found when the run was opened
         bound = texts.seal.texts.keys()
+        self.datasets += 1
         for place in sorted(_REQUIRED - bound):
             self.problems.add(f"/run/{place}", "is missing from the seal")
         for place in bound:
@@ -194,6 +197,7 @@ class _Check:
         with self.problems.noting(), guarded.guarded(self.path, f"/{name}"):
             group = guarded.group_at(file, name, "NXentry")
             record, trees = read_entry(self.path, file, name, finished.record)
+            self.datasets += 1
             self._record(f"/{name}", entry, record, trees)
             self._says(group, f"/{name}", record)
             for place in self._members(group, f"/{name}", record):
@@ -232,6 +236,7 @@ class _Check:
         says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
         for name, wanted in says.items():
             with self.problems.noting():
+                self.datasets += 1
                 if guarded.text_at(group, name) != hdf5.storable(wanted):
                     self.problems.add(f"{place}/{name}", "is not what the record says")
 
@@ -281,6 +286,10 @@ class _Check:
                 data = guarded.group_at(group, inner, "NXdata")
                 for name in sorted(set(guarded.names(data)) - names):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
+                if guarded.text_at(data, "title") != hdf5.storable(record.label):
+                    self.problems.add(f"{place}/{inner}/title", "is not what the record says")
+                for name in sorted(_PLOT - set(data.attrs)):
+                    self.problems.add(f"{place}/{inner}@{name}", "is missing")
                 shown = guarded.attribute(data, "signal")
                 if shown not in names:
                     self.problems.add(f"{place}/{inner}@signal", "names no channel that is there")
