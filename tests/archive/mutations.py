@@ -47,7 +47,7 @@ def read(path: Path) -> tuple[dict, int]:
     recordings, damaged = {}, len(run.damaged)
     for archived in run.trials:
         try:
-            recording = archived.recording()
+            recording = archived.recording().whole()
         except ArchiveError:
             damaged += 1
             continue
