@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from typing import Any, Literal, Protocol
@@ -308,13 +308,6 @@ class Recording:
             return self.channels[name].samples
         except KeyError:
             raise KeyError(f"no channel {name!r}; there are {', '.join(self.channels)}") from None
-
-    def whole(self) -> Recording:
-        """With every channel read: an archive reads each one when it is first asked for.
-
-        Raises ArchiveError when one of them is damaged.
-        """
-        return replace(self, channels=dict(self.channels))
 
     def window(self, start: float, stop: float) -> Recording:
         """The part with start <= time < stop (s), half a sample tolerant."""

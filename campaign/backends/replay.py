@@ -138,7 +138,7 @@ class ReplayBackend:
         if stop():
             return Ending(Outcome.INTERRUPTED, "stopped by the operator")
         try:
-            recording = archived.recording().whole()
+            recording = archived.recording()
         except ArchiveError as error:
             return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
         channels = list(recording.channels.values())

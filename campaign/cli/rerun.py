@@ -32,7 +32,7 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     """Execute an archived trial again; the new archive's path is the last line of output."""
     run = open_run(find_run(results, name))
     archived = find_trial(run, wanted)
-    before = archived.recording().whole()
+    before = archived.recording()
     kind = find_backend(SIM)
     simulated = run.header.backend == SIM
     tree = run.header.backend_options if simulated else {}

@@ -82,7 +82,7 @@ def _write(trials: Sequence[TrialView], kind: ExportKind, part: Path, folder: Pa
     problems = []
     for view in trials:
         try:
-            recording = view.recording().whole()
+            recording = view.recording()
         except ArchiveError as error:
             problems.append(str(error))
             continue

@@ -114,7 +114,7 @@ def _readable(
     good, damaged = [], []
     for trial in trials:
         try:
-            trial.recording().whole()
+            trial.recording()
         except ArchiveError as error:
             damaged.append(f"{trial.trial.name} is left out: {error}")
         else:

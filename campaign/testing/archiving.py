@@ -25,7 +25,7 @@ def archived_as_recorded(
             path = _sealed(Path(folder), trial, channels, recording)
             run = open_run(path)
             (archived,) = run.trials
-            again = archived.recording().whole()
+            again = archived.recording()
         except (CampaignError, ValueError) as error:
             raise CheckFailedError(f"the recording cannot be archived: {error}") from error
         require(archived.trial.fingerprint == trial.fingerprint, "the trial itself was changed")
