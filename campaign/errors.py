@@ -105,3 +105,10 @@ class ArchiveError(CampaignError):
     """An archive that cannot be read, or fails its own checks."""
 
     exit_code = ExitCode.ARCHIVE
+
+
+class ArchiveWarning(UserWarning):
+    """An archive of which something is damaged, missing or not as it was sealed.
+
+    What is good of it is used. With `strict=True` the same is an ArchiveError.
+    """

@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticUndefined, core_schema
 
+from campaign.choice import Choice
 from campaign.units import Quantity
 
 
@@ -141,10 +142,13 @@ def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> st
     plain = [_PLAIN[t] for t in types if isinstance(t, type) and t in _PLAIN]
     if quantified:  # numbers come with their unit, as text
         plain = []
+    chosen = [f"{t.tag} = {word}" for t in types if isinstance(t, Choice) for word in t.words()]
+    if chosen:
+        plain.append(f"table: {' | '.join(chosen)}")
     if tables:
         plain.append("table" if len(tables) == 1 else f"table: {_alternatives(tables)}")
     accepted = " | ".join(dict.fromkeys((*words, *plain)))
-    if get_origin(annotation) is dict and not tables:
+    if get_origin(annotation) is dict and not tables and not chosen:
         return f"table of {accepted}"
     many = get_origin(annotation) in (tuple, list)
     return f"list of {accepted or 'values'}" if many else accepted

@@ -1,35 +1,223 @@
-"""Finding kinds: every module of a package, and every installed entry point of a group.
+"""The kinds of a room by name, each imported when somebody asks for it and not before.
 
-A new experiment, friction model, compensation method or backend is one file in its room, or one
-installed package that names itself under an entry point group such as `campaign.experiments`.
+A new experiment, friction model, compensation method, backend or format is one file in its room,
+or one installed package that names itself under an entry point group such as
+`campaign.experiments`. A package that cannot be used is named with what is wrong with it by whoever
+asks for its kind, and harms nobody else.
 """
 
 from __future__ import annotations
 
-import importlib
+import ast
+import importlib.util
 import pkgutil
-from importlib.metadata import entry_points
-from typing import Any
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any, Protocol, TypeVar, get_args
 
+from campaign.entry_points import PlugIn, installed, one_line
 from campaign.errors import UsageError
+from campaign.options import Options
 
 
-def discover(package: str, attribute: str, group: str) -> dict[str, Any]:
-    """Objects named `attribute` in the modules of `package`, then entry points of `group`, by name.
+class Kind(Protocol):
+    """What all kinds have in common; most have `options`, too."""
 
-    Names are sorted, so that what depends on the order (help, errors, archives) is reproducible.
-    Raises UsageError when two objects share a name.
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
+
+
+K = TypeVar("K", bound=Kind)
+
+
+class Kinds(Mapping[str, K]):
+    """The kinds of one room. Names cost no import; `kinds[name]` imports that one kind.
+
+    Raises KeyError for a name that nobody has, and UsageError, which names the package, for one
+    that cannot be used.
     """
-    found: dict[str, Any] = {}
-    path = importlib.import_module(package).__path__
-    candidates = []
-    for module_info in pkgutil.iter_modules(path):
-        module = importlib.import_module(f"{package}.{module_info.name}")
-        if hasattr(module, attribute):
-            candidates.append(getattr(module, attribute))
-    candidates += [entry.load() for entry in entry_points(group=group)]
-    for candidate in candidates:
-        if candidate.name in found:
-            raise UsageError(f"two {group} are called {candidate.name!r}; remove one of them")
-        found[candidate.name] = candidate
-    return dict(sorted(found.items()))
+
+    def __init__(
+        self, room: str, package: str, attribute: str, interface: type[K], tag: str = ""
+    ) -> None:
+        """Nothing is read yet.
+
+        Args:
+            room: what a kind is called, e.g. "friction model".
+            package: the room; its modules that have `attribute` are the program's own kinds.
+            interface: the class of a kind.
+            tag: the option that names the kind in a file, where one does.
+        """
+        self.room = room
+        self.group = GROUPS[room]
+        self._package = package
+        self._attribute = attribute
+        self._interface = interface
+        self._tag = tag
+        self._loaded: dict[str, K] = {}
+        self._unusable: dict[str, str] = {}
+
+    def __getitem__(self, name: str) -> K:
+        if name in self._loaded:
+            return self._loaded[name]
+        if name in self._unusable:
+            raise UsageError(self._unusable[name])
+        if name in self._own:
+            module = importlib.import_module(self._own[name])
+            kind: K = getattr(module, self._attribute)
+        elif name in self._installed:
+            try:
+                kind = self._load(name)
+            except UsageError as error:
+                self._unusable[name] = str(error)
+                raise
+        else:
+            raise KeyError(name)
+        return self._loaded.setdefault(name, kind)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted({*self._own, *self._installed, *self._loaded}))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._own or name in self._installed or name in self._loaded
+
+    def plug_in(self, name: str) -> PlugIn | None:
+        """The installed package's entry that a kind comes from; None for the program's own."""
+        if name in self._own or name not in self._installed:
+            return None
+        return self._installed[name][0]
+
+    @property
+    def plug_ins(self) -> tuple[str, ...]:
+        """The names of all kinds that come from installed packages."""
+        return tuple(name for name in self if self.plug_in(name) is not None)
+
+    def described(self) -> Iterator[tuple[str, K | str]]:
+        """Every name, with its kind or with why it cannot be used. Imports all of them."""
+        for name in self:
+            try:
+                yield name, self[name]
+            except UsageError as error:
+                yield name, str(error)
+            if name in self._own:
+                for plug_in in self._installed.get(name, ()):
+                    yield name, self._is_unusable(plug_in, "the program has one of that name")
+
+    @contextmanager
+    def including(self, kind: K) -> Iterator[None]:
+        """For tests: within the block, `kind` is there as if a package had brought it."""
+        before = self._loaded.get(kind.name)
+        self._loaded[kind.name] = kind
+        try:
+            yield
+        finally:
+            del self._loaded[kind.name]
+            if before is not None:
+                self._loaded[kind.name] = before
+
+    @cached_property
+    def _own(self) -> dict[str, str]:
+        """Module by name of the program's own kinds, as their sources say it."""
+        found = {}
+        for each in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
+            module = f"{self._package}.{each.name}"
+            name = _declared_name(_source(module), self._attribute)
+            if name:
+                found[name] = module
+        return found
+
+    @cached_property
+    def _installed(self) -> dict[str, list[PlugIn]]:
+        found: dict[str, list[PlugIn]] = {}
+        for plug_in in installed().plug_ins:
+            if plug_in.group == self.group:
+                found.setdefault(plug_in.name, []).append(plug_in)
+        return found
+
+    def _load(self, name: str) -> K:
+        plug_in, *others = self._installed[name]
+        if others:
+            packages = " and of ".join(map(str, self._installed[name]))
+            raise UsageError(
+                f"the {self.room} {name!r} is that of {packages}; remove all but one of them"
+            )
+        try:
+            kind: Any = plug_in.load()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a package may leave with SystemExit, too
+            raise UsageError(self._is_unusable(plug_in, one_line(error))) from error
+        why = self._why_not(kind, name)
+        if why:
+            raise UsageError(self._is_unusable(plug_in, why))
+        usable: K = kind
+        return usable
+
+    def _why_not(self, kind: Any, name: str) -> str:
+        """What it lacks of a kind of that name; empty when it is one."""
+        wanted = self._interface.__name__
+        if not isinstance(kind, self._interface):
+            return f"it is {type(kind).__name__!r}, no {wanted} of this program"
+        if kind.name != name:
+            return f"it calls itself {kind.name!r}; both names must be the same"
+        if "options" not in self._interface.__annotations__:
+            return ""
+        options: Any = getattr(kind, "options", None)
+        if not (isinstance(options, type) and issubclass(options, Options)):
+            return "its options are no subclass of campaign.options.Options"
+        field = options.model_fields.get(self._tag)
+        if self._tag and (field is None or get_args(field.annotation) != (name,)):
+            return f"its options lack the field `{self._tag}: Literal[{name!r}]`"
+        return ""
+
+    def _is_unusable(self, plug_in: PlugIn, why: str) -> str:
+        return f"the {self.room} {plug_in.name!r} of {plug_in} cannot be used: {why}"
+
+
+GROUPS = {
+    "experiment": "campaign.experiments",
+    "friction model": "campaign.friction",
+    "compensation method": "campaign.compensation",
+    "backend": "campaign.backends",
+    "export format": "campaign.exports",
+}
+"""Entry point group by room."""
+
+
+def stray_entries() -> Iterator[str]:
+    """A line about each package that cannot be read, or that names a group there is none of."""
+    yield from installed().unreadable
+    for plug_in in installed().plug_ins:
+        if plug_in.group not in GROUPS.values():
+            known = ", ".join(GROUPS.values())
+            yield f"{plug_in}: there is no group {plug_in.group!r}; there are {known}"
+
+
+def _source(module: str) -> str:
+    """The text of a module that need not be imported for it."""
+    spec = importlib.util.find_spec(module)
+    loader: Any = spec.loader if spec is not None else None
+    return loader.get_source(module) or ""
+
+
+def _declared_name(source: str, attribute: str) -> str:
+    """The name in `ATTRIBUTE = Class("name", ...)` or `Class(name="name", ...)`; empty without."""
+    start = source.find(f"\n{attribute} = ")
+    if start < 0:
+        return ""
+    [statement, *_] = ast.parse(source[start:]).body
+    call = statement.value if isinstance(statement, ast.Assign) else None
+    if not isinstance(call, ast.Call):
+        return ""
+    given = [keyword.value for keyword in call.keywords if keyword.arg == "name"]
+    for value in (*given, *call.args[:1]):
+        if isinstance(value, ast.Constant) and isinstance(value.value, str):
+            return value.value
+    return ""

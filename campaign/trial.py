@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -316,11 +316,28 @@ class Recording:
         half = 0.5 * (self.time[1] - self.time[0])
         first, last = np.searchsorted(self.time, (start - half, stop - half))
         cut = slice(int(first), int(last))
-        channels = {
-            name: channel.info.with_samples(channel.samples[cut])
-            for name, channel in self.channels.items()
-        }
-        return Recording(self.time[cut], channels, self.events, self.ending)
+        return Recording(self.time[cut], _Cut(self.channels, cut), self.events, self.ending)
+
+
+class _Cut(Mapping[str, Channel]):
+    """A part of each channel, which an archive reads when it is asked for."""
+
+    def __init__(self, whole: Mapping[str, Channel], cut: slice) -> None:
+        self._whole = whole
+        self._cut = cut
+
+    def __getitem__(self, name: str) -> Channel:
+        channel = self._whole[name]
+        return channel.info.with_samples(channel.samples[self._cut])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._whole
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._whole)
+
+    def __len__(self) -> int:
+        return len(self._whole)
 
 
 class Recorder(Protocol):

@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from campaign.access.run import RunView
+from campaign.access.telling import tell
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
 from campaign.archive import find_run, open_run
@@ -18,15 +19,21 @@ __all__ = ["RunView", "TestView", "TrialView", "open_view"]
 
 
 def open_view(
-    run: str | PathLike[str] | None = None, results: str | PathLike[str] = "results"
+    run: str | PathLike[str] | None = None,
+    results: str | PathLike[str] = "results",
+    *,
+    strict: bool = False,
 ) -> RunView:
-    """Open an archived run.
+    """Open an archived run; an ArchiveWarning says what of it is damaged.
 
     Args:
         run: a path, a run's name, or a unique beginning of it; absent: the newest.
         results: the folder in which names are looked up.
+        strict: whether any damage is an error.
 
     Raises UsageError when there is no such run, ArchiveError when it cannot be read.
     """
     name = None if run is None else str(run)
-    return RunView(open_run(find_run(Path(results), name)))
+    view = RunView(open_run(find_run(Path(results), name)), strict)
+    tell(view.path, view.damaged, strict=strict)
+    return view

@@ -13,7 +13,9 @@ from campaign.access.tables import trials_table
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
 from campaign.archive import RunHeader, RunReader, RunStatus
-from campaign.errors import UsageError
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import in_words, lost_trials, of_test
+from campaign.errors import ArchiveError, UsageError
 from campaign.trial import Outcome
 
 if TYPE_CHECKING:
@@ -22,9 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class RunView:
-    """A run; iterating over it gives its executed trials, failed ones included, in plan order."""
+    """A run; iterating over it gives its executed trials, failed ones included, in plan order.
+
+    Attributes:
+        strict: whether an analysis refuses to leave a damaged trial out.
+    """
 
     archive: RunReader
+    strict: bool = False
 
     @property
     def name(self) -> str:
@@ -46,8 +53,13 @@ class RunView:
         return self.archive.header
 
     @property
+    def damaged(self) -> tuple[Damage, ...]:
+        """What was found, in opening it, damaged, missing or not as it was archived."""
+        return self.archive.damaged
+
+    @property
     def tests(self) -> pd.DataFrame:
-        """One row per test of the protocol, its name as index."""
+        """One row per test of the protocol, its name as index; attrs as those of `trials`."""
         import pandas as pd
 
         views = self._tests()
@@ -59,31 +71,46 @@ class RunView:
             (view.kind, view.title, planned[view.name], len(view), done[view.name])
             for view in views
         ]
-        return pd.DataFrame(
+        table = pd.DataFrame(
             rows,
             columns=["kind", "title", "planned", "executed", "completed"],
             index=pd.Index([view.name for view in views], name="test", dtype="object"),
         )
+        table.attrs["damaged"] = [in_words(damage) for damage in self.damaged]
+        return table
 
     @property
     def trials(self) -> pd.DataFrame:
-        """One row per executed trial, its number as index."""
-        return trials_table(self.archive.trials)
+        """One row per executed trial, its number as index.
+
+        A trial that cannot be read has no row; `attrs["damaged"]` names it.
+        """
+        return trials_table(self.archive.trials, self.damaged)
 
     def test(self, name: str) -> TestView:
-        """The test of that name. Raises UsageError naming those there are."""
+        """The test of that name.
+
+        Raises UsageError naming those there are; ArchiveError when what names them is damaged.
+        """
         views = {view.name: view for view in self._tests()}
         if name in views:
             return views[name]
+        if lost := [damage for damage in self.damaged if "provenance/tests" in damage.place]:
+            raise ArchiveError(f"{self.path}: no test {name!r} can be found: {in_words(lost[0])}")
         close = difflib.get_close_matches(name, views, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(views) or 'none'}"
         raise UsageError(f"{self.name}: there is no test {name!r}; {hint}")
 
     def trial(self, number: int) -> TrialView:
-        """The trial of that number. Raises UsageError when it was not executed."""
+        """The trial of that number.
+
+        Raises UsageError when it was not executed, ArchiveError when it was and cannot be read.
+        """
         for archived in self.archive.trials:
             if archived.trial.number == number:
-                return TrialView(archived)
+                return TrialView(archived, damaged=self.damaged)
+        if lost := lost_trials(self.archive).get(number):
+            raise ArchiveError(f"{self.path}: trial {number} cannot be read: {in_words(lost)}")
         planned = any(trial.number == number for trial in self.archive.plan)
         why = (
             "was not executed" if planned else f"is not among the {len(self.archive.plan)} planned"
@@ -91,7 +118,7 @@ class RunView:
         raise UsageError(f"{self.name}: trial {number} {why}")
 
     def __iter__(self) -> Iterator[TrialView]:
-        return (TrialView(archived) for archived in self.archive.trials)
+        return (TrialView(archived, damaged=self.damaged) for archived in self.archive.trials)
 
     def __len__(self) -> int:
         return len(self.archive.trials)
@@ -99,6 +126,7 @@ class RunView:
     def __repr__(self) -> str:
         tests = self._tests()
         count = f"{len(self)} of {len(self.archive.plan)} trials executed"
+        count += f", damaged in {len(self.damaged)} places" if self.damaged else ""
         lines = [f"<run {self.name}: {self.status.value}, {count}>"]
         return "\n".join([*lines, *(f"  {view.name} ({view.kind}): {len(view)}" for view in tests)])
 
@@ -117,6 +145,9 @@ class RunView:
                     title=str(test.get("title") or name),
                     options=options if isinstance(options, dict) else {},
                     archived=self.archive.trials_of(name),
+                    run=self.path,
+                    damaged=of_test(self.archive, name),
+                    strict=self.strict,
                 )
             )
         return views

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from campaign.archive import ArchivedTrial
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import in_words
 from campaign.result import Table
 
 if TYPE_CHECKING:
@@ -26,11 +28,12 @@ COLUMNS = (
 """What the table of trials says of every trial, before the swept values."""
 
 
-def trials_table(trials: Iterable[ArchivedTrial]) -> pd.DataFrame:
+def trials_table(trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """One row per executed trial, its number as index; swept values (SI) by their dotted path.
 
     `duration` is the planned one (s). A swept value that would take the place of another column is
-    called `point.` and its path.
+    called `point.` and its path. A trial that cannot be read has no row: `attrs["damaged"]` names
+    it, in words.
     """
     import pandas as pd
 
@@ -43,6 +46,7 @@ def trials_table(trials: Iterable[ArchivedTrial]) -> pd.DataFrame:
     )
     for column in ("started", "ended"):
         table[column] = pd.to_datetime(table[column], utc=True, format="ISO8601", errors="coerce")
+    table.attrs["damaged"] = [in_words(damage) for damage in damaged]
     return table
 
 
@@ -66,8 +70,11 @@ def _row(archived: ArchivedTrial) -> dict[str, object]:
     return row
 
 
-def result_table(table: Table) -> pd.DataFrame:
-    """A table of an analysis, unrounded, SI; `attrs` has its title, units and labels."""
+def result_table(table: Table, damaged: Iterable[Damage] = ()) -> pd.DataFrame:
+    """A table of an analysis, unrounded, SI; `attrs` has its title, units and labels.
+
+    `attrs["damaged"]` names, in words, what is damaged of the trials that it should be made of.
+    """
     import pandas as pd
 
     names = [column.name for column in table.columns]
@@ -76,5 +83,6 @@ def result_table(table: Table) -> pd.DataFrame:
         "title": table.title,
         "units": {column.name: column.unit for column in table.columns},
         "labels": {column.name: column.label for column in table.columns},
+        "damaged": [in_words(damage) for damage in damaged],
     }
     return frame

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from campaign.access.tables import result_table, trials_table
+from campaign.access.telling import tell
 from campaign.access.trial import TrialView
 from campaign.archive import ArchivedTrial
+from campaign.archive.damage import Damage
+from campaign.archive.sound_samples import Trials, without_damaged
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
@@ -27,6 +31,9 @@ class TestView:
     Attributes:
         options: normalised (SI), before the sweep.
         archived: its executed trials, in plan order.
+        run: where the run lies.
+        damaged: what was found damaged, in opening the run, of this test, or of no trial.
+        strict: whether an analysis that has to leave a trial out is an error.
     """
 
     __test__ = False  # it is not one of pytest's
@@ -36,31 +43,53 @@ class TestView:
     title: str
     options: Tree
     archived: tuple[ArchivedTrial, ...] = field(repr=False)
+    run: Path = field(default=Path(), repr=False)
+    damaged: tuple[Damage, ...] = field(default=(), repr=False)
+    strict: bool = field(default=False, repr=False)
 
     @property
     def trials(self) -> pd.DataFrame:
-        """One row per executed trial, its number as index."""
-        return trials_table(self.archived)
+        """One row per executed trial, its number as index; `attrs["damaged"]` as for the run."""
+        return trials_table(self.archived, self.damaged)
 
-    @cached_property
+    @property
     def result(self) -> Result:
         """What the experiment's analysis finds in these trials, by this program; computed once.
 
-        Raises UsageError when no experiment of that kind is installed.
+        Trials that are damaged are left out, and an ArchiveWarning names them.
+
+        Raises UsageError when no experiment of that kind is installed, ArchiveError when a trial
+        would be left out and the run was opened with `strict`.
         """
+        return self._analysed[0]
+
+    @cached_property
+    def _analysed(self) -> tuple[Result, tuple[Damage, ...]]:
+        """The result, and what is damaged of that which it should be made of."""
         experiment = experiments().get(self.kind)
         if experiment is None:
             raise UsageError(f"no experiment is called {self.kind!r}; install what provides it")
-        data = TestData(self.name, self.kind, self.options, self.archived)
-        return result_of(experiment, data)
+
+        def analyse(trials: Trials) -> Result:
+            return result_of(experiment, TestData(self.name, self.kind, self.options, trials))
+
+        result, _, found = without_damaged(self.run, self.archived, analyse)
+        damaged = tuple(dict.fromkeys((*self.damaged, *found)))
+        left_out = [damage for damage in damaged if damage.trial]
+        tell(self.run, left_out, strict=self.strict)
+        return result, damaged
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The tables of the analysis by their key, unrounded, SI; units in `attrs`."""
-        return {table.key: result_table(table) for table in self.result.tables}
+        """The tables of the analysis by their key, unrounded, SI; units in `attrs`.
+
+        `attrs["damaged"]` says what is damaged of the trials that they should be made of.
+        """
+        result, damaged = self._analysed
+        return {table.key: result_table(table, damaged) for table in result.tables}
 
     def __iter__(self) -> Iterator[TrialView]:
-        return (TrialView(archived) for archived in self.archived)
+        return (TrialView(archived, damaged=self.damaged) for archived in self.archived)
 
     def __len__(self) -> int:
         return len(self.archived)

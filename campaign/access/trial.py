@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from campaign.archive import ArchivedTrial
+from campaign.archive.damage import Damage
 from campaign.errors import UsageError
 from campaign.trial import Ending, Recording, Trial
 
@@ -20,10 +21,12 @@ class TrialView:
 
     Attributes:
         cut: the part of the time that is looked at (start, stop) (s); None for all of it.
+        damaged: what is known to be damaged of its run. No method returns damaged samples.
     """
 
     archived: ArchivedTrial = field(repr=False)
     cut: tuple[float, float] | None = None
+    damaged: tuple[Damage, ...] = field(default=(), repr=False)
 
     @property
     def number(self) -> int:
@@ -50,7 +53,7 @@ class TrialView:
         return replace(self, cut=cut)
 
     def recording(self) -> Recording:
-        """Samples and events as NumPy arrays, SI."""
+        """Samples and events as NumPy arrays, SI. Raises ArchiveError when they are damaged."""
         whole = self.archived.recording()
         return whole.window(*self.cut) if self.cut else whole
 

@@ -6,10 +6,13 @@ nothing that can be read; the hash of the file finds it, and it is reported as s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 import h5py
+from h5py import h5o
 
 from campaign.archive import consistency, guarded, hdf5, nexus
 from campaign.archive.checksums import text_digest
@@ -83,6 +86,7 @@ class _Check:
         self.unreadable: set[str] = set()
         self.datasets = 0
         self.root = ""
+        self._instruments: set[int] = set()
 
     def sealed(self) -> None:
         """A sealed file: its content first, so that the hash speaks of what that does not show."""
@@ -199,11 +203,8 @@ class _Check:
             record, trees = read_entry(self.path, file, name, finished.record)
             self.datasets += 1
             self._record(f"/{name}", entry, record, trees)
-            self._says(group, f"/{name}", record)
-            for place in self._members(group, f"/{name}", record):
-                with self.problems.noting(), guarded.guarded(self.path, place):
-                    guarded.check_dataset(file[place.rpartition("/")[0]], place.rpartition("/")[2])
-                    self.datasets += 1
+            self._says(group, record)
+            self._members(group, f"/{name}", record)
             self._series(group, f"/{name}", record)
 
     def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
@@ -231,68 +232,98 @@ class _Check:
         )
         self.unreadable.discard(entry)
 
-    def _says(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+    def _says(self, group: h5py.Group, record: TrialRecord) -> None:
         """What viewers show beside the record is what the record says."""
         says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
         for name, wanted in says.items():
             with self.problems.noting():
+                guarded.text_at(group, name, text_digest(hdf5.storable(wanted)))
                 self.datasets += 1
-                if guarded.text_at(group, name) != hdf5.storable(wanted):
-                    self.problems.add(f"{place}/{name}", "is not what the record says")
 
-    def _members(self, group: h5py.Group, place: str, record: TrialRecord) -> Iterator[str]:
-        """What else of an entry has checksums of its own; what is missing or unknown is told."""
+    def _members(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+        """What else an entry holds; what is missing or unknown is told."""
+        kept = guarded.names(guarded.inner_group(group, "record"))
         wanted = set(_MEMBERS)
-        kept = "not_kept" not in group["record"]
-        if record.samples is not None and kept:
+        if record.samples is not None and "not_kept" not in kept:
             wanted.add("data")
+            if not self.path.name.startswith("trial-") and nexus.follows_definition(record.series):
+                wanted |= set(nexus.MEMBERS)
         if record.preview is not None:
             wanted.add("preview")
-        described = nexus.follows_definition(record.series) and kept
-        if described and not self.path.name.startswith("trial-"):
-            wanted |= set(nexus.MEMBERS)
         there = set(guarded.names(group))
         for name in sorted(wanted - there):
             self.problems.add(f"{place}/{name}", "is missing")
-        for name in sorted(there - wanted):
+        unknown = sorted(there - wanted) + sorted(
+            f"record/{name}" for name in set(kept) - {"json", "trees", "not_kept"}
+        )
+        for name in unknown:
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
-        for name in sorted(set(guarded.names(group["record"])) - {"json", "trees", "not_kept"}):
-            self.remarks.add(f"{place}/record/{name}", "is nothing that the format knows")
-        yield f"{place}/record/trees"
-        if "definition" in there & wanted:
-            yield f"{place}/definition"
-            yield from (f"{place}/{inner}" for inner in _places(group, "instrument", "instrument/"))
+        self._by_themselves(group, place, "record", ("trees", "not_kept"))
+        if set(nexus.MEMBERS) <= there & wanted:
+            self._instrument(group, place)
+
+    def _instrument(self, group: h5py.Group, place: str) -> None:
+        """The definition and the instrument, which trials of one bench share: each once."""
+        address = h5o.get_info(guarded.inner_group(group, "instrument").id).addr
+        if address in self._instruments:
+            return
+        self._instruments.add(address)
+        self._by_themselves(group, place, "", ("definition",))
+        for inner in _places(group, "instrument", "instrument/"):
+            parent, _, name = inner.rpartition("/")
+            self._by_themselves(group, place, parent, (name,))
+
+    def _by_themselves(
+        self, group: h5py.Group, place: str, inner: str, names: Iterable[str]
+    ) -> None:
+        """Datasets that have checksums of their own, in the groups `inner` of an entry."""
+        with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
+            for step in filter(None, inner.split("/")):
+                group = guarded.inner_group(group, step)
+            for name in names:
+                if name in group:
+                    guarded.check_dataset(group, name)
+                    self.datasets += 1
 
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+        """The samples, each series against its digest, and that there are no others."""
         if "not_kept" in group["record"]:
             return
-        told = {channel.name: channel for channel in record.channels}
-        wanted: dict[str, set[str]] = {}
-        for inner, name, length, digest in series_of(record):
-            wanted.setdefault(inner, {"title"}).add(name)
-            where = f"{place}/{inner}/{name}"
-            with self.problems.noting(), guarded.guarded(self.path, where):
-                series = series_at(guarded.inner_group(group, inner), name, length)
-                series.check(digest)
-                self.progress(series.stored)
-                self.datasets += 1
-                if name in told:
-                    check_unit(series, told[name])
-                    label = guarded.attribute(h5py.Dataset(series.dataset), "long_name")
-                    if label != told[name].info.long_name:
-                        self.problems.add(f"{where}@long_name", "is not what was recorded")
-        for inner, names in wanted.items():
+        for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
                 data = guarded.group_at(group, inner, "NXdata")
-                for name in sorted(set(guarded.names(data)) - names):
+                told = {name: (length, digest) for _, name, length, digest in series}
+                for name, (length, digest) in told.items():
+                    with self.problems.noting():
+                        self._one_series(data, f"{place}/{inner}", name, length, digest, record)
+                for name in sorted(set(guarded.names(data)) - told.keys() - {"title"}):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
-                if guarded.text_at(data, "title") != hdf5.storable(record.label):
-                    self.problems.add(f"{place}/{inner}/title", "is not what the record says")
+                with self.problems.noting():
+                    guarded.text_at(data, "title", text_digest(hdf5.storable(record.label)))
                 for name in sorted(_PLOT - set(data.attrs)):
                     self.problems.add(f"{place}/{inner}@{name}", "is missing")
-                shown = guarded.attribute(data, "signal")
-                if shown not in names:
+                if guarded.attribute(data, "signal") not in told:
                     self.problems.add(f"{place}/{inner}@signal", "names no channel that is there")
+
+    def _one_series(
+        self,
+        data: h5py.Group,
+        place: str,
+        name: str,
+        length: int,
+        digest: str,
+        record: TrialRecord,
+    ) -> None:
+        with guarded.guarded(self.path, f"{place}/{name}"):
+            series = series_at(data, name, length)
+            series.check(digest)
+            self.progress(series.stored)
+            self.datasets += 1
+            told = next((channel for channel in record.channels if channel.name == name), None)
+            if told is not None:
+                check_unit(series, told)
+                if guarded.attribute(series.hdf5, "long_name") != told.info.long_name:
+                    self.problems.add(f"{place}/{name}@long_name", "is not what was recorded")
 
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str

@@ -18,7 +18,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5g, h5o, h5s
+from h5py import h5a, h5d, h5f, h5g, h5o, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.files import why
@@ -33,6 +33,10 @@ _MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
 _LARGEST_CHUNK = 1 << 22  # samples
 _CHECKED_AT_ONCE = 1 << 18  # samples
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
+_TEXT = h5py.string_dtype()
+
+_SOUND: dict[bytes, bool] = {}
+"""Whether the heaps of the files that are open are sound, by name; as far as that was looked at."""
 
 # What h5py raises on damage is not documented, and is of every kind.
 _DAMAGE = (
@@ -69,6 +73,7 @@ def open_file(path: Path) -> Iterator[h5py.File]:
         if not h5py.is_hdf5(path):
             raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
         with h5py.File(path, "r", locking=False) as file:
+            _SOUND.pop(h5f.get_name(file.id), None)
             yield file
 
 
@@ -114,7 +119,7 @@ def check_dataset(parent: h5py.Group, name: str) -> int:
 
 def names(group: h5py.Group) -> list[str]:
     """Names of what `group` holds, sorted."""
-    return sorted(group)
+    return sorted(name.decode("utf-8", "surrogateescape") for name in group.id)
 
 
 def text_at(parent: h5py.Group, name: str, digest: str | None = None) -> str:
@@ -209,10 +214,10 @@ def check_samples(dataset: h5py.Dataset) -> None:
 def attribute(item: h5py.HLObject, name: str) -> str:
     """A text attribute; ArchiveError when there is none."""
     identifier = _attribute(item, name)
-    kind = identifier.dtype
-    if identifier.shape != () or h5py.check_string_dtype(kind) is None:
+    kind = identifier.get_type()
+    if not isinstance(kind, h5t.TypeStringID):
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a text")
-    value = np.empty((), dtype=kind)
+    value = np.empty((), dtype=_TEXT if kind.is_variable_str() else kind.dtype)
     identifier.read(value)
     return bytes(value[()]).decode("utf-8")
 
@@ -229,12 +234,15 @@ def text_list(item: h5py.HLObject, name: str) -> list[str]:
 
 def _attribute(item: h5py.HLObject, name: str) -> h5a.AttrID:
     raw = name.encode()
-    path = Path(os.fsdecode(h5f.get_name(item.id)))
-    if not heaps_are_sound(path):  # looked at here, as nothing else that is read lies in them
-        raise ArchiveError(f"{path}: cannot be read: its attributes are damaged")
-    if not h5a.exists(item.id, raw):
-        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is missing")
-    identifier = h5a.open(item.id, raw)
+    file = h5f.get_name(item.id)
+    if file not in _SOUND:  # looked at here, as nothing else that is read lies in the heaps
+        _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
+    if not _SOUND[file]:
+        raise ArchiveError(f"{os.fsdecode(file)}: cannot be read: its attributes are damaged")
+    try:
+        identifier = h5a.open(item.id, raw)
+    except KeyError:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is missing") from None
     if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is too large")
     return identifier

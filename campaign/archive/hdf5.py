@@ -347,7 +347,7 @@ def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
     try:
         raw = inflating.decompress(packed, size)
         more = b"" if inflating.eof else inflating.decompress(b"", 1)
-    except isal_zlib.error:
+    except isal_zlib.error:  # type: ignore[misc] # its types call the class an instance
         return None
     if len(raw) != size or more or not inflating.eof or inflating.unused_data:
         return None

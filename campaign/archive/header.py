@@ -72,6 +72,8 @@ class RunHeader(_Record):
     """How many trials are planned."""
     versions: dict[str, str] = {}
     """Python, this program and the libraries that made the samples."""
+    plugins: tuple[Tree, ...] = ()
+    """Per kind of an installed package: room, name, distribution, version, entry_point, sha256."""
     host: dict[str, str] = {}
     """The machine: name, system, processor."""
     command: tuple[str, ...] = ()

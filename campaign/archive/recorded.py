@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -52,13 +52,14 @@ class RecordedSamples:
     def channels(self) -> tuple[ChannelInfo, ...]:
         return self.record.series
 
-    def channel(self, told: SeriesRecord) -> Channel:
-        """One channel, read now. Raises ArchiveError."""
+    def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
+        """Channels, read now, one after another. Raises ArchiveError."""
         with self._data() as data:
-            series = series_at(data, told.name, self.record.samples or 0)
-            samples = series.read(told.sha256)
-            check_unit(series, told)
-        return told.info.with_samples(samples)
+            for told in channels:
+                series = series_at(data, told.name, self.record.samples or 0)
+                samples = series.read(told.sha256)
+                check_unit(series, told)
+                yield told.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
         if self.record.samples is None or self.not_kept:
@@ -99,8 +100,22 @@ class _Channels(Mapping[str, Channel]):
 
     def __getitem__(self, name: str) -> Channel:
         if name not in self._read:
-            self._read[name] = self._samples.channel(self._told[name])
+            (self._read[name],) = self._samples.read([self._told[name]])
         return self._read[name]
+
+    def values(self) -> ValuesView[Channel]:
+        self._read_all()
+        return super().values()
+
+    def items(self) -> ItemsView[str, Channel]:
+        self._read_all()
+        return super().items()
+
+    def _read_all(self) -> None:
+        """Whatever is left, the file being opened once."""
+        left = [told for name, told in self._told.items() if name not in self._read]
+        if left:
+            self._read |= {channel.name: channel for channel in self._samples.read(left)}
 
     def __contains__(self, name: object) -> bool:
         return name in self._told
@@ -150,7 +165,7 @@ def parse_record(path: Path, place: str, text: str) -> TrialRecord:
 
 def check_unit(series: Series, told: SeriesRecord) -> None:
     """ArchiveError unless a channel's dataset has the unit in which it was recorded."""
-    unit = guarded.attribute(h5py.Dataset(series.dataset), "units")
+    unit = guarded.attribute(series.hdf5, "units")
     if unit != told.unit:
         place = f"{series.place}@units"
         raise ArchiveError(f"{place}: is {unit!r}, and {told.unit!r} was recorded")

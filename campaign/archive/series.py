@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import h5py
@@ -21,6 +22,7 @@ from campaign.trial import Array
 _LARGEST_CHUNK = 1 << 22  # samples
 _SHUFFLED = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE]
 _DEFLATED = [h5py.h5z.FILTER_DEFLATE]
+_NO_SERIES = "is not a chunked series of float64"
 
 
 @dataclass(frozen=True)
@@ -29,14 +31,15 @@ class Series:
 
     Attributes:
         dataset: of HDF5's low-level interface: a campaign has tens of thousands of them.
-        place: file and path, for messages.
+        parent, name: where it is.
         length: samples that it states.
         chunk: samples of a chunk.
         shuffled: whether its chunks passed the shuffle filter.
     """
 
     dataset: h5d.DatasetID
-    place: str
+    parent: h5py.Group
+    name: str
     length: int
     chunk: int
     shuffled: bool
@@ -69,6 +72,16 @@ class Series:
         chunks = map(self.dataset.get_chunk_info, range(self.dataset.get_num_chunks()))
         return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)
 
+    @cached_property
+    def hdf5(self) -> h5py.Dataset:
+        """As h5py's other interface knows it, for attributes."""
+        return h5py.Dataset(self.dataset)
+
+    @property
+    def place(self) -> str:
+        """File and path, for messages."""
+        return _place(self.parent, self.name)
+
     @property
     def stored(self) -> int:
         """Bytes that it takes in the file."""
@@ -84,24 +97,29 @@ MISMATCH = "does not match its checksum; it was damaged or changed"
 
 def series_at(parent: h5py.Group, name: str, length: int) -> Series:
     """A series of `length` samples that `parent` itself holds. Raises ArchiveError."""
-    place = f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"
     raw = name.encode()
     if not raw or b"/" in raw or raw not in parent.id:
-        raise ArchiveError(f"{place}: is missing")
+        raise ArchiveError(f"{_place(parent, name)}: is missing")
     if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
-        raise ArchiveError(f"{place}: is a link, and links are not followed")
+        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
     found: Any = h5o.open(parent.id, raw)
     plan = found.get_create_plist() if isinstance(found, h5d.DatasetID) else None
     if plan is None or plan.get_layout() != h5d.CHUNKED or found.rank != 1:
-        raise ArchiveError(f"{place}: is not a chunked series of float64")
+        raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
     filters = [plan.get_filter(number)[0] for number in range(plan.get_nfilters())]
     if filters not in (_SHUFFLED, _DEFLATED):
-        raise ArchiveError(f"{place}: is stored with a filter other than shuffle and deflate")
+        what = "is stored with a filter other than shuffle and deflate"
+        raise ArchiveError(f"{_place(parent, name)}: {what}")
     (stated,), (chunk,) = found.shape, plan.get_chunk()
     if not found.get_type().equal(h5t.IEEE_F64LE):
-        raise ArchiveError(f"{place}: is not a chunked series of float64")
+        raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
     if not 0 < chunk <= _LARGEST_CHUNK:
-        raise ArchiveError(f"{place}: has chunks of {chunk} samples")
+        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
     if stated != length:
-        raise ArchiveError(f"{place}: has {stated} samples, and {length} were recorded")
-    return Series(found, place, length, chunk, filters == _SHUFFLED)
+        what = f"has {stated} samples, and {length} were recorded"
+        raise ArchiveError(f"{_place(parent, name)}: {what}")
+    return Series(found, parent, name, length, chunk, filters == _SHUFFLED)
+
+
+def _place(parent: h5py.Group, name: str) -> str:
+    return f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"

@@ -77,7 +77,7 @@ class TrialFile:
         try:
             self._file = hdf5.create_file(self._part)
         except OSError as error:
-            raise ArchiveError(f"{self._part}: cannot be written: {why(error)}") from None
+            raise _lost(self._part, error) from None
         self._entry = hdf5.make_group(self._file, entry_name(trial.number), "NXentry")
         hdf5.put_text(self._entry, "title", trial.label)
 
@@ -187,10 +187,19 @@ class TrialFile:
             yield
         except (OSError, RuntimeError, ValueError) as error:
             self.discard()
-            raise ArchiveError(
-                f"{self._part}: cannot be written: {why(error)}; this trial is not archived, "
-                "the finished ones are"
-            ) from None
+            raise _lost(self._part, error) from None
+
+
+def _lost(part: Path, error: Exception) -> ArchiveError:
+    """Why a trial could not be written, and what that means for the others."""
+    if not part.parent.is_dir():
+        return ArchiveError(
+            f"{part.parent}: is gone: it was moved or removed while the run went on; wherever it "
+            "is now, it has the trials that had finished by then"
+        )
+    return ArchiveError(
+        f"{part}: cannot be written: {why(error)}; this trial is not archived, those before are"
+    )
 
 
 def write_record(

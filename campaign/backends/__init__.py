@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from campaign.backends.interface import BackendKind
-from campaign.plugins import discover
+from campaign.plugins import Kinds
 
 
 @cache
-def backends() -> dict[str, BackendKind]:
+def backends() -> Kinds[BackendKind]:
     """Every backend, by name."""
-    return discover(__name__, "BACKEND", "campaign.backends")
+    return Kinds("backend", __name__, "BACKEND", BackendKind)

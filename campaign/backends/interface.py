@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
+from campaign.archive import RunReader
 from campaign.options import Options
 from campaign.trial import Ending, PanicStop, Recorder, SafeState, Trial
 
@@ -81,6 +82,15 @@ class StoppedOutside(Protocol):
 
         Raises BackendError when there is none, or a later one.
         """
+
+
+@runtime_checkable
+class ServesArchive(Protocol):
+    """What a backend has besides when its samples come out of an archived run."""
+
+    @property
+    def archive(self) -> RunReader:
+        """That run: commands say what of it is damaged, on screen and in the new archive."""
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 A planned trial is answered by an archived one of the same bench and the same task; only the
 measuring window may differ, since it is the analysis' business. Every archived trial is served
-once; those that somebody interrupted are not.
+once; those that somebody interrupted are not. One that cannot be read ends as a fault that names
+what is damaged.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import threading
 from collections.abc import Iterator, Mapping
@@ -19,6 +21,9 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
+from campaign.archive.damage_words import in_one_line, in_words, lost_trials
+from campaign.archive.sound_samples import whole_recording
+from campaign.archive.story import read_lines
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ArchiveError
 from campaign.options import Options
@@ -49,11 +54,22 @@ class ReplayOptions(Options):
     """Path of the archive to replay, or a run's name in `results`."""
 
 
+@dataclass(frozen=True)
+class _Lost:
+    """An archived trial that cannot be read: what it was, the archived plan tells."""
+
+    trial: Trial
+    reason: str
+
+
+_Archived = ArchivedTrial | _Lost
+
+
 @dataclass
 class _Alike:
     """Archived trials of one bench and task, and the planned trials that they answer."""
 
-    archived: list[ArchivedTrial] = field(default_factory=list)
+    archived: list[_Archived] = field(default_factory=list)
     answers: dict[int, Trial] = field(default_factory=dict)  # by place in `archived`
 
     def assign(self, trial: Trial) -> bool:
@@ -79,7 +95,7 @@ class _Alike:
                 return holder
         raise AssertionError("a free place suits everybody")
 
-    def answer_to(self, trial: Trial) -> ArchivedTrial | None:
+    def answer_to(self, trial: Trial) -> _Archived | None:
         """What was assigned to `trial`."""
         for place, planned in self.answers.items():
             if planned.number == trial.number:
@@ -96,9 +112,14 @@ class ReplayBackend:
         self._trials = [t for t in run.trials if t.ending.outcome is not Outcome.INTERRUPTED]
         self._alike: dict[str, _Alike] = {}
         self._channels: dict[tuple[Path, str], frozenset[str] | None] = {}
-        for archived in self._trials:
+        answers: list[_Archived] = [*self._trials, *_lost(run)]
+        for archived in answers:
             key = canonical_json(_asked_of_bench(archived.trial))
             self._alike.setdefault(key, _Alike()).archived.append(archived)
+
+    @property
+    def archive(self) -> RunReader:
+        return self._run
 
     def __enter__(self) -> ReplayBackend:
         return self
@@ -117,7 +138,7 @@ class ReplayBackend:
         ends here as it did there, or as a fault: nothing is said of its channels.
         """
         archived = self._answer(trial)
-        if archived is None:
+        if archived is None or isinstance(archived, _Lost):
             return None
         key = (archived.path, archived.entry)
         if key not in self._channels:
@@ -137,8 +158,10 @@ class ReplayBackend:
             return Ending(Outcome.FAULT, self._why_not(trial), fault=Fault.REFUSED)
         if stop():
             return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+        if isinstance(archived, _Lost):
+            return Ending(Outcome.FAULT, archived.reason, fault=Fault.OTHER)
         try:
-            recording = archived.recording()
+            recording = whole_recording(archived)
         except ArchiveError as error:
             return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
         channels = list(recording.channels.values())
@@ -161,7 +184,7 @@ class ReplayBackend:
         """A replay has nothing that moves."""
         return SafeState.CONFIRMED
 
-    def _answer(self, trial: Trial) -> ArchivedTrial | None:
+    def _answer(self, trial: Trial) -> _Archived | None:
         alike = self._alike.get(canonical_json(_asked_of_bench(trial)))
         if alike is None:
             return None
@@ -171,6 +194,12 @@ class ReplayBackend:
             return alike.answer_to(trial)
 
     def _why_not(self, trial: Trial) -> str:
+        why = self._no_such(trial)
+        if self._run.damaged:
+            why += f"; it may have been lost: {in_one_line(self._run.path, self._run.damaged)}"
+        return why
+
+    def _no_such(self, trial: Trial) -> str:
         asked = _asked_of_bench(trial)
         alike = self._alike.get(canonical_json(asked))
         if alike is not None:
@@ -192,6 +221,16 @@ class ReplayBackend:
             f"{self._run.name} has no such trial; the nearest, {nearest.trial.name} "
             f"({nearest.trial.label}), differs in {'; '.join(differing[:_TOLD])}{more}"
         )
+
+
+def _lost(run: RunReader) -> Iterator[_Lost]:
+    """The trials that were executed to their end and cannot be read, as far as a plan has them."""
+    finished = read_lines(run.journal.encode()).finished
+    for number, damage in sorted(lost_trials(run).items()):
+        if number in finished and finished[number].outcome is Outcome.INTERRUPTED:
+            continue
+        with contextlib.suppress(ArchiveError):  # without a plan nobody knows what it was
+            yield _Lost(run.planned(number), f"{run.path}: {in_words(damage)}")
 
 
 def _asked_of_bench(trial: Trial) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def plan(
 
     settings = (*(changes or ()), *short_settings(port, source, results))
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
-    show_plan(request, results, as_json=as_json)
+    raise typer.Exit(show_plan(request, results, as_json=as_json))
 
 
 @app.command()
@@ -231,7 +231,9 @@ def report(
     """Write report.html, its tables and its figures, from an archive alone."""
     from campaign.cli.report import report_run
 
-    typer.echo(report_run(run, results, output, templates, open_it=open_it))
+    page, code = report_run(run, results, output, templates, open_it=open_it)
+    typer.echo(page)
+    raise typer.Exit(code)
 
 
 @app.command()
@@ -319,7 +321,7 @@ def show(
     """Show what a run was, how it ended, and all that did not go as planned."""
     from campaign.cli.show import show_archive
 
-    show_archive(run, results, as_json=as_json)
+    raise typer.Exit(show_archive(run, results, as_json=as_json))
 
 
 @app.command()

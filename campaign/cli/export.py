@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.access import open_view
+from campaign.access import RunView
+from campaign.archive import find_run, open_run
+from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.errors import ExitCode, UsageError
 from campaign.export import exports
@@ -26,10 +28,9 @@ def export_archive(
     kinds = exports()
     if to not in kinds:
         raise UsageError(f"there is no format {to!r}; there are {', '.join(kinds)}")
-    run = open_view(name, results)
+    run = RunView(open_run(find_run(results, name)))
     folder = output or run.path.with_name(f"{run.path.stem}-{to}")
     exported = export_run(run, kinds[to], folder, tests, trials)
-    for problem in exported.problems:
-        print_note(f"not exported: {problem}", style="yellow")
+    code = say_damaged(run.path, exported.damaged)
     print_note(f"{exported.files} recordings written")
-    return exported.folder, ExitCode.ARCHIVE if exported.problems else ExitCode.DONE
+    return exported.folder, code

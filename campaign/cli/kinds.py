@@ -3,50 +3,75 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
+
+from pydantic import BaseModel
 
 from campaign.backends import backends
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.cli.output import print_line, print_table
+from campaign.cli.output import print_line, print_note, print_table
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
+from campaign.export import exports
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
+from campaign.plugins import Kinds, stray_entries
 from campaign.units import convert
 
-EXPERIMENT = "experiment"
 CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
 def list_kinds() -> None:
-    """One line per kind."""
-    print_table(("room", "name", "what it is"), [*(k[:3] for k in _all_kinds()), CHANNELS])
+    """One line per kind, and what is wrong with installed packages that have some."""
+    rows: list[tuple[str, str, str]] = []
+    problems: list[str] = []
+    for room in _rooms():
+        for name, kind in room.described():
+            if isinstance(kind, str):
+                problems.append(kind)
+            else:
+                rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
+    print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS])
+    for problem in (*problems, *stray_entries()):
+        print_note(problem, style="yellow")
 
 
 def show_kind(name: str) -> None:
-    """Every kind of that name with its options. Raises UsageError when there is none."""
+    """Every kind of that name with its options.
+
+    Raises UsageError when there is none, or when its package is broken.
+    """
     if name == CHANNELS[1]:
         _show_channels()
         return
-    kinds = list(_all_kinds())
-    chosen = [kind for kind in kinds if kind[1] == name]
-    if not chosen:
-        names = {CHANNELS[1], *(kind[1] for kind in kinds)}
+    if name == BENCH[1]:
+        _show(*BENCH)
+        return
+    rooms = [room for room in _rooms() if name in room]
+    if not rooms:
+        names = {CHANNELS[1], BENCH[1], *(each for room in _rooms() for each in room)}
         close = difflib.get_close_matches(name, sorted(names), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
-    for room, kind, summary, options in chosen:
-        print_line(f"{kind} ({room}): {summary}")
+    for room in rooms:
+        kind = room[name]
+        options = getattr(kind, "options", None)  # an export format has none
+        _show(room.room, name, f"{kind.summary}{_whose(room, name)}", options)
+        if isinstance(kind, Experiment):
+            _show_needs(kind)
+
+
+def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:
+    print_line(f"{name} ({room}): {summary}")
+    if options is not None:
         print_line()
         rows = [_row(info) for info in describe(options)]
         print_table(("option", "unit or values", "default", "meaning"), rows)
-        if room == EXPERIMENT:
-            _show_needs(experiments()[kind])
 
 
 def _show_needs(experiment: Experiment) -> None:
@@ -70,17 +95,14 @@ def _show_channels() -> None:
     print_table(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
 
 
-def _all_kinds() -> Iterator[tuple[str, str, str, Any]]:
-    rooms: Sequence[tuple[str, dict[str, Any]]] = (
-        (EXPERIMENT, experiments()),
-        ("friction model", friction_models()),
-        ("compensation method", compensation_methods()),
-        ("backend", backends()),
-    )
-    for room, kinds in rooms:
-        for name, kind in kinds.items():
-            yield room, name, kind.summary, kind.options
-    yield BENCH
+def _rooms() -> Iterator[Kinds[Any]]:
+    yield from (experiments(), friction_models(), compensation_methods(), backends(), exports())
+
+
+def _whose(room: Kinds[Any], name: str) -> str:
+    """The installed package that a kind is of; nothing for the program's own."""
+    plug_in = room.plug_in(name)
+    return f" (of {plug_in.distribution} {plug_in.version})" if plug_in is not None else ""
 
 
 def _row(info: OptionInfo) -> tuple[str, str, str, str]:

@@ -9,8 +9,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
+from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_line, print_note, print_table
 from campaign.cli.prepare import Prepared, Request, lacking, prepare
+from campaign.errors import ExitCode
 from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.experiments.interface import lost_without
@@ -31,19 +33,25 @@ NOTES = 5
 """of a test that are shown; the others are in the JSON."""
 
 
-def show_plan(request: Request, results: Path, *, as_json: bool) -> None:
-    """Show the plan. Raises LimitError, after that, when it breaks a limit or is unstable."""
+def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
+    """Show the plan; ARCHIVE when the run that it would replay is damaged.
+
+    Raises LimitError, after that, when it breaks a limit or is unstable.
+    """
     prepared = prepare(request)
     backend = prepared.open_backend()  # refuses what it cannot execute; it is not connected
+    source = archive_of(backend)
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
     if as_json:
         tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
         print_line(json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False))
     else:
         _print(prepared, results, losses)
+    code = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     check_limits(prepared.plan)
     check_loops(prepared.plan)
     print_low_margins(prepared.plan)
+    return code
 
 
 def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:

@@ -15,7 +15,8 @@ from campaign.archive import find_run
 from campaign.backends import backends
 from campaign.backends.interface import Backend, BackendKind
 from campaign.channels import explained, missing
-from campaign.errors import UsageError
+from campaign.cli.damage import archive_of
+from campaign.errors import ArchiveError, UsageError
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
@@ -72,13 +73,16 @@ def prepare(request: Request) -> Prepared:
 def open_backend(kind: BackendKind, options: Options, trials: Sequence[Trial]) -> Backend:
     """A backend that accepts every one of `trials`, not yet connected.
 
-    Raises UsageError when it does not, or is known not to record what one of them requires.
+    Raises UsageError when it does not, or is known not to record what one of them requires;
+    ArchiveError when it does not and the run that it serves is damaged.
     """
     backend = kind.open(options)
+    source = archive_of(backend)
+    refusal = ArchiveError if source is not None and source.damaged else UsageError
     for trial in trials:
         why = backend.refuses(trial)
         if why:
-            raise UsageError(
+            raise refusal(
                 f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label}): {why}"
             )
     check_channels(kind, backend, trials)

@@ -6,7 +6,9 @@ import webbrowser
 from pathlib import Path
 
 from campaign.archive import find_run, open_run
+from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
+from campaign.errors import ExitCode
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.report.build import build_report
@@ -21,8 +23,8 @@ def report_run(
     templates: Path | None,
     *,
     open_it: bool,
-) -> Path:
-    """Build the report of the run that `name` means and return where its page lies."""
+) -> tuple[Path, ExitCode]:
+    """Build the report of the run that `name` means; its page, and whether all could be read."""
     path = find_run(results, name)
     run = open_run(path)
     report = build_report(
@@ -32,8 +34,9 @@ def report_run(
         packaged_templates=templates_folder(),
         templates=templates,
     )
+    code = say_damaged(path, report.damaged)
     for problem in report.problems:
         print_note(problem, style="yellow")
     if open_it and not webbrowser.open(report.path.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
-    return report.path
+    return report.path, code

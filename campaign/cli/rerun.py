@@ -16,10 +16,12 @@ from campaign.archive import (
     open_run,
     reserved_name,
 )
+from campaign.archive.damage_words import heading, in_words, lost_trials
+from campaign.archive.sound_samples import whole_recording
 from campaign.cli.output import print_line, print_note
 from campaign.cli.prepare import find_backend, open_backend
 from campaign.cli.session import Session, execute
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.comparison import differences
 from campaign.policy import Policy
@@ -32,7 +34,7 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     """Execute an archived trial again; the new archive's path is the last line of output."""
     run = open_run(find_run(results, name))
     archived = find_trial(run, wanted)
-    before = archived.recording()
+    before = whole_recording(archived)
     kind = find_backend(SIM)
     simulated = run.header.backend == SIM
     tree = run.header.backend_options if simulated else {}
@@ -43,7 +45,7 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     stem = f"rerun-{archived.trial.name}-{run.header.protocol_name or 'run'}"
     with reserved_name(results, stem, now) as lock:
         header = _header(run, archived, lock.name, now, options.model_dump(mode="json"))
-        session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name)
+        session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name, repeats=run)
         outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial], lock))
     if outcome.status is RunStatus.INTERRUPTED:
         print_note("interrupted: nothing was compared")
@@ -55,13 +57,16 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
             "beside them are the simulation's"
         )
     (again,) = open_run(outcome.archive).trials
-    code = _say(f"{archived.trial.name} of {run.name}", before, again.recording())
+    same = _say(f"{archived.trial.name} of {run.name}", before, again.recording())
     print_line(str(outcome.archive))
-    return code
+    return worst_exit_code([same, ExitCode.ARCHIVE if run.damaged else ExitCode.DONE])
 
 
 def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
-    """The executed trial of that number or name. Raises UsageError when there is none."""
+    """The executed trial of that number or name.
+
+    Raises UsageError when there is none, ArchiveError when it cannot be read.
+    """
     match = re.fullmatch(r"(?:trial[-_])?([0-9]{1,10})", wanted)
     if match is None:
         raise UsageError(f"{wanted!r} is neither the number nor the name of a trial: trial-00017")
@@ -69,6 +74,8 @@ def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
     for archived in run.trials:
         if archived.trial.number == number:
             return archived
+    if lost := lost_trials(run).get(number):
+        raise ArchiveError(f"{run.path}: trial {number} cannot be read: {in_words(lost)}")
     planned = any(each.number == number for each in run.plan)
     what = "was planned but not executed" if planned else f"is not among its {len(run.plan)} trials"
     raise UsageError(f"{run.name}: trial {number} {what}")
@@ -90,18 +97,22 @@ def _header(
     run: RunReader, archived: ArchivedTrial, name: str, now: datetime, options: dict[str, object]
 ) -> RunHeader:
     trial, was = archived.trial, run.header
+    notes = [f"repeats {trial.name} of {run.name}"]
+    if run.damaged:
+        notes.append(heading(Path(run.path.name), run.damaged))
     return was.model_copy(
         update={
             "name": name,
             "created": now.isoformat(timespec="milliseconds"),
             "title": f"{trial.label}, repeated",
-            "notes": f"repeats {trial.name} of {run.name}",
+            "notes": "; ".join(notes),
             "tags": ("rerun",),
             "tests": tuple(test for test in was.tests if test.get("name") == trial.test),
             "only": (trial.test,),
             "backend": SIM,
             "backend_options": options,
             "versions": provenance.versions(),
+            "plugins": provenance.plug_ins([trial], SIM),
             "host": provenance.host(),
             "command": provenance.command(),
             "protocol_path": "",

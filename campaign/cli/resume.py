@@ -10,12 +10,13 @@ from pathlib import Path
 from campaign.archive import RunReader, RunWriter, find_run, open_run
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
+from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, choose_workers, conduct, print_warning
 from campaign.cli.sign import rehearse_signing
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.attempt import utc_now
 from campaign.execution.resume import (
@@ -65,6 +66,7 @@ def resume_run(
     """
     path = find_run(results, name)
     run = open_run(path)
+    read = say_damaged(path, run.damaged)
     check_resumable(run)
     remade = remake(run, port)
     _check_changes(run, remade.changes, accepted=accept_changes)
@@ -98,7 +100,8 @@ def resume_run(
         clear_stop,
         finished,
     )
-    return conduct(session, open_archive, report=report, sign=sign)
+    code = conduct(session, open_archive, report=report, sign=sign)
+    return worst_exit_code([code, read])
 
 
 def remake(run: RunReader, port: str | None = None) -> Remade:
@@ -143,6 +146,7 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
         prepared.kind.name,
         prepared.options.model_dump(mode="json"),
         provenance.versions(),
+        provenance.plug_ins(plan.trials, prepared.kind.name),
     )
     changes = differences(archived_conditions(run), now)
     if not same_list(run.plan, plan.trials):
@@ -165,11 +169,15 @@ def _from_archive(run: RunReader) -> Remade:
     kind = find_backend(header.backend)
     options = kind.options.model_validate(header.backend_options, context={"si": True})
     was = archived_conditions(run)
-    now = Conditions(
-        was.normalised, kind.name, options.model_dump(mode="json"), provenance.versions()
-    )
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
     trials = tuple(run.full_plan.trials())
+    now = Conditions(
+        was.normalised,
+        kind.name,
+        options.model_dump(mode="json"),
+        provenance.versions(),
+        provenance.plug_ins(trials, kind.name),
+    )
     return Remade(kind, options, trials, (), policy, tuple(differences(was, now)))
 
 

@@ -87,6 +87,7 @@ def run_header(
         tests=tuple(as_tree(plan)["tests"]),
         seed=plan.seed,
         versions=provenance.versions(),
+        plugins=provenance.plug_ins(plan.trials, prepared.kind.name),
         host=provenance.host(),
         command=provenance.command(),
         operator=remarks.operator or plan.operator,

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from campaign.archive import RunStatus, RunWriter
+from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.header import SEALED
 from campaign.backends.interface import Backend, BackendKind, StoppedOutside
 from campaign.cli.ask import attendance_of
+from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import check_channels
@@ -48,6 +49,7 @@ class Session:
         run: the name that the run has or will have.
         yes: whether nobody is asked anything.
         clear_stop: the count of a stop of the bench from outside that a person has seen.
+        repeats: the run whose trial is repeated; a backend that serves a run says so itself.
     """
 
     kind: BackendKind
@@ -59,6 +61,12 @@ class Session:
     yes: bool = False
     clear_stop: int | None = None
     finished: Mapping[int, Outcome] = field(default_factory=dict)
+    repeats: RunReader | None = None
+
+    @property
+    def source(self) -> RunReader | None:
+        """The archived run that this one is made from, if any."""
+        return self.repeats or archive_of(self.backend)
 
     @property
     def left(self) -> Iterator[Trial]:
@@ -100,6 +108,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     bench turns out not to record what a trial requires.
     """
     outcome: RunOutcome | None = None
+    source = session.source
+    read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     if isinstance(session.backend, StoppedOutside):
         session.backend.introduce(session.run)
     try:
@@ -115,6 +125,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
                 writer = open_archive()
                 if cleared:
                     writer.decision("stop cleared", cleared)
+                if source:
+                    note_damaged(writer, source)
             stop.kept(partial(_what_is_kept, writer.folder), moves=session.kind.live)
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
@@ -122,8 +134,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
         if outcome is None:
             raise
         print_warning(str(error))
-        return outcome, worst_exit_code([outcome.exit_code, error.exit_code])
-    return outcome, outcome.exit_code
+        return outcome, worst_exit_code([outcome.exit_code, error.exit_code, read])
+    return outcome, worst_exit_code([outcome.exit_code, read])
 
 
 def _what_is_kept(folder: Path) -> str:
@@ -142,8 +154,9 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
     except (AbortedError, NotSafeError):
         raise  # they say so themselves, after what matters more
     except Exception:
-        kept = folder if folder.is_dir() else folder.with_suffix(SEALED)
-        print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
+        there = (path for path in (folder, folder.with_suffix(SEALED)) if path.exists())
+        if kept := next(there, None):
+            print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
         raise
 
 
@@ -202,7 +215,7 @@ def _report(outcome: RunOutcome) -> ExitCode:
         Exception: a bug, after a run that has nothing worse to say.
     """
     try:
-        _build_report(outcome)
+        return _build_report(outcome)
     except CampaignError as error:
         print_warning(f"no report: {error}")
         return error.exit_code
@@ -219,13 +232,14 @@ def _report(outcome: RunOutcome) -> ExitCode:
     return ExitCode.DONE
 
 
-def _build_report(outcome: RunOutcome) -> None:
+def _build_report(outcome: RunOutcome) -> ExitCode:
     from campaign.cli.report import report_run
 
     archive: Path = outcome.archive
     if outcome.exit_code is ExitCode.INTERRUPTED:
         name = reference(archive)
         print_note(f"no report of an interrupted run; `campaign report {name}` makes one")
-        return
-    page = report_run(str(archive), archive.parent, None, None, open_it=False)
+        return ExitCode.DONE
+    page, code = report_run(str(archive), archive.parent, None, None, open_it=False)
     print_note(f"report: {page}")
+    return code

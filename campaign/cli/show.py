@@ -12,17 +12,24 @@ from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
 from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
+from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_table
-from campaign.trial import Outcome
+from campaign.errors import ExitCode
+from campaign.trial import Outcome, Tree
 
 
-def show_archive(name: str | None, results: Path, *, as_json: bool) -> None:
+def show_archive(name: str | None, results: Path, *, as_json: bool) -> ExitCode:
     """What a run was, how it ended, its tests, and all that did not go as planned."""
     run = open_run(find_run(results, name))
     story = read_lines(run.journal.encode())
     if as_json:
         print_line(json.dumps(_tree(run, story), indent=2))
-        return
+    else:
+        _print(run, story)
+    return say_damaged(run.path, run.damaged)
+
+
+def _print(run: RunReader, story: Lines) -> None:
     for label, value in _facts(run):
         if value:
             print_line(f"{label + ':':<13}{value}")
@@ -126,6 +133,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("tags", ", ".join(header.tags)),
         ("revision", header.git_revision),
         ("versions", versions),
+        ("plug-ins", "; ".join(map(_plug_in, header.plugins))),
         ("fingerprint", header.fingerprint),
     ]
 
@@ -134,6 +142,13 @@ def _signature(run: RunReader) -> str:
     if not (run.sealed and has_signature(run.path)):
         return ""
     return f"{signature_path(run.path).name} (not checked; campaign verify --signer ...)"
+
+
+def _plug_in(record: Tree) -> str:
+    """One kind of an installed package."""
+    sha256 = str(record.get("sha256", ""))[:12]
+    package = f"{record.get('distribution')} {record.get('version')}"
+    return f"{record.get('room')} {record.get('name')} of {package}, sources {sha256}"
 
 
 def _tests(run: RunReader) -> list[tuple[str, ...]]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from campaign.archive import find_runs
-from campaign.archive.damage import Damage
+from campaign.archive.damage_words import in_words
 from campaign.archive.verification import Verification, verify_run
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.signature import Checked, Wanted, check_signature
@@ -38,7 +38,7 @@ def verify_archives(
 def _print(found: Verification, signature: Checked) -> None:
     """One line per problem on standard output; one when there is none; one for a signature."""
     for damage in found.problems:
-        print_line(f"{found.path}: {_told(damage)}")
+        print_line(f"{found.path}: {in_words(damage)}")
     if found.sound:
         root = f", seal {found.root}" if found.root else ""
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets{root})")
@@ -48,12 +48,6 @@ def _print(found: Verification, signature: Checked) -> None:
         print_line(signature.text)
     elif signature.text:
         print_note(signature.text)
-
-
-def _told(damage: Damage) -> str:
-    if damage.trial and damage.channel:
-        return f"{damage.trial}, {damage.channel}: {damage}"
-    return f"{damage.trial}: {damage}" if damage.trial else str(damage)
 
 
 def _tree(found: Verification, signature: Checked) -> dict[str, object]:

@@ -5,10 +5,20 @@ from __future__ import annotations
 import platform
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import campaign
+from campaign.backends import backends
+from campaign.entry_points import PlugIn
+from campaign.experiments import experiments
+from campaign.physics.compensation import compensation_methods
+from campaign.physics.friction import friction_models
+from campaign.plugins import Kinds
+from campaign.source_hash import digest, sources_of
+from campaign.trial import Tree, Trial
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "pint")
 
@@ -22,6 +32,50 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def plug_ins(trials: Iterable[Trial], backend: str) -> tuple[Tree, ...]:
+    """Every kind of an installed package that trials and backend name, with its sources' hash.
+
+    The friction models and compensation methods are all those of the trials' benches.
+    """
+    friction, compensation = friction_models(), compensation_methods()
+    benches = bool(friction.plug_ins or compensation.plug_ins)
+    named: set[tuple[str, str]] = set()
+    experiment_names: set[str] = set()
+    for trial in trials:
+        experiment_names.add(trial.kind)
+        if benches:
+            named |= set(_words(trial.bench.get("friction")))
+            named |= set(_words(trial.bench.get("compensation")))
+    rooms: tuple[tuple[Kinds[Any], set[str]], ...] = (
+        (experiments(), experiment_names),
+        (friction, {word for key, word in named if key == "model"}),
+        (compensation, {word for key, word in named if key == "method"}),
+        (backends(), {backend}),
+    )
+    found = ((room, room.plug_in(name)) for room, names in rooms for name in sorted(names))
+    return tuple(_record(room.room, plug_in) for room, plug_in in found if plug_in is not None)
+
+
+def _words(tree: Any) -> Iterator[tuple[str, str]]:
+    """Every field of nested tables that is a text."""
+    for key, value in tree.items() if isinstance(tree, dict) else ():
+        if isinstance(value, str):
+            yield key, value
+        else:
+            yield from _words(value)
+
+
+def _record(room: str, plug_in: PlugIn) -> Tree:
+    return {
+        "room": room,
+        "name": plug_in.name,
+        "distribution": plug_in.distribution,
+        "version": plug_in.version,
+        "entry_point": plug_in.entry_point,
+        "sha256": digest(sources_of(plug_in.packages)),
+    }
 
 
 def host() -> dict[str, str]:

@@ -28,12 +28,14 @@ class Conditions:
     Attributes:
         normalised: the protocol's, as `Plan.normalised`; what else is in it is not compared.
         versions: of the program and the libraries that make samples.
+        plug_ins: those that are used, as `provenance.plug_ins`.
     """
 
     normalised: Tree
     backend: str
     backend_options: Tree
     versions: Mapping[str, str]
+    plug_ins: Sequence[Tree] = ()
 
 
 def check_resumable(run: RunReader) -> None:
@@ -83,7 +85,11 @@ def archived_conditions(run: RunReader) -> Conditions:
     """What the run began with."""
     header = run.header
     return Conditions(
-        header.normalised, header.backend, header.backend_options, dict(header.versions)
+        header.normalised,
+        header.backend,
+        header.backend_options,
+        dict(header.versions),
+        header.plugins,
     )
 
 
@@ -101,6 +107,10 @@ def differences(was: Conditions, now: Conditions) -> list[str]:
     found += [
         _line(f"versions.{path}", *values)
         for path, *values in _compare(dict(was.versions), dict(now.versions))
+    ]
+    found += [
+        _line(f"plugins.{path}", *values)
+        for path, *values in _compare(_by_room(was.plug_ins), _by_room(now.plug_ins))
     ]
     return found
 
@@ -139,6 +149,16 @@ def _by_name(normalised: Tree) -> dict[str, Any]:
         rest["matrix"] = dict(test.get("matrix", []))
         trees[test["name"]] = {**test.get("options", {}), **rest}
     return trees
+
+
+def _by_room(plug_ins: Sequence[Tree]) -> dict[str, Any]:
+    """What is known of each plug-in, by `room.name`."""
+    return {
+        f"{str(each.get('room')).replace(' ', '-')}.{each.get('name')}": {
+            key: value for key, value in each.items() if key not in ("room", "name")
+        }
+        for each in plug_ins
+    }
 
 
 def _of_tests(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from campaign.experiments.interface import Experiment
-from campaign.plugins import discover
+from campaign.plugins import Kinds
 
 
 @cache
-def experiments() -> dict[str, Experiment]:
+def experiments() -> Kinds[Experiment]:
     """Every experiment, by name."""
-    return discover(__name__, "EXPERIMENT", "campaign.experiments")
+    return Kinds("experiment", __name__, "EXPERIMENT", Experiment)

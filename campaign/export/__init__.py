@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from campaign.export.interface import ExportKind
-from campaign.plugins import discover
+from campaign.plugins import Kinds
 
 
 @cache
-def exports() -> dict[str, ExportKind]:
+def exports() -> Kinds[ExportKind]:
     """Every format, by name."""
-    return discover(__name__, "EXPORT", "campaign.exports")
+    return Kinds("export format", __name__, "EXPORT", ExportKind)

@@ -17,7 +17,8 @@ class ExportKind:
     Attributes:
         suffix: of its files, e.g. `.csv`.
         write: writes a recording, all of it in SI and at full precision, into a new file. Raises
-            UsageError when the format cannot hold it, or when a library is missing.
+            UsageError when the format cannot hold it, or when a library is missing. A format with
+            metadata says there what is `damaged` of the trial's run.
     """
 
     name: str

@@ -1,7 +1,8 @@
 """MAT version 5, which MATLAB, Octave and SciPy read.
 
 Each channel is a variable, a column; beside them stand the structs `units` and `labels` with a
-field per variable, and `trial` with what was executed and how it ended.
+field per variable, and `trial` with what was executed, how it ended, and what of its run is
+damaged.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from campaign.access import TrialView
+from campaign.archive.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 from campaign.trial import Recording, canonical_json
@@ -82,6 +84,7 @@ def _about(trial: TrialView) -> dict[str, Any]:
         "seed": np.uint64(executed.seed),  # a double has no room for its 63 bits
         "outcome": ending.outcome.value,
         "reason": _ascii(ending.reason),
+        "damaged": _ascii("\n".join(map(in_words, trial.damaged))),
         "json": canonical_json(executed.model_dump(mode="json")),
     }
 

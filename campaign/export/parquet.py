@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from campaign.access import TrialView
+from campaign.archive.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 from campaign.trial import Recording, canonical_json
@@ -30,6 +31,7 @@ def _write(trial: TrialView, recording: Recording, path: Path) -> None:
         "title": trial.trial.label,
         "outcome": trial.ending.outcome.value,
         "reason": trial.ending.reason,
+        "damaged": canonical_json(list(map(in_words, trial.damaged))),
         "trial": canonical_json(trial.trial.model_dump(mode="json")),
     }
     table = pa.table(

@@ -6,12 +6,15 @@ import os
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.access import RunView, TrialView
 from campaign.access.tables import trials_table
-from campaign.errors import ArchiveError, UsageError
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import FILE, damaged_csv, lost_trials
+from campaign.archive.sound_samples import sound_part
+from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 
 TABLE = "trials.csv"
@@ -24,12 +27,13 @@ class Exported:
 
     Attributes:
         files: how many recordings were written.
-        problems: the trials that could not be read, each in one line; everything else is there.
+        damaged: what of the run is damaged, as far as this export looked at it; `damaged.csv` has
+            it, and everything else is there.
     """
 
     folder: Path
     files: int
-    problems: tuple[str, ...]
+    damaged: tuple[Damage, ...]
 
 
 def export_run(
@@ -49,6 +53,9 @@ def export_run(
         folder: where to write; it must not be there yet, or be empty.
         tests, numbers: what to choose; a trial needs to be among one of them.
 
+    A channel or a trial that is damaged is left out; `damaged.csv` lists it, and so does each file
+    of a format that has a place for it.
+
     Raises UsageError when there is something in the folder, or a test or trial is not in the run.
     """
     trials = _chosen(run, tests, numbers)
@@ -60,39 +67,61 @@ def export_run(
     except OSError as error:
         raise UsageError(f"{folder}: cannot be written: {error.strerror}") from None
     try:
-        exported = _write(trials, kind, part, folder)
+        files, damaged = _write(run, trials, kind, part)
         _publish(part, folder)
     except OSError as error:
         raise UsageError(f"{folder}: cannot be written: {error.strerror or error}") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
-    return exported
+    return Exported(folder, files, damaged)
 
 
 def _chosen(run: RunView, tests: Sequence[str], numbers: Sequence[int]) -> list[TrialView]:
     if not tests and not numbers:
         return list(run)
     chosen = {view.number: view for name in tests for view in run.test(name)}
-    chosen |= {number: run.trial(number) for number in numbers}
+    lost = lost_trials(run.archive)
+    chosen |= {number: run.trial(number) for number in numbers if number not in lost}
     return [chosen[number] for number in sorted(chosen)]
 
 
-def _write(trials: Sequence[TrialView], kind: ExportKind, part: Path, folder: Path) -> Exported:
-    files: dict[int, str] = {}
-    problems = []
-    for view in trials:
-        try:
-            recording = view.recording()
-        except ArchiveError as error:
-            problems.append(str(error))
-            continue
-        if recording.channels:  # a trial that failed before its first sample has none
-            files[view.number] = f"{view.name}{kind.suffix}"
-            kind.write(view, recording, part / files[view.number])
+def _write(
+    run: RunView, trials: Sequence[TrialView], kind: ExportKind, part: Path
+) -> tuple[int, tuple[Damage, ...]]:
+    """Write recordings and tables; how many recordings, and what is damaged.
+
+    Each file names all damage. What is only found in reading samples is known after the last of
+    them: then they are written once more.
+    """
+    files, damaged = _write_recordings(run, trials, kind, part, run.damaged)
+    if damaged != run.damaged:
+        files, damaged = _write_recordings(run, trials, kind, part, damaged)
     table = trials_table(view.archived for view in trials)
     table["file"] = [files.get(view.number, "") for view in trials]
     table.to_csv(part / TABLE, lineterminator="\n", encoding="utf-8")
-    return Exported(folder, len(files), tuple(problems))
+    if damaged:
+        (part / FILE).write_text(damaged_csv(damaged), encoding="utf-8", newline="\n")
+    return len(files), damaged
+
+
+def _write_recordings(
+    run: RunView,
+    trials: Sequence[TrialView],
+    kind: ExportKind,
+    part: Path,
+    known: tuple[Damage, ...],
+) -> tuple[dict[int, str], tuple[Damage, ...]]:
+    """The file of each trial that has one, and what is damaged of the run and of their samples."""
+    files: dict[int, str] = {}
+    damaged = list(run.damaged)
+    for view in trials:
+        recording, found = sound_part(run.path, view.archived)
+        damaged += found
+        if recording is None or not recording.channels:
+            continue  # damaged, or it failed before its first sample
+        files[view.number] = f"{view.name}{kind.suffix}"
+        kind.write(replace(view, damaged=known), recording, part / files[view.number])
+    return files, tuple(dict.fromkeys(damaged))
 
 
 def _publish(part: Path, folder: Path) -> None:

@@ -2,15 +2,25 @@
 
 numba's own cache compares only the file a function stands in: edit a function that it calls in
 another file, and the old machine code goes on giving the old numbers. Here the cache folder's name
-is a hash of every source file of `campaign.physics`, so any edit starts afresh.
+is a hash of every source file that the function may call, so any edit starts afresh:
+
+- for a function of `campaign.physics`, all of `campaign.physics`, which calls nothing outside;
+- for any other, also the rest of this program, its own distribution, the folders and editable
+  installs that it imports from (`campaign.source_hash`), and which libraries are installed.
+
+Where that cannot be known (a notebook's cell, a source edited since the process began) nothing is
+kept. What a module reads from data files while it is imported is not seen.
 """
 
 from __future__ import annotations
 
 import hashlib
 import platform
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -18,23 +28,57 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from campaign.entry_points import packages_of
+from campaign.source_hash import digest, sources_of
+
 _CONFIG: Any = numba.config
+_PHYSICS = Path(__file__).parent
+_CHOSEN_BY_USER: str = _CONFIG.CACHE_DIR  # NUMBA_CACHE_DIR
+_DECORATING = threading.RLock()
+_IMPORTED_AT = time.time()
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @cache
-def cache_folder() -> Path:
-    """Where compiled functions are kept: the user's cache, or a temporary folder if it is shut."""
-    import platformdirs
+def cache_folder(module: str) -> Path | None:
+    """Where machine code of a module's functions is kept; None: it is not kept.
 
-    name = digest_of_sources(Path(__file__).parent)
-    folder = platformdirs.user_cache_path("campaign") / "compiled" / name
+    The folder lies in the user's cache (in NUMBA_CACHE_DIR, where that is set), or in a temporary
+    folder if that is shut.
+    """
+    try:
+        name = _key(module)
+    except OSError:  # a source that is gone, or that may not be read
+        name = None
+    if name is None:
+        return None
+    folder = _user_cache() / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError:
         folder = Path(tempfile.mkdtemp(prefix="campaign-compiled-"))
     return folder
+
+
+def _user_cache() -> Path:
+    import platformdirs
+
+    if _CHOSEN_BY_USER:
+        return Path(_CHOSEN_BY_USER) / "campaign"
+    return platformdirs.user_cache_path("campaign") / "compiled"
+
+
+def _key(module: str) -> str | None:
+    """16 hexadecimal digits that change with whatever a module's functions may call."""
+    physics = digest_of_sources(_PHYSICS)
+    if f"{module}.".startswith("campaign.physics."):
+        return physics
+    own = sources_of(packages_of(module))
+    if not own or _is_newer(own):
+        return None
+    parts = (physics, digest(sources_of(("campaign",))), digest(own), *_libraries())
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -46,21 +90,35 @@ def digest_of_sources(folder: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def _is_newer(sources: Mapping[str, Path]) -> bool:
+    """Whether a source was written after this process may have imported what it was before."""
+    return any(path.stat().st_mtime >= _IMPORTED_AT for path in sources.values())
+
+
+def _libraries() -> list[str]:
+    """Names, versions and times of all that is installed where modules are looked for."""
+    folders = (Path(folder) for folder in dict.fromkeys(sys.path) if folder)
+    abouts = (about for folder in folders for about in folder.glob("*.dist-info"))
+    return sorted(f"{about.name} {about.stat().st_mtime_ns}" for about in abouts)
+
+
 @contextmanager
-def _cached_here() -> Iterator[None]:
+def _kept_in(folder: Path | None) -> Iterator[None]:
     """Numba chooses the cache folder when it decorates; other packages keep their own."""
-    before = _CONFIG.CACHE_DIR
-    _CONFIG.CACHE_DIR = before or str(cache_folder())
-    try:
-        yield
-    finally:
-        _CONFIG.CACHE_DIR = before
+    with _DECORATING:
+        before = _CONFIG.CACHE_DIR
+        _CONFIG.CACHE_DIR = str(folder) if folder is not None else before
+        try:
+            yield
+        finally:
+            _CONFIG.CACHE_DIR = before
 
 
 def compiled(function: F) -> F:
     """Decorator: compile at the first call, keep on disk, release the GIL while running."""
-    with _cached_here():
-        return cast(F, numba.njit(cache=True, nogil=True)(function))
+    folder = cache_folder(function.__module__)
+    with _kept_in(folder):
+        return cast(F, numba.njit(cache=folder is not None, nogil=True)(function))
 
 
 def inlined(function: F) -> F:
@@ -70,5 +128,6 @@ def inlined(function: F) -> F:
 
 def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile `function` now, with a C signature; the result has an `address`."""
-    with _cached_here():
-        return numba.cfunc(signature, cache=True)(function)
+    folder = cache_folder(function.__module__)
+    with _kept_in(folder):
+        return numba.cfunc(signature, cache=folder is not None)(function)

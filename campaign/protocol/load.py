@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from campaign.errors import Problem, ProtocolError
+from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
 from campaign.policy import Policy
@@ -200,8 +200,14 @@ class _Loader:
         return test
 
     def _experiment(self, draft: Draft, kind: Any) -> ExperimentKind | None:
-        if not isinstance(kind, str) or kind in self.experiments:
-            return self.experiments.get(kind) if isinstance(kind, str) else None
+        if not isinstance(kind, str):
+            return None
+        if kind in self.experiments:
+            try:
+                return self.experiments[kind]
+            except UsageError as error:
+                self._report(draft.origin.problem(("kind",), "value", str(error)))
+                return None
         message = f"unknown kind {shown(kind)}; {allowed(self.experiments)}"
         message += nearest(kind, self.experiments)
         self._report(draft.origin.problem(("kind",), "value", message))

@@ -100,6 +100,8 @@ def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collec
             return keys, "value", f"'{field}' is missing; {tags}"
         case "union_tag_invalid":
             return _wrong_tag(keys, shape, tree, detail["ctx"])
+        case "unusable_kind":
+            return *_place_of_tag(keys, tree, detail["ctx"]["discriminator"]), str(detail["msg"])
         case "friction_path":
             return keys, "value" if isinstance(keys[-1], int) else "key", str(detail["msg"])
         case _:
@@ -111,10 +113,17 @@ def _wrong_tag(keys: Keys, shape: Shape | None, tree: Any, context: Mapping[str,
     field, tag = context["discriminator"].strip("'"), context["tag"]
     tags = [str(name) for name in shape.tags()] if shape is not None else []
     message = f"unknown {field} {shown(tag)}; {allowed(tags)}{nearest(tag, tags)}"
+    keys, aim = _place_of_tag(keys, tree, field)
+    implied = f", or say which with '{field} = ...'" if aim == "key" else ""
+    return keys, aim, f"{message}{implied}"
+
+
+def _place_of_tag(keys: Keys, tree: Any, field: str) -> tuple[Keys, Aim]:
+    """Where a table says what it is: in `field`, or by its own name."""
     value = _value_at(tree, keys)
     if isinstance(value, Mapping) and field not in value:
-        return keys, "key", f"{message}, or say which with '{field} = ...'"
-    return (*keys, field), "value", message
+        return keys, "key"
+    return (*keys, field), "value"
 
 
 _WANTED = {

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
 
+from campaign.choice import Choice
 from campaign.protocol.positions import Keys
 from campaign.units import Quantity
 
@@ -27,22 +28,34 @@ class Shape:
         discriminator: the field that tells models apart, or "".
         quantity: the physical quantity it is, if it is one.
         meaning: what the field's documentation says.
+        choice: the tables among which the discriminator chooses, in place of members.
     """
 
     members: tuple[Any, ...]
     discriminator: str = ""
     quantity: Quantity | None = None
     meaning: str = ""
+    choice: Choice | None = None
+
+    @property
+    def is_union(self) -> bool:
+        """Whether pydantic labels a member in the location of an error."""
+        return self.choice is not None or len(self.members) > 1
 
     def models(self) -> tuple[type[BaseModel], ...]:
         return tuple(m for m in self.members if isinstance(m, type) and issubclass(m, BaseModel))
 
     def tags(self) -> tuple[str, ...]:
         """The allowed values of the discriminator."""
+        if self.choice is not None:
+            return self.choice.words()
         return tuple(tag for model in self.models() for tag in _tags(model, self.discriminator))
 
     def tagged(self, tag: object) -> Shape:
         """This shape with the union narrowed to the member that pydantic labels `tag`."""
+        if self.choice is not None:
+            options = self.choice.options(tag)
+            return Shape((options,) if options is not None else ())
         chosen = [
             member
             for member in self.models()
@@ -52,7 +65,7 @@ class Shape:
 
     def narrowed(self, value: Any) -> Shape:
         """This shape with a discriminated union narrowed by what `value` says."""
-        if len(self.members) > 1 and self.discriminator and isinstance(value, Mapping):
+        if self.is_union and self.discriminator and isinstance(value, Mapping):
             return self.tagged(value.get(self.discriminator))
         return self
 
@@ -82,6 +95,9 @@ def shape_of(annotation: Any) -> Shape:
     while get_origin(annotation) is Annotated:
         annotation, *more = get_args(annotation)
         metadata += more
+    choice = next((m for m in metadata if isinstance(m, Choice)), None)
+    if choice is not None:
+        return Shape((), choice.tag, choice=choice)
     members = (annotation,)
     if get_origin(annotation) in (Union, UnionType):
         members = tuple(_untagged(m) for m in get_args(annotation) if m is not NoneType)
@@ -117,7 +133,7 @@ def from_location(
     keys: Keys = ()
     shape: Shape | None = Shape((root,))
     for part in location:
-        if shape is not None and len(shape.members) > 1:
+        if shape is not None and shape.is_union:
             shape = shape.tagged(part)
             continue
         keys = (*keys, part)
@@ -145,6 +161,7 @@ def _of_field(field: FieldInfo) -> Shape:
         discriminator or shape.discriminator,
         quantity or shape.quantity,
         " ".join((field.description or "").split()),
+        shape.choice,
     )
 
 

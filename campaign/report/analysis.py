@@ -6,8 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from pydantic import ValidationError
+
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.errors import ArchiveError
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import of_test
+from campaign.archive.sound_samples import Trials, without_damaged
+from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
 from campaign.published.scoreboard import Evidence, evidence_of
@@ -24,9 +29,10 @@ class AnalysedTest:
         title: heading on the page.
         reproduces: published tables it stands for.
         options: normalised (SI), before the sweep.
-        trials: the executed ones, in plan order, failed ones included.
+        trials: the executed ones that could be read, in plan order, failed ones included.
         experiment, bench: None when this program does not know the kind, or nothing was executed.
         problem: why there is no result, in one line; empty when there is one.
+        damaged: what is damaged of its trials; those that cannot be read are not among `trials`.
     """
 
     name: str
@@ -40,6 +46,7 @@ class AnalysedTest:
     bench: Bench | None
     result: Result
     problem: str = ""
+    damaged: tuple[Damage, ...] = ()
 
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
@@ -49,7 +56,7 @@ class AnalysedTest:
         """What it brings to the scoreboard."""
         found = evidence_of(self.name, self.reproduces, self.result.findings, self.bench)
         lost = any(not math.isfinite(finding.value) for finding in found.findings)
-        return replace(found, failed=lost or bool(self.failed or self.problem))
+        return replace(found, failed=lost or bool(self.failed or self.problem or self.damaged))
 
 
 def analyse_run(run: RunReader, experiments: Mapping[str, Experiment]) -> tuple[AnalysedTest, ...]:
@@ -68,7 +75,9 @@ def published_of(run: RunReader) -> Published:
 
 
 def one_line(error: BaseException) -> str:
-    """An error without its traceback."""
+    """An error without its traceback; of options that are not valid, the first that is wrong."""
+    if isinstance(error, ValidationError):
+        return str(error.errors(include_url=False)[0]["msg"])[:600]
     lines = str(error).strip().splitlines()
     text = lines[0] if lines else "no message"
     return f"{type(error).__name__}: {text}"[:300]
@@ -77,19 +86,18 @@ def one_line(error: BaseException) -> str:
 def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) -> AnalysedTest:
     name, kind = str(test.get("name", "")), str(test.get("kind", ""))
     options, reproduces = test.get("options"), test.get("reproduces")
-    trials = tuple(trial for trial in run.trials if trial.trial.test == name)
-    experiment = experiments.get(kind)
+    trials = run.trials_of(name)
+    experiment, unusable = _experiment(kind, experiments)
     data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
+
+    def analyse(trials: Trials) -> tuple[Result, str]:
+        return _result(replace(data, trials=trials), experiment)
+
+    damaged = tuple(damage for damage in of_test(run, name) if damage.trial)
     try:
-        result, problem = _result(data, experiment)
-    except ArchiveError:
-        trials, damaged = _readable(trials)
-        data = replace(data, trials=trials)
-        try:
-            result, problem = _result(data, experiment)
-        except ArchiveError as error:
-            result, problem = Result(), one_line(error)
-        problem = "; ".join([*damaged, *filter(None, [problem])])
+        (result, problem), trials, found = without_damaged(run.path, trials, analyse)
+    except ArchiveError as error:
+        result, problem, found = Result(), one_line(error), (Damage.of(run.path, error),)
     return AnalysedTest(
         name=name,
         kind=kind,
@@ -103,23 +111,17 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
         experiment=experiment,
         bench=_bench(trials),
         result=result,
-        problem=problem,
+        problem=unusable or problem,
+        damaged=tuple(dict.fromkeys((*damaged, *found))),
     )
 
 
-def _readable(
-    trials: tuple[ArchivedTrial, ...],
-) -> tuple[tuple[ArchivedTrial, ...], tuple[str, ...]]:
-    """The trials whose samples are as they were recorded, and a line about each of the others."""
-    good, damaged = [], []
-    for trial in trials:
-        try:
-            trial.recording()
-        except ArchiveError as error:
-            damaged.append(f"{trial.trial.name} is left out: {error}")
-        else:
-            good.append(trial)
-    return tuple(good), tuple(damaged)
+def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Experiment | None, str]:
+    """The experiment, or why a package that should provide it cannot."""
+    try:
+        return experiments.get(kind), ""
+    except UsageError as error:
+        return None, str(error)
 
 
 def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from campaign.archive import RunReader
+from campaign.archive.damage import Damage
 from campaign.archive.journal import Decision, OperatorStep, RunResumed
 from campaign.archive.story import Lines, read_lines
 from campaign.report import page, tables
@@ -27,6 +28,7 @@ class Besides:
     figures: tuple[page.ShownFigure, ...]
     tables: tuple[page.ShownTable, ...]
     problems: tuple[str, ...]
+    damaged: tuple[Damage, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.figures or self.tables)
@@ -35,13 +37,13 @@ class Besides:
 def besides(run: RunReader, folder: page.Folder) -> Besides:
     """All there is to say, numbered after what `folder` already has."""
     told = read_lines(run.journal.encode())
-    drifts, problems = drifts_of(run)
+    drifts, problems, damaged = drifts_of(run)
     loops, loop_problems = low_margin_table(run)
     found = [_decisions(told), _steps(told), _attempts(told), _faults(run), loops]
     found += [drift_table(drift) for drift in drifts]
     shown = tuple(_shown(table, folder) for table in found if table.rows)
     figures = tuple(_drawn(drift_figure(drift), folder) for drift in drifts)
-    return Besides(figures, shown, (*problems, *loop_problems))
+    return Besides(figures, shown, (*problems, *loop_problems), tuple(damaged))
 
 
 def _drawn(figure: Figure, folder: page.Folder) -> page.ShownFigure:

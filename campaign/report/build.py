@@ -9,18 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import listed, lost_trials
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.report import page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
 from campaign.report.besides import besides
+from campaign.report.damage_notice import told_on_page
 from campaign.report.output import replaced_folder
 from campaign.report.palette import variables
 from campaign.trial import Outcome
 
 FAILED = 200
 """Most failed trials that are listed; the archive has them all."""
+DAMAGED = 200
+"""Most damage that is listed on the page; `tables/damaged.csv` has all."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +35,12 @@ class Report:
     Attributes:
         path: of `report.html`.
         problems: analyses that failed and numbers that could not be compared, one line each.
+        damaged: what of the run is damaged, as far as the report looked at it; all else is there.
     """
 
     path: Path
     problems: tuple[str, ...]
+    damaged: tuple[Damage, ...] = ()
 
 
 def build_report(
@@ -50,22 +57,23 @@ def build_report(
     the same name. Raises UsageError when `output` is no report of ours or cannot be written, or
     when a template is wrong; an older report is then left as it was.
     """
-    html, folder, problems = render(run, experiments, packaged_templates, templates)
+    html, folder, report = render(run, output, experiments, packaged_templates, templates)
     with replaced_folder(output) as new:
         for name, text in {"report.html": html, **folder.files}.items():
             path = new / name
             path.parent.mkdir(exist_ok=True)
             path.write_text(text, encoding="utf-8", newline="\n")
-    return Report(output / "report.html", problems)
+    return report
 
 
 def render(
     run: RunReader,
+    output: Path,
     experiments: Mapping[str, Experiment],
     packaged_templates: Path,
     templates: Path | None = None,
-) -> tuple[str, page.Folder, tuple[str, ...]]:
-    """The page's text, the other files, and the problems; nothing is written."""
+) -> tuple[str, page.Folder, Report]:
+    """The page's text, the other files, and what there is to say of them; nothing is written."""
     published = published_of(run)
     tests = analyse_run(run, experiments)
     scoreboard = score(published, [test.evidence() for test in tests])
@@ -74,9 +82,10 @@ def render(
     picture = page.overview(scoreboard, folder)
     sections = page.lay_out(tests, scoreboard, published, folder)
     happened = besides(run, folder)
+    found = [damage for test in tests for damage in test.damaged]
+    damaged = tuple(dict.fromkeys((*run.damaged, *found, *happened.damaged)))
     problems = (
-        *(f"not readable, and left out: {damage}" for damage in run.damaged),
-        *(f"{s.test.name}: {problem}" for s in sections for problem in s.problems),
+        *(f"{s.test.name}: {p}" for s in sections for p in s.problems if p not in s.left_out),
         *scoreboard.problems,
         *happened.problems,
     )
@@ -96,12 +105,15 @@ def render(
         "failed_count": sum(t.ending.outcome is not Outcome.COMPLETED for t in run.trials),
         "contradictions": page.contradictions(scoreboard),
         "sources": _sources_of(scoreboard, published),
-        "problems": problems,
+        "problems": (*(f"damaged: {line}" for line in listed(damaged, DAMAGED)), *problems),
+        "damage": told_on_page(run, damaged, folder) if damaged else None,
         "command": _command(run),
         "seeds": _seeds(run.trials),
-        "not_executed": max(0, len(run.plan) - len(run.trials)),
+        "lost": len(lost_trials(run)),
+        "not_executed": max(0, len(run.plan) - len(run.trials) - len(lost_trials(run))),
     }
-    return _fill(context, packaged_templates, templates), folder, problems
+    html = _fill(context, packaged_templates, templates)
+    return html, folder, Report(output / "report.html", problems, damaged)
 
 
 def _fill(context: Mapping[str, Any], packaged: Path, own: Path | None) -> str:

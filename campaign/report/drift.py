@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.damage import Damage
+from campaign.archive.sound_samples import Trials, without_damaged
 from campaign.channels import (
     DRIVE_TORQUE,
     GYRO_RATE,
@@ -32,10 +35,11 @@ class Drift:
     rms: tuple[float, ...]
 
 
-def drifts_of(run: RunReader) -> tuple[list[Drift], list[str]]:
-    """One drift per test with checks, and what of them could not be read."""
+def drifts_of(run: RunReader) -> tuple[list[Drift], list[str], list[Damage]]:
+    """One drift per test with checks, why there is none, and what of the trials is damaged."""
     drifts: list[Drift] = []
     problems: list[str] = []
+    damaged: list[Damage] = []
     checked = [t.trial for t in run.trials if t.trial.role is Role.CHECK]
     for test in dict.fromkeys(trial.test for trial in checked):
         task = next(trial.task for trial in checked if trial.test == test)
@@ -45,13 +49,16 @@ def drifts_of(run: RunReader) -> tuple[list[Drift], list[str]]:
             if t.trial.task == task and t.ending.outcome is Outcome.COMPLETED and _comparable(t)
         )
         try:
-            drift = _drift(test, same)
+            drift, _, found = without_damaged(run.path, same, partial(_drift, test))
+            damaged += found
         except (ArchiveError, KeyError, ValueError) as error:
+            if isinstance(error, ArchiveError):
+                damaged.append(Damage.of(run.path, error))
             problems.append(f"the checks of {test}: {one_line(error)}")
             continue
         if drift is not None:
             drifts.append(drift)
-    return drifts, problems
+    return drifts, problems, damaged
 
 
 def _comparable(item: ArchivedTrial) -> bool:
@@ -60,7 +67,9 @@ def _comparable(item: ArchivedTrial) -> bool:
     return trial.role is Role.CHECK or (trial.role is Role.MEASUREMENT and trial.repeat == 1)
 
 
-def _drift(test: str, trials: tuple[ArchivedTrial, ...]) -> Drift | None:
+def _drift(test: str, trials: Trials) -> Drift | None:
+    if not trials:
+        return None
     trials = tuple(t for t in trials if t.trial.bench == trials[-1].trial.bench)
     if len(trials) < 2:
         return None

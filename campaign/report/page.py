@@ -95,7 +95,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Section:
-    """One test on the page."""
+    """One test on the page; `left_out` are those of the `problems` that are damaged trials."""
 
     anchor: str
     test: AnalysedTest
@@ -104,6 +104,7 @@ class Section:
     tables: tuple[ShownTable, ...]
     comparisons: tuple[Comparison, ...]
     problems: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass
@@ -222,6 +223,7 @@ def _section(
     published: Sequence[PublishedTable],
     folder: Folder,
 ) -> Section:
+    left_out = tuple(_left_out(test))
     problems = [test.problem] if test.problem else []
     comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
     figures = [
@@ -241,8 +243,17 @@ def _section(
         figures=tuple(figures),
         tables=tuple(shown_tables),
         comparisons=tuple(comparisons),
-        problems=tuple(problems),
+        problems=(*left_out, *problems),
+        left_out=left_out,
     )
+
+
+def _left_out(test: AnalysedTest) -> Iterator[str]:
+    """What is damaged of the test's trials, and whether that cost it the trial."""
+    there = {archived.trial.name for archived in test.trials}
+    for damage in test.damaged:
+        is_what = "is damaged" if damage.trial in there else "is left out"
+        yield f"{damage.trial or test.name} {is_what}: {damage}"
 
 
 def _attempt(problems: list[str], key: str, make: Callable[[], Any]) -> Any:

@@ -19,6 +19,7 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.sound_samples import whole_recording
 from campaign.archive.statement import run_statement
 from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError
@@ -342,7 +343,7 @@ def test_an_excuse_that_makes_no_sense_is_none(sealed, text):
 
 def _readable(archived: ArchivedTrial) -> bool:
     try:
-        archived.recording().whole()
+        whole_recording(archived)
     except ArchiveError:
         return False
     return True

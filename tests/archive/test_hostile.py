@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunWriter, list_runs, open_run
+from campaign.archive.sound_samples import whole_recording
 from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError, ExitCode
 from tests.archive.forging import (
@@ -27,7 +28,7 @@ from tests.archive.forging import (
 def read_all(path):
     """Everything a report would read, by trial."""
     trials = open_run(path).trials
-    return {archived.trial.number: archived.recording().whole() for archived in trials}
+    return {archived.trial.number: whole_recording(archived) for archived in trials}
 
 
 def refused(path, match):
@@ -45,7 +46,7 @@ def listed(path, match):
     assert any(re.search(match, line) for line in told), told
     assert all("\n" not in line and str(path) not in line for line in told)
     for archived in run.trials:
-        archived.recording().whole()
+        whole_recording(archived)
     return run
 
 
@@ -179,7 +180,7 @@ def test_links_are_not_followed(sealed, tmp_path, kind):
         file["trial_00001"] = link if kind == "external" else h5py.SoftLink("/aside")
     refused(sealed, "/trial_00001: is a link, and links are not followed")
     placed(sealed, "/trial_00001: is a link")
-    assert len(open_run(sealed).trials[1].recording().whole().time) == 120
+    assert len(whole_recording(open_run(sealed).trials[1]).time) == 120
     with h5py.File(sealed, "r+") as file:
         del file["trial_00001"]
         file.move("aside", "trial_00001")
@@ -360,7 +361,7 @@ def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
         dataset[:] = values
     refused(sealed, "/trial_00002/data/friction_torque: does not match its checksum")
     run = open_run(sealed)
-    assert len(run.trials[0].recording().whole().time) == 50
+    assert len(whole_recording(run.trials[0]).time) == 50
     assert len(run.problems()) == 1
     assert not run.unchanged()
 

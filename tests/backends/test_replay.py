@@ -237,7 +237,7 @@ def test_a_trial_that_recorded_nothing_says_nothing_of_its_channels(tmp_path, tr
     assert served(backend, asking).ending.reason == "no power at 5 °C"
 
 
-def test_a_trial_whose_record_is_damaged_is_not_served(tmp_path, trial):
+def test_a_trial_whose_record_is_damaged_is_a_fault_that_names_it(tmp_path, trial):
     path = archived(tmp_path / "results", [(trial, marked(1.0))])
     assert replay(path).channels(trial) == {"gyro_rate"}
     with h5py.File(path, "r+") as file:
@@ -245,4 +245,6 @@ def test_a_trial_whose_record_is_damaged_is_not_served(tmp_path, trial):
             file[place][()] = file[place][()].replace(b"gyro_rate", b"gyro_rats")
     backend = replay(path)
     assert backend.channels(trial) is None
-    assert backend.refuses(trial) == "2026-11-21T09-36-50-axis has no recordings"
+    ending = served(backend, trial).ending
+    assert ending.fault is Fault.OTHER
+    assert "trial-00001" in ending.reason

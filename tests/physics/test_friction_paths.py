@@ -8,19 +8,17 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from pydantic import Field, ValidationError
 
 from campaign.physics.bench import Bench
-from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel, FrictionOptions
-from campaign.physics.friction.lugre import LuGreOptions
-from campaign.physics.friction.stribeck import StribeckOptions
 from campaign.physics.steady_friction import steady_friction
 from campaign.physics.variation import as_it_is, of_its_day
+from campaign.testing import known
 from campaign.units import RotationalDamping, Torque
 from tests.physics.benches import RATIO, Tree, bench, stribeck
 
@@ -66,19 +64,9 @@ GREASE = FrictionModel(
 )
 
 
-class GreasedBench(Bench):
-    """A bench of a program that has the model installed."""
-
-    friction: dict[
-        str,
-        Annotated[GreaseOptions | LuGreOptions | StribeckOptions, Field(discriminator="model")],
-    ]
-
-
 @pytest.fixture
-def greased(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def greased() -> Iterator[Any]:
     """Makes a bench with LuGre friction on the load and grease in the mesh."""
-    monkeypatch.setitem(friction_models(), "grease", GREASE)
 
     def make(**changes: Any) -> Bench:
         tree = bench().model_dump(mode="json")
@@ -88,9 +76,10 @@ def greased(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
         }
         tree["gear"]["preload"] = changes.pop("preload", None)
         tree["friction"]["load"] |= changes.pop("load", {})
-        return GreasedBench.model_validate({**tree, **changes}, context={"si": True})
+        return Bench.model_validate({**tree, **changes}, context={"si": True})
 
-    return make
+    with known(GREASE):
+        yield make
 
 
 def scattering(table: Tree, day: int = 1, seed: int = 5, **rest: Tree) -> Bench:
@@ -358,13 +347,12 @@ def test_what_a_made_up_model_does_not_declare_is_refused(
     assert message in str(caught.value)
 
 
-def test_a_model_may_declare_what_it_likes(greased: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    narrow = dataclasses.replace(GREASE, changeable=("order",))
-    monkeypatch.setitem(friction_models(), "grease", narrow)
-    on = greased(variation={"day": 1, "day_to_day": {"mesh.order": 0.1}})
-    assert of_its_day(on).friction["mesh"].order != 1.0
-    with pytest.raises(ValidationError, match="allowed are order"):
-        greased(variation={"day_to_day": {"mesh.yield_torque": 0.1}})
+def test_a_model_may_declare_what_it_likes(greased: Any) -> None:
+    with known(dataclasses.replace(GREASE, changeable=("order",))):
+        on = greased(variation={"day": 1, "day_to_day": {"mesh.order": 0.1}})
+        assert of_its_day(on).friction["mesh"].order != 1.0
+        with pytest.raises(ValidationError, match="allowed are order"):
+            greased(variation={"day_to_day": {"mesh.yield_torque": 0.1}})
 
 
 def test_a_preload_raises_a_torque_that_a_made_up_model_declares(greased: Any) -> None:

@@ -10,7 +10,9 @@ import numpy as np
 
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.journal import Decision, OperatorStep
+from campaign.errors import ArchiveError
 from campaign.report.besides import besides
+from campaign.report.build import render
 from campaign.report.drift import drift_table, drifts_of
 from campaign.report.low_margins import low_margin_table
 from campaign.report.page import Folder
@@ -33,6 +35,13 @@ def of(run: RunReader, number: int, role: Role, ending: Ending) -> ArchivedTrial
     task = type(task).model_validate({**task.model_dump(), "base_acceleration": {"shape": "zero"}})
     trial = like.trial.model_copy(update={"number": number, "role": role, "task": task})
     return InMemory(trial, ending, "", "", like.path, "")
+
+
+class Damaged(InMemory):
+    """A trial of which a sample fails its checksum."""
+
+    def recording(self) -> Recording:
+        raise ArchiveError(f"{self.path}: /{self.trial.name}/data/motor_current: is damaged")
 
 
 def test_a_plain_run_has_nothing_to_say(made_up: ModuleType, tmp_path: object) -> None:
@@ -60,13 +69,35 @@ def test_the_journal_and_the_faults(made_up: ModuleType, tmp_path: object) -> No
     assert "7" in folder.files["tables/besides-faults.csv"].splitlines()[1]
 
 
+def test_a_damaged_check_is_left_out_of_the_drift_and_told(
+    made_up: ModuleType, tmp_path: object
+) -> None:
+    run = made_up.made_up_run(tmp_path)
+    done = Ending(Outcome.COMPLETED)
+    roles = {1: Role.MEASUREMENT, 21: Role.CHECK, 42: Role.CHECK}
+    trials = [of(run, n, role, done) for n, role in roles.items()]
+    bad = trials[1]
+    trials[1] = Damaged(bad.trial, bad.ending, "", "", run.path, "")
+    run = replace(run, trials=tuple(trials))
+    (drift,), problems, damaged = drifts_of(run)
+    assert [trial.trial.number for trial in drift.trials] == [1, 42]
+    assert not problems
+    assert [damage.trial for damage in damaged] == ["trial-00021"]
+    found = besides(run, Folder())
+    assert found.damaged == tuple(damaged)
+    page, _, report = render(run, run.path, {}, made_up.TEMPLATES)  # no analysis reads it
+    assert report.damaged == tuple(damaged)
+    assert "(trial-00021)" in page
+
+
 def test_the_drift_of_the_checks(made_up: ModuleType, tmp_path: object) -> None:
     run = made_up.made_up_run(tmp_path)
     done = Ending(Outcome.COMPLETED)
     roles = {1: Role.MEASUREMENT, 21: Role.CHECK, 42: Role.CHECK}
     run = replace(run, trials=tuple(of(run, n, role, done) for n, role in roles.items()))
-    (drift,), problems = drifts_of(run)
+    (drift,), problems, damaged = drifts_of(run)
     assert not problems
+    assert not damaged
     rows = drift_table(drift).rows
     assert [row["trial"] for row in rows] == [1, 21, 42]
     assert math.isclose(float(rows[0]["rms"]), 1.01 / math.sqrt(2), rel_tol=1e-2)

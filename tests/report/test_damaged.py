@@ -45,5 +45,8 @@ def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
     (test,) = analyse_run(open_run(path), {"velocity_map": SimpleNamespace(analyse=analyse)})
     assert seen == [[1.0, 3.0]]
     assert [trial.trial.number for trial in test.trials] == [1, 3]
-    assert test.problem.startswith("trial-00002 is left out: ")
-    assert "does not match its checksum" in test.problem
+    (damage,) = test.damaged
+    assert (damage.trial, damage.channel) == ("trial-00002", "gyro_rate")
+    assert "does not match its checksum" in damage.reason
+    assert test.problem == ""
+    assert test.evidence().failed  # what it did not find is not merely "not run"

@@ -37,10 +37,10 @@ def run(
     for method, answer in WAYS[code].items():  # else it does what it does
         monkeypatch.setattr(SimBackend, method, lambda *arguments, _a=answer: _a)
 
-    def report_run(*arguments: object, **more: object) -> Path:
+    def report_run(*arguments: object, **more: object) -> tuple[Path, ExitCode]:
         if report_error is not None:
             raise report_error
-        return folder / "report.html"
+        return folder / "report.html", ExitCode.DONE
 
     monkeypatch.setattr("campaign.cli.report.report_run", report_run)
     request = Request(str(write(folder, SEA)))

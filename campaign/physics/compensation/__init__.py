@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import Annotated, Any
 
-from pydantic import Field
-
+from campaign.choice import Choice
 from campaign.physics.compensation.interface import CompensationMethod
-from campaign.plugins import discover
+from campaign.plugins import Kinds
 
 
 @cache
-def compensation_methods() -> dict[str, CompensationMethod]:
+def compensation_methods() -> Kinds[CompensationMethod]:
     """Every compensation method, by name."""
-    return discover(__name__, "COMPENSATION", "campaign.compensation")
+    return Kinds("compensation method", __name__, "COMPENSATION", CompensationMethod, tag="method")
 
 
-if TYPE_CHECKING:
-    CompensationField = Any
-else:
-    CompensationField = Annotated[
-        Union[tuple(method.options for method in compensation_methods().values())],  # noqa: UP007
-        Field(discriminator="method"),
-    ]
+CompensationField = Annotated[Any, Choice("method", compensation_methods)]
+"""The options of one compensation method, told by `method`."""

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import Annotated, Any
 
-from pydantic import Field
-
+from campaign.choice import Choice
 from campaign.physics.friction.interface import FrictionModel
-from campaign.plugins import discover
+from campaign.plugins import Kinds
 
 
 @cache
-def friction_models() -> dict[str, FrictionModel]:
+def friction_models() -> Kinds[FrictionModel]:
     """Every friction model, by name."""
-    return discover(__name__, "FRICTION", "campaign.friction")
+    return Kinds("friction model", __name__, "FRICTION", FrictionModel, tag="model")
 
 
-if TYPE_CHECKING:
-    FrictionField = Any
-else:
-    FrictionField = Annotated[
-        Union[tuple(model.options for model in friction_models().values())],  # noqa: UP007
-        Field(discriminator="model"),
-    ]
+FrictionField = Annotated[Any, Choice("model", friction_models)]
+"""The options of one friction model, told by `model`."""

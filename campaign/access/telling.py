@@ -1,0 +1,38 @@
+"""Damage as Python tells of it: a warning, or an error for whoever wants all or nothing."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from campaign.archive.damage import Damage
+from campaign.archive.damage_words import in_one_line
+from campaign.errors import ArchiveError, ArchiveWarning
+
+_PACKAGE = str(Path(__file__).parents[1]) + os.sep
+
+
+def tell(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
+    """Warn of what is damaged of the run at `path`. Raises ArchiveError instead when `strict`."""
+    if not damaged:
+        return
+    text = in_one_line(path, damaged)
+    if strict:
+        raise ArchiveError(text)
+    warnings.warn(text, ArchiveWarning, stacklevel=_of_the_caller())
+
+
+def _of_the_caller() -> int:
+    """The `stacklevel`, seen from `tell`, of the first line that is not the program's own."""
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and _is_ours(frame.f_code.co_filename):
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def _is_ours(file: str) -> bool:
+    return file.startswith(_PACKAGE) or file == functools.__file__  # of a cached property

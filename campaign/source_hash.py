@@ -1,0 +1,96 @@
+"""One hash of all the source files that a package's code comes from.
+
+An archive keeps it beside a plug-in's version, and machine code is kept under it: a version says
+what somebody meant to release, the hash what was there.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+_SOURCES = (".py", *EXTENSION_SUFFIXES)
+_INSTALLED = {"site-packages", "dist-packages"}
+_PROGRAM = __name__.partition(".")[0]
+
+
+def sources_of(packages: Iterable[str]) -> dict[str, Path]:
+    """Python files and extension modules of top-level `packages`, and of what these import.
+
+    Imports are followed into folders on the path and editable installs, which change from one
+    edit to the next; not into this program, the standard library, or libraries that were installed
+    once and for all. Nothing is imported. The keys are relative to the folder that is on the path;
+    a package that is not found has no files.
+    """
+    chosen = tuple(packages)
+    waiting = list(chosen)
+    found: dict[str, Path] = {}
+    done: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name in done:
+            continue
+        done.add(name)
+        places = _places(name)
+        if name not in chosen and any(_INSTALLED.intersection(place.parts) for place in places):
+            continue
+        files = {key: path for place in places for key, path in _files(name, place)}
+        found |= files
+        if name != _PROGRAM:
+            waiting += (each for path in files.values() for each in _imported(path))
+    return dict(sorted(found.items()))
+
+
+def digest(sources: Mapping[str, Path]) -> str:
+    """SHA-256 of names and contents, hexadecimal. Raises OSError."""
+    whole = hashlib.sha256()
+    for name, path in sorted(sources.items()):
+        content = path.read_bytes()
+        whole.update(f"{name}\0{len(content)}\0".encode())
+        whole.update(content)
+    return whole.hexdigest()
+
+
+def _places(name: str) -> tuple[Path, ...]:
+    """The folders of a top-level package, or the file of a module; none where there are none."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError):  # ValueError: __main__
+        return ()
+    if spec is None:
+        return ()
+    if spec.submodule_search_locations is not None:
+        return tuple(map(Path, spec.submodule_search_locations))
+    return (Path(spec.origin),) if spec.origin is not None else ()
+
+
+def _files(name: str, place: Path) -> Iterator[tuple[str, Path]]:
+    """The source files at one of a package's places."""
+    if place.is_file():
+        yield place.name, place
+    for path in place.rglob("*"):
+        if path.name.endswith(_SOURCES) and path.is_file():
+            yield f"{name}/{path.relative_to(place).as_posix()}", path
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """Top-level names that a file imports and that are neither Python's nor this program's."""
+    try:
+        tree = ast.parse(path.read_bytes()) if path.suffix == ".py" else ast.Module([], [])
+    except (OSError, SyntaxError, ValueError, RecursionError):
+        return  # a file that nobody can import
+    for node in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names = [node.module]
+        for name in names:
+            top = name.partition(".")[0]
+            if top != _PROGRAM and top not in sys.stdlib_module_names:
+                yield top

@@ -1,0 +1,43 @@
+"""Kinds that a test has at hand and nobody has installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from campaign.backends import backends
+from campaign.backends.interface import BackendKind
+from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment
+from campaign.export import exports
+from campaign.export.interface import ExportKind
+from campaign.physics.compensation import compensation_methods
+from campaign.physics.compensation.interface import CompensationMethod
+from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionModel
+
+AnyKind = Experiment | FrictionModel | CompensationMethod | BackendKind | ExportKind
+
+
+@contextmanager
+def known(*kinds: AnyKind) -> Iterator[None]:
+    """Within the block, protocols and benches can name `kinds`, as if they were installed."""
+    with ExitStack() as stack:
+        for kind in kinds:
+            stack.enter_context(_room(kind).including(kind))
+        yield
+
+
+def _room(kind: AnyKind) -> Any:
+    match kind:
+        case Experiment():
+            return experiments()
+        case FrictionModel():
+            return friction_models()
+        case CompensationMethod():
+            return compensation_methods()
+        case BackendKind():
+            return backends()
+        case ExportKind():
+            return exports()

@@ -1,0 +1,315 @@
+"""Kinds of installed packages: by name, one at a time, and each broken one by itself."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import pkgutil
+import re
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+from pydantic import Field, TypeAdapter, ValidationError
+
+from campaign.backends import backends
+from campaign.experiments import experiments
+from campaign.export import exports
+from campaign.physics.compensation import compensation_methods
+from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.friction.lugre import LuGreOptions
+from campaign.physics.friction.stribeck import StribeckOptions
+from campaign.plugins import Kinds
+from tests.packages import FILM, GREASE, ROOT, Packages
+from tests.physics.benches import bench
+
+ROOMS = {
+    "campaign.experiments": (experiments, "EXPERIMENT"),
+    "campaign.backends": (backends, "BACKEND"),
+    "campaign.export": (exports, "EXPORT"),
+    "campaign.physics.friction": (friction_models, "FRICTION"),
+    "campaign.physics.compensation": (compensation_methods, "COMPENSATION"),
+}
+
+
+@pytest.fixture
+def packages(tmp_path: Path) -> Packages:
+    (tmp_path / "packages").mkdir()
+    return Packages(tmp_path / "packages")
+
+
+def said(packages: Packages, code: str) -> Any:
+    """What `code` prints as JSON."""
+    done = packages.python(code)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_the_names_read_from_sources_are_those_that_the_modules_have(package: str) -> None:
+    registry, attribute = ROOMS[package]
+    names = []
+    for each in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        module = importlib.import_module(f"{package}.{each.name}")
+        if hasattr(module, attribute):
+            names.append(getattr(module, attribute).name)
+    kinds: Kinds[Any] = registry()
+    assert list(kinds) == sorted(names)
+    assert [kind.name for kind in kinds.values()] == list(kinds)
+    assert not list(kinds.plug_ins)
+
+
+def test_names_import_no_kind_and_a_kind_imports_no_other(packages: Packages) -> None:
+    packages.grease()
+    code = """
+import json, sys
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+def kinds():
+    return [m for m in ("campaign.physics.friction.lugre", "campaign.physics.friction.stribeck",
+                        "grease_film") if m in sys.modules]
+names = list(friction_models())
+there = "grease" in friction_models()
+before = kinds()
+model = friction_models()["grease"]
+print(json.dumps([names, there, before, model.summary, kinds()]))
+"""
+    names, there, before, summary, after = said(packages, code)
+    assert names == ["grease", "lugre", "stribeck"]
+    assert there
+    assert before == []
+    assert summary == "a film with a yield torque"
+    assert after == ["grease_film"]
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "import grease_film.model",
+        "import campaign.physics.friction.interface",
+        "import campaign.physics.friction",
+        "import campaign.physics.compiled",
+        "import campaign.physics.bench",
+        "import campaign.physics.compensation.friction_model",
+        "import campaign.experiments",
+    ],
+)
+def test_a_plug_in_can_be_imported_by_its_own_tests(packages: Packages, first: str) -> None:
+    packages.grease()
+    code = f"""
+{first}
+import json
+from grease_film.model import FRICTION
+from campaign.physics.friction import friction_models
+print(json.dumps(friction_models()["grease"] is FRICTION))
+"""
+    assert said(packages, code) is True
+
+
+BROKEN = {
+    "raise ImportError('no such drive')": "ImportError: no such drive",
+    "import nowhere_to_be_found": "No module named 'nowhere_to_be_found'",
+    "def (": "SyntaxError",
+    "import sys; sys.exit(3)": "SystemExit: 3",
+    "class Odd(BaseException): pass\nraise Odd('unheard of')": "Odd: unheard of",
+    "1 / 0": "ZeroDivisionError: division by zero",
+    "": "has no attribute 'FRICTION'",
+    "FRICTION = 7": "it is 'int', no FrictionModel of this program",
+    GREASE.replace("grease_film.film", "film").replace('name="grease"', 'name="oil"'): (
+        "it calls itself 'oil'; both names must be the same"
+    ),
+    GREASE.replace("grease_film.film", "film").replace("=GreaseOptions", "=dict"): (
+        "its options are no subclass"
+    ),
+    GREASE.replace("grease_film.film", "film").replace('Literal["grease"]', "str"): (
+        "its options lack the field `model: Literal['grease']`"
+    ),
+}
+
+
+@pytest.mark.parametrize("source", BROKEN)
+def test_a_broken_one_is_named_with_its_package_and_harms_no_other(
+    packages: Packages, source: str
+) -> None:
+    files = {"sticky.py": source, "film.py": FILM}
+    packages.install("sticky_pack", files, {"campaign.friction/grease": "sticky:FRICTION"}, "2.1")
+    code = """
+import json
+from campaign.errors import UsageError
+from campaign.physics.friction import friction_models
+models = friction_models()
+messages = []
+for attempt in range(2):
+    try:
+        models["grease"]
+    except UsageError as error:
+        messages.append(str(error))
+print(json.dumps([list(models), models["lugre"].name, messages]))
+"""
+    names, works, [message, again] = said(packages, code)
+    assert names == ["grease", "lugre", "stribeck"]
+    assert works == "lugre"
+    assert message.startswith(
+        "the friction model 'grease' of the package sticky_pack 2.1 (entry point sticky:FRICTION) "
+        "cannot be used: "
+    )
+    assert BROKEN[source] in message
+    assert "\n" not in message
+    assert again == message
+
+
+def test_a_name_of_the_program_stays_the_program_s(packages: Packages) -> None:
+    packages.install("rival", {"rival.py": "1 / 0"}, {"campaign.friction/lugre": "rival:FRICTION"})
+    code = """
+import json
+from campaign.physics.friction import friction_models
+described = [(n, k if isinstance(k, str) else k.name) for n, k in friction_models().described()]
+print(json.dumps([friction_models()["lugre"].step.__module__, described]))
+"""
+    module, described = said(packages, code)
+    assert module == "campaign.physics.friction.lugre"
+    assert described[0] == ["lugre", "lugre"]
+    assert described[1][0] == "lugre"
+    assert "rival 1.0" in described[1][1]
+    assert "the program has one of that name" in described[1][1]
+    assert described[2:] == [["stribeck", "stribeck"]]
+
+
+def test_a_name_that_two_packages_claim_is_nobody_s(packages: Packages) -> None:
+    packages.grease()
+    packages.install("other", {"other.py": ""}, {"campaign.friction/grease": "other:FRICTION"})
+    code = """
+import json
+from campaign.errors import UsageError
+from campaign.physics.friction import friction_models
+try:
+    friction_models()["grease"]
+except UsageError as error:
+    print(json.dumps([str(error), list(friction_models())]))
+"""
+    message, names = said(packages, code)
+    assert "grease_film 1.0" in message
+    assert "other 1.0" in message
+    assert "remove all but one" in message
+    assert names == ["grease", "lugre", "stribeck"]
+
+
+def test_a_package_that_cannot_be_read_costs_only_its_own(packages: Packages) -> None:
+    packages.grease()
+    packages.declare("mangled", "[campaign.friction]\nmud = mud:FRICTION\n")
+    (packages.folder / "mangled-1.0.dist-info" / "METADATA").unlink()
+    packages.install("lost", {}, {"campaign.frictions/slime": "lost:FRICTION"})
+    code = """
+import json
+from campaign.physics.friction import friction_models
+from campaign.plugins import stray_entries
+print(json.dumps([list(friction_models()), sorted(stray_entries())]))
+"""
+    names, strays = said(packages, code)
+    assert names == ["grease", "lugre", "stribeck"]
+    assert len(strays) == 2
+    assert any("lost 1.0" in stray and "no group 'campaign.frictions'" in stray for stray in strays)
+    assert any("with mud:FRICTION" in stray and "cannot be read" in stray for stray in strays)
+
+
+def test_the_first_of_a_name_on_the_path_is_the_one_that_counts(
+    packages: Packages, tmp_path: Path
+) -> None:
+    packages.grease("2.0")
+    behind = Packages(tmp_path / "behind")
+    behind.grease("1.0")
+    behind.declare("grease_film", "[campaign.friction]\nslime = grease_film.model:FRICTION\n")
+    code = f"""
+import json, sys
+sys.path.append({str(behind.folder)!r})
+from campaign.physics.friction import friction_models
+print(json.dumps([list(friction_models()), friction_models().plug_in("grease").version]))
+"""
+    assert said(packages, code) == [["grease", "lugre", "stribeck"], "2.0"]
+
+
+PAGE = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def page(packages: Packages) -> Packages:
+    """The package of docs/plug-ins.md."""
+    found = re.findall(r"^```\w+ ([\w./]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    files = dict(found)
+    assert set(files) == {"pyproject.toml", "grease_film/model.py", "tests/test_model.py"}
+    project = tomllib.loads(files["pyproject.toml"])["project"]
+    points = {
+        f"{group}/{name}": value
+        for group, entries in project["entry-points"].items()
+        for name, value in entries.items()
+    }
+    files["grease_film/__init__.py"] = ""
+    packages.install(project["name"], files, points, project["version"])
+    return packages
+
+
+def test_the_page_s_own_test_passes(page: Packages) -> None:
+    shutil.rmtree(page.folder / "grease-film-1.0.dist-info")
+    code = """
+import sys, pytest
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_model.py"]))
+"""
+    done = page.python(code)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+
+
+def test_the_page_s_model_can_be_named_by_a_bench_and_compiles(page: Packages) -> None:
+    code = """
+import ctypes, json
+from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.step_function import address_of
+from pydantic import TypeAdapter
+tree = {"model": "grease", "yield_torque": "8 N m", "shear_rate": "0.1 rad/s"}
+options = TypeAdapter(FrictionField).validate_python(tree)
+model = friction_models()["grease"]
+doubles, double = ctypes.POINTER(ctypes.c_double), ctypes.c_double
+step = ctypes.CFUNCTYPE(None, doubles, doubles, double, double, double, double, doubles)
+line, none = (double * 2)(), (double * 1)()
+parameters = (double * 2)(*model.parameters(options))
+step(address_of(model.step))(parameters, none, 0.1, 0.1, 1e-3, 0.0, line)
+print(json.dumps([options.model_dump(mode="json")["model"], line[0], line[1]]))
+"""
+    name, torque, change = said(page, code)
+    assert name == "grease"
+    # (e - 1/e) / (e + 1/e), with e = exp(1)
+    assert torque == pytest.approx(8 * (math.e**2 - 1) / (math.e**2 + 1))
+    assert change == 0.0
+
+
+def test_a_choice_reports_as_a_union_of_tables_does() -> None:
+    """pydantic's own discriminated union, built of the same classes, is what it is held against."""
+    union = Annotated[LuGreOptions | StribeckOptions, Field(discriminator="model")]
+    ours, theirs = TypeAdapter(FrictionField), TypeAdapter(union)
+    good = bench().friction["load"]
+    for value in [
+        {"model": "lugri"},
+        {"model": 3},
+        {"model": "lugre"},
+        {"model": "stribeck", "coulomb_torque": "2 A", "odd": 1},
+        {"coulomb_torque": 1},
+        {},
+        7,
+        None,
+        [good],
+    ]:
+        assert errors(ours, value) == errors(theirs, value)
+    assert ours.validate_python(good) is theirs.validate_python(good) is good
+    tree = good.model_dump(mode="json")
+    assert ours.validate_python(tree, context={"si": True}) == good
+    assert ours.dump_python(good, mode="json") == tree
+    assert ours.dump_json(good) == theirs.dump_json(good)
+
+
+def errors(adapter: TypeAdapter[Any], value: Any) -> list[tuple[Any, ...]]:
+    with pytest.raises(ValidationError) as caught:
+        adapter.validate_python(value)
+    return [(e["type"], e["loc"], e["msg"]) for e in caught.value.errors()]
