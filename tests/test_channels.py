@@ -106,13 +106,12 @@ def test_only_a_channel_with_a_rate_of_its_own_says_so_in_an_archive(tmp_path: P
     trial = plan_of(tmp_path).trials[0]
     path = archived(tmp_path / "results", [(trial, recording())])
     with h5py.File(path) as file:
-        text = file["trial_00001/record/channels"].asstr()[()]
-    assert text == (
-        '[{"display_unit":"deg/s","label":"Rate of the load (gyro)","measured":true,'
-        '"name":"gyro_rate","unit":"rad/s"},'
-        '{"display_unit":"degC","label":"Temperature","measured":true,"name":"temperature",'
-        '"own_rate":10.0,"unit":"degC"}]'
-    )
+        record = json.loads(file["trial_00001/record/json"][()])
+    fast, slow = record["channels"]
+    about = {"display_unit": "deg/s", "label": "Rate of the load (gyro)", "unit": "rad/s"}
+    assert fast == about | {"name": "gyro_rate", "sha256": fast["sha256"]}
+    about = {"display_unit": "degC", "label": "Temperature", "unit": "degC", "own_rate": 10.0}
+    assert slow == about | {"name": "temperature", "sha256": slow["sha256"]}
     assert verify_run(path).sound
     (item,) = open_run(path).trials
     assert item.channels() == (FAST, SLOW)

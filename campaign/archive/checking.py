@@ -52,6 +52,8 @@ _REQUIRED = frozenset(
 ) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
 _OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}
 _MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
+_PLOT = frozenset(("axes", "time_indices"))
+"""Attributes by which viewers plot a group, besides its signal."""
 
 
 def verify(path: Path, progress: Progress) -> Verification:
@@ -142,6 +144,7 @@ class _Check:
         if texts.seal is None:
             return  # which was found when the run was opened
         bound = texts.seal.texts.keys()
+        self.datasets += 1
         for place in sorted(_REQUIRED - bound):
             self.problems.add(f"/run/{place}", "is missing from the seal")
         for place in bound:
@@ -198,6 +201,7 @@ class _Check:
         with self.problems.noting(), guarded.guarded(self.path, f"/{name}"):
             group = guarded.group_at(file, name, "NXentry")
             record, trees = read_entry(self.path, file, name, finished.record)
+            self.datasets += 1
             self._record(f"/{name}", entry, record, trees)
             self._says(group, record)
             self._members(group, f"/{name}", record)
@@ -294,6 +298,10 @@ class _Check:
                         self._one_series(data, f"{place}/{inner}", name, length, digest, record)
                 for name in sorted(set(guarded.names(data)) - told.keys() - {"title"}):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
+                with self.problems.noting():
+                    guarded.text_at(data, "title", text_digest(hdf5.storable(record.label)))
+                for name in sorted(_PLOT - set(data.attrs)):
+                    self.problems.add(f"{place}/{inner}@{name}", "is missing")
                 if guarded.attribute(data, "signal") not in told:
                     self.problems.add(f"{place}/{inner}@signal", "names no channel that is there")
 

@@ -83,7 +83,7 @@ def check_trials(
             found.add(trial.place, "is there, and no line of the journal says that it finished")
             continue
         for what in ("outcome", "reason", "safe_state"):
-            mine, theirs = getattr(trial, what), str(getattr(finished, what))
+            mine, theirs = str(getattr(trial, what)), str(getattr(finished, what))
             if mine != theirs:
                 found.add(trial.place, f"has {what} {mine!r}, and the journal says {theirs!r}")
 

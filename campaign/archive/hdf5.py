@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -347,9 +346,10 @@ def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
     inflating = isal_zlib.decompressobj()
     try:
         raw = inflating.decompress(packed, size)
-    except zlib.error:  # isal's own is this one
+        more = b"" if inflating.eof else inflating.decompress(b"", 1)
+    except isal_zlib.error:  # type: ignore[misc] # its types call the class an instance
         return None
-    if len(raw) != size or (not inflating.eof and inflating.decompress(b"", 1)):
+    if len(raw) != size or more or not inflating.eof or inflating.unused_data:
         return None
     if not shuffled:
         return np.frombuffer(raw, dtype=SAMPLE)

@@ -162,7 +162,7 @@ class _Trials:
     def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
         trees: Trees = self.trees
         if (line := self.lines.get(told.record)) is not None:
-            record = parse_record(self.path, "/run/index", line)
+            record = parse_record(self.path, f"/{entry}", line)
         if line is None or not record.tree_names <= trees.keys():
             record, trees = read_entry(self.path, self.file, entry, told.record)
         if (record.number, record.attempt) != (told.trial, told.attempt):

@@ -14,6 +14,7 @@ from collections import Counter
 from pathlib import Path
 
 from campaign.archive import list_runs, open_run
+from campaign.archive.sound_samples import whole_recording
 from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError
 
@@ -47,7 +48,7 @@ def read(path: Path) -> tuple[dict, int]:
     recordings, damaged = {}, len(run.damaged)
     for archived in run.trials:
         try:
-            recording = archived.recording()
+            recording = whole_recording(archived)
         except ArchiveError:
             damaged += 1
             continue

@@ -179,7 +179,10 @@ def test_a_results_folder_under_a_file_is_bad_usage(tmp_path, kit):
 
 
 def test_no_run_is_written_over_another(tmp_path, kit):
-    RunWriter.create(tmp_path, kit.header(), [])
+    writer = RunWriter.create(tmp_path, kit.header(), [])
+    with pytest.raises(UsageError, match="another process is writing the run"):
+        RunWriter.create(tmp_path, kit.header(), [])
+    writer.close()
     with pytest.raises(UsageError, match="already"):
         RunWriter.create(tmp_path, kit.header(), [])
     kit.run(tmp_path, name="another")

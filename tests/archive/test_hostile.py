@@ -1,6 +1,5 @@
 """A file that nobody vouches for is read right or refused with a message: never anything else."""
 
-import hashlib
 import json
 import random
 import re
@@ -10,12 +9,26 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunWriter, list_runs, open_run
+from campaign.archive.sound_samples import whole_recording
+from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError, ExitCode
+from tests.archive.forging import (
+    canonical,
+    change_record,
+    put_integer,
+    put_record,
+    put_samples,
+    put_text,
+    reseal,
+    sha256,
+    text_of,
+)
 
 
 def read_all(path):
     """Everything a report would read, by trial."""
-    return {archived.trial.number: archived.recording() for archived in open_run(path).trials}
+    trials = open_run(path).trials
+    return {archived.trial.number: whole_recording(archived) for archived in trials}
 
 
 def refused(path, match):
@@ -33,8 +46,14 @@ def listed(path, match):
     assert any(re.search(match, line) for line in told), told
     assert all("\n" not in line and str(path) not in line for line in told)
     for archived in run.trials:
-        archived.recording()
+        whole_recording(archived)
     return run
+
+
+def placed(path, match):
+    """Verifying tells of it in a line that begins with its place."""
+    told = [str(damage) for damage in verify_run(path).problems]
+    assert any(re.match(match, line) for line in told), told
 
 
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"\x89HDF\r\n\x1a\n" + b"\xff" * 500])
@@ -64,22 +83,8 @@ def test_a_truncated_file_is_refused(sealed, share):
 
 def test_a_newer_format_is_named(sealed):
     with h5py.File(sealed, "r+") as file:
-        replace_integer(file["run/provenance"], "format", 99)
+        put_integer(file, "run/provenance/format", 99)
     refused(sealed, "has format 99")
-
-
-def put_text(file, place, text):
-    """Put another text where one is, with a checksum that holds."""
-    del file[place]
-    kind = h5py.string_dtype("utf-8", max(1, len(text)))
-    file.create_dataset(place, data=np.array(text.encode(), dtype=kind))
-    file[place].attrs["sha256"] = hashlib.sha256(text.encode()).hexdigest()
-
-
-def replace_integer(group, name, value):
-    del group[name]
-    group[name] = np.array(value, "<i8")
-    group[name].attrs["sha256"] = hashlib.sha256(np.array(value, "<i8").tobytes()).hexdigest()
 
 
 def replace_samples(file, **options):
@@ -93,58 +98,104 @@ def replace_samples(file, **options):
 
 def test_an_absurd_size_is_refused_before_memory_is_asked_for(sealed):
     with h5py.File(sealed, "r+") as file:
-        replace_samples(file, shape=(2**50,), chunks=(1000,), dtype="<f8")
-    refused(sealed, "states 1125899906842624 samples but stores 0 bytes")
+        absurd = {"shape": (2**50,), "chunks": (1000,), "compression": "gzip", "dtype": "<f8"}
+        replace_samples(file, **absurd)
+    refused(sealed, "has 1125899906842624 samples, and 50 were recorded")
+    with h5py.File(sealed, "r+") as file:
+        change_record(file, "trial_00001", lambda record: record.update(samples=2**50))
+    refused(sealed, "has 50 samples, and 1125899906842624 were recorded")
+
+
+def test_an_absurd_size_that_the_record_confirms_is_refused(sealed):
+    """Time and record agree with it, and nothing of it is stored."""
+    with h5py.File(sealed, "r+") as file:
+        data = file["trial_00001/data"]
+        del data["time"]
+        data.create_dataset("time", (2**50,), "<f8", chunks=(1000,), compression="gzip")
+        change_record(file, "trial_00001", lambda record: record.update(samples=2**50))
+    refused(sealed, "/trial_00001.*: cannot be read")
+
+
+def test_a_chunk_that_would_take_all_memory_is_refused(sealed):
+    with h5py.File(sealed, "r+") as file:
+        huge = {"maxshape": (None,), "chunks": (1 << 28,), "compression": "gzip", "dtype": "<f8"}
+        replace_samples(file, shape=(50,), **huge)
+    refused(sealed, "has chunks of 268435456 samples")
+
+
+PACKED = {"compression": "gzip", "chunks": (50,)}
 
 
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"data": np.zeros(50, "<f4"), "chunks": (50,)}, "not a chunked series of float64"),
-        ({"data": np.zeros((50, 2)), "chunks": (50, 2)}, "not a chunked series of float64"),
-        ({"data": [b"x"] * 50, "dtype": h5py.string_dtype()}, "not a chunked series"),
-        ({"data": np.zeros(49), "chunks": (49,)}, "has 49 samples, and time has 50"),
-        ({"data": np.zeros(50), "chunks": (50,)}, "does not match its checksum"),
+        ({"data": np.zeros(50, "<f4"), **PACKED}, "not a chunked series of float64"),
+        ({"data": np.zeros(50, ">f8"), **PACKED}, "not a chunked series of float64"),
+        ({"data": np.zeros(50, "<i8"), **PACKED}, "not a chunked series of float64"),
+        ({"data": np.zeros((50, 2)), **PACKED, "chunks": (50, 2)}, "not a chunked series"),
+        ({"data": [b"x"] * 50, "dtype": h5py.string_dtype(), **PACKED}, "not a chunked series"),
+        ({"data": np.zeros(50)}, "not a chunked series"),
+        ({"data": np.zeros(49), **PACKED, "chunks": (49,)}, "has 49 samples, and 50 were recorded"),
+        ({"data": np.zeros(50), **PACKED}, "does not match its checksum"),
+        ({"data": np.zeros(50), "chunks": (50,)}, "a filter other than"),
         ({"data": np.zeros(50), "chunks": (50,), "compression": "lzf"}, "a filter other than"),
+        ({"data": np.zeros(50), **PACKED, "fletcher32": True}, "a filter other than"),
     ],
 )
 def test_samples_of_another_kind_are_refused(sealed, options, match):
     with h5py.File(sealed, "r+") as file:
         replace_samples(file, **options)
-    refused(sealed, match)
+    refused(sealed, f"/trial_00001/data/gyro_rate: .*{match}")
+
+
+def test_samples_that_another_program_packed_are_read(sealed):
+    """What counts are the samples, not the bytes: the digest is of numbers."""
+    with h5py.File(sealed, "r+") as file:
+        samples = file["trial_00001/data/gyro_rate"][:]
+        put_samples(file, "trial_00001/data/gyro_rate", samples, compression_opts=9, chunks=(7,))
+    found = read_all(sealed)[1]["gyro_rate"]
+    assert found.tobytes() == samples.tobytes()
+    assert not [damage for damage in verify_run(sealed).problems if damage.trial]
 
 
 def test_no_object_is_ever_read(sealed):
     with h5py.File(sealed, "r+") as file:
-        del file["trial_00001/record/reason"]
-        file["trial_00001/record"].create_dataset(
-            "reason", data=b"cos\nsystem\n", dtype=h5py.string_dtype()
-        )
-    run = listed(sealed, "^/trial_00001/record/reason: is not a text of fixed length")
-    assert [trial.trial.number for trial in run.trials] == [2]
+        for place in ("run/plan/data", "trial_00001/record/json"):
+            del file[place]
+            file.create_dataset(place, data=b"cos\nsystem\n", dtype=h5py.string_dtype())
+    run = listed(sealed, "^/run/plan/data: is not a text of fixed length")
+    assert [trial.trial.number for trial in run.trials] == [1, 2]
+    placed(sealed, "/trial_00001/record/json: is not a text of fixed length")
 
 
-def test_links_are_not_followed(sealed, tmp_path):
+@pytest.mark.parametrize("kind", ["external", "soft"])
+def test_links_are_not_followed(sealed, tmp_path, kind):
     other = tmp_path / "other.h5"
     with h5py.File(sealed) as file, h5py.File(other, "w") as target:
         file.copy("trial_00001", target, "trial_00001")
+        file.copy("trial_00001", target, "trial_00002")
+    with h5py.File(sealed, "r+") as file:
+        file.move("trial_00001", "aside")
+        link = h5py.ExternalLink(str(other), "/trial_00001")
+        file["trial_00001"] = link if kind == "external" else h5py.SoftLink("/aside")
+    refused(sealed, "/trial_00001: is a link, and links are not followed")
+    placed(sealed, "/trial_00001: is a link")
+    assert len(whole_recording(open_run(sealed).trials[1]).time) == 120
     with h5py.File(sealed, "r+") as file:
         del file["trial_00001"]
-        file["trial_00001"] = h5py.ExternalLink(str(other), "/trial_00001")
-    assert len(listed(sealed, "^/trial_00001: is a link").trials) == 1
-    with h5py.File(sealed, "r+") as file:
-        del file["trial_00001"]
-        file["trial_00001"] = h5py.SoftLink("/trial_00002")
-    assert len(listed(sealed, "^/trial_00001: is a link").trials) == 1
+        file.move("aside", "trial_00001")
+        file.move("trial_00001/data/command", "aside")
+        link = h5py.ExternalLink(str(other), "/trial_00001/data/command")
+        file["trial_00001/data/command"] = link if kind == "external" else h5py.SoftLink("/aside")
+    refused(sealed, "/trial_00001/data/command: is a link, and links are not followed")
 
 
-@pytest.mark.parametrize("name", ["/trial_00001/data/command", "aside/command", ".", "", "x"])
+@pytest.mark.parametrize("name", ["/trial_00001/data/command", "aside/command", ".", "..", "", "x"])
 def test_a_channel_is_not_looked_for_along_a_path(sealed, name):
     with h5py.File(sealed, "r+") as file:
         file["trial_00001/data/aside"] = h5py.SoftLink("/trial_00002/data")
-        channel = {"name": name, "unit": "", "label": "", "display_unit": "", "measured": True}
-        put_text(file, "trial_00001/record/channels", json.dumps([channel]))
-    refused(sealed, "is a path, not a name|is missing")
+        change_record(file, "trial_00001", lambda record: record["channels"][0].update(name=name))
+    refused(sealed, "/trial_00001.*: (is missing|cannot be read)")
 
 
 def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
@@ -152,67 +203,99 @@ def test_samples_in_another_file_are_not_opened(sealed, tmp_path):
     outside.write_bytes(bytes(400))
     with h5py.File(sealed, "r+") as file:
         replace_samples(file, shape=(50,), dtype="<f8", external=[(str(outside), 0, 400)])
-    refused(sealed, "lies in another file")
+    refused(sealed, "/gyro_rate: is not a chunked series")
     layout = h5py.VirtualLayout(shape=(50,), dtype="<f8")
     layout[:] = h5py.VirtualSource(str(outside), "x", shape=(50,))
     with h5py.File(sealed, "r+") as file:
         del file["trial_00001/data/gyro_rate"]
         file["trial_00001/data"].create_virtual_dataset("gyro_rate", layout)
-    refused(sealed, "lies in another file")
+    refused(sealed, "/gyro_rate: is not a chunked series")
 
 
 NONSENSE = ["", "nonsense", "[" * 20_000, '{"a":1}', "NaN"]
 
 
-@pytest.mark.parametrize(
-    "place",
-    [
-        "run/provenance/created",
-        "run/outcome/status",
-        "trial_00001/record/events",
-        "trial_00001/record/channels",
-    ],
-)
+@pytest.mark.parametrize("place", ["provenance/created", "outcome/status", "outcome/safe_state"])
 @pytest.mark.parametrize("text", NONSENSE)
-def test_text_that_is_not_what_belongs_there_is_refused(sealed, place, text):
+@pytest.mark.parametrize("anew", [False, True])
+def test_text_that_is_not_what_belongs_there_is_refused(sealed, place, text, anew):
+    """Also where the seal says that it belongs there."""
     with h5py.File(sealed, "r+") as file:
-        put_text(file, place, text)
-    refused(sealed, "record|provenance|/run|trial_00001")
+        put_text(file, f"run/{place}", text)
+        if anew:
+            reseal(file)
+    refused(sealed, "/run" if anew else f"/run/{place}: does not match its checksum")
 
 
 @pytest.mark.parametrize("place", ["provenance/tests", "plan/data", "journal/data"])
 @pytest.mark.parametrize("text", NONSENSE)
-def test_a_text_of_the_run_that_is_damaged_costs_only_itself(sealed, place, text):
+@pytest.mark.parametrize("anew", [False, True])
+def test_a_text_of_the_run_that_is_damaged_costs_only_itself(sealed, place, text, anew):
     with h5py.File(sealed, "r+") as file:
         put_text(file, f"run/{place}", text)
+        if anew:
+            reseal(file)
     run = open_run(sealed)
-    if text or place != "plan/data":
+    if text or not anew or place != "plan/data":  # an empty plan is one, of no trials
         run = listed(sealed, f"^/run/{place.removesuffix('/data')}|plan, line 1")
     assert (run.tests == ()) is (place == "provenance/tests")
     assert (run.plan == ()) is (place == "plan/data")
-    assert len(run.trials) == 2
+    assert [trial.trial.number for trial in run.trials] == [1, 2]
 
 
-@pytest.mark.parametrize("place", ["trial", "outcome", "safe_state"])
-@pytest.mark.parametrize("text", NONSENSE)
-def test_a_trial_whose_record_is_damaged_costs_only_itself(sealed, place, text):
+@pytest.mark.parametrize("place", ["trial", "outcome", "safe_state", "channels", "events"])
+@pytest.mark.parametrize("value", ["", "nonsense", [[[1]]], {"a": 1}, 1.5, None])
+def test_a_record_that_makes_no_sense_costs_only_its_trial(sealed, place, value):
     with h5py.File(sealed, "r+") as file:
-        put_text(file, f"trial_00001/record/{place}", text)
-    run = listed(sealed, "^/trial_00001")
+        change_record(file, "trial_00001", lambda record: record.update({place: value}))
+    run = listed(sealed, "^/trial_00001: ")
     assert [trial.trial.number for trial in run.trials] == [2]
     assert {damage.trial for damage in run.damaged} == {"trial-00001"}
 
 
-def test_a_text_without_its_checksum_is_not_believed(sealed):
+@pytest.mark.parametrize("text", NONSENSE)
+def test_a_record_that_is_none_costs_only_its_trial(sealed, text):
+    with h5py.File(sealed, "r+") as file:
+        put_record(file, "trial_00001", text)
+        reseal(file)
+    run = listed(sealed, "^/trial_00001")
+    assert [trial.trial.number for trial in run.trials] == [2]
+
+
+def test_a_text_is_held_against_the_seal_whatever_its_own_checksum_says(sealed):
     with h5py.File(sealed, "r+") as file:
         for place in ("run/provenance/notes", "run/source_001/data"):
             del file[place].attrs["sha256"]
         put_text(file, "run/provenance/operator", "Eve")
-        file["run/provenance/operator"].attrs["sha256"] = "0" * 64
     run = listed(sealed, "^/run/provenance/operator: does not match its checksum")
-    assert len(run.damaged) == 3
+    assert len(run.damaged) == 1
+    assert run.header.operator == ""
+    assert len(run.header.sources) == 2
+
+
+def test_without_the_seal_a_text_needs_its_own_checksum(sealed):
+    with h5py.File(sealed, "r+") as file:
+        for place in ("run/provenance/notes", "run/source_001/data"):
+            del file[place].attrs["sha256"]
+        del file["run/outcome/seal"]
+        put_text(file, "run/provenance/operator", "Eve", honest=True)
+    run = listed(sealed, "^/run/provenance/operator: does not match its checksum")
+    assert {damage.place for damage in run.damaged} >= {
+        "/run/outcome/seal",
+        "/run/provenance/notes@sha256",
+        "/run/source_001/data@sha256",
+    }
     assert run.header.operator == ""
     assert len(run.header.sources) == 1
+    assert run.root == ""
+
+
+def test_a_text_that_was_not_sealed_is_not_believed(sealed):
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, "run/source_003/data", "[evil]")
+        put_text(file, "run/source_003/file_name", "evil.toml")
+    run = listed(sealed, "^/run/source_003/file_name: was not there when the run was sealed")
+    assert "evil.toml" not in run.header.sources
 
 
 @pytest.mark.parametrize("name", ["run", "run/provenance", "run/outcome"])
@@ -222,31 +305,52 @@ def test_a_missing_group_is_named(sealed, name):
     refused(sealed, f"/{name}: is missing")
 
 
-@pytest.mark.parametrize("name", ["trial_00001", "trial_00001/record", "run/journal", "run/plan"])
-def test_a_missing_group_that_the_rest_can_do_without_is_listed(sealed, name):
+@pytest.mark.parametrize(
+    "name", ["trial_00001", "run/journal", "run/plan", "run/index", "run/trees", "run/outcome/seal"]
+)
+def test_what_is_missing_and_the_rest_can_do_without_is_listed(sealed, name):
     with h5py.File(sealed, "r+") as file:
         del file[name]
-    run = listed(sealed, f"^/{name}: is missing")
+    run = listed(sealed, f"^/{name}.*: is missing")
     assert len(run.trials) == (1 if name.startswith("trial") else 2)
 
 
-def test_an_archive_from_before_a_trial_had_a_field_still_opens(sealed):
+def test_a_trial_whose_own_record_is_gone_is_known_by_the_index(sealed):
     with h5py.File(sealed, "r+") as file:
-        tree = json.loads(file["trial_00001/record/trial"][()])
-        del tree["task"]["start_angle"], tree["note"]
-        put_text(file, "trial_00001/record/trial", json.dumps(tree))
-        what = {key: tree[key] for key in ("bench", "seed", "task")}
-        digest = hashlib.sha256(json.dumps(what, separators=(",", ":"), sort_keys=True).encode())
-        put_text(file, "trial_00001/record/fingerprint", digest.hexdigest())
+        del file["trial_00001/record"]
+    assert len(read_all(sealed)) == 2
+    placed(sealed, "/trial_00001/record: is missing")
+
+
+def test_an_archive_from_before_a_trial_had_a_field_still_opens(sealed, kit):
+    def older(record):
+        del record["trial"]["task"]["start_angle"], record["trial"]["note"]
+        what = {"bench": kit.trial(1).bench} | {n: record["trial"][n] for n in ("seed", "task")}
+        record["fingerprint"] = sha256(canonical(what))
+
+    with h5py.File(sealed, "r+") as file:
+        change_record(file, "trial_00001", older)
     assert open_run(sealed).trials[0].trial.task.start_angle == 0.0
+    found = [damage.place for damage in verify_run(sealed).problems]
+    assert "/trial_00001/record" not in found  # the fingerprint is that of what was stored
 
 
-def test_a_trial_that_is_not_what_ran_is_left_out(sealed):
+def test_a_trial_that_is_not_what_ran_is_found(sealed):
     with h5py.File(sealed, "r+") as file:
-        tree = json.loads(file["trial_00001/record/trial"][()])
-        tree["bench"]["axis"]["inertia"] = 36.0
-        put_text(file, "trial_00001/record/trial", json.dumps(tree))
-    listed(sealed, "^/trial_00001/record: does not match its fingerprint")
+        change_record(file, "trial_00001", lambda record: record["trial"].update(seed=1))
+    placed(sealed, "/trial_00001/record: does not match its fingerprint")
+
+
+def test_a_bench_that_is_not_what_ran_is_not_used(sealed, kit):
+    with h5py.File(sealed, "r+") as file:
+        trees = text_of(file, "run/trees/data").replace("35.0", "36.0")
+        put_text(file, "run/trees/data", trees)
+        reseal(file)
+    assert open_run(sealed).trials[0].trial.bench == kit.trial(1).bench  # from its own group
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, "trial_00001/record/trees", trees)
+    run = listed(sealed, "^/trial_00001/record/trees: line . does not match its digest")
+    assert [trial.trial.number for trial in run.trials] == [2]
 
 
 def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
@@ -257,7 +361,7 @@ def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
         dataset[:] = values
     refused(sealed, "/trial_00002/data/friction_torque: does not match its checksum")
     run = open_run(sealed)
-    assert len(run.trials[0].recording().time) == 50
+    assert len(whole_recording(run.trials[0]).time) == 50
     assert len(run.problems()) == 1
     assert not run.unchanged()
 

@@ -105,14 +105,38 @@ def write_whole(kit, results: Path, samples: int = 50, bench: object = BENCH) ->
 
 
 @pytest.mark.parametrize("samples", [50, PREVIEW_POINTS + 1])
-def test_trials_follow_the_definition_sealed_or_not(tmp_path, kit, samples):
-    for path in write_whole(kit, tmp_path, samples):
-        for judge in (nxvalidate, nxcheck):
-            errors, warnings, output = judge(path)
-            assert (errors, warnings) == (0, 0), output
-        with h5py.File(path) as file:
-            assert file["trial_00001/definition"][()] == b"NXfriction_trial"
-            assert file["trial_00001/definition"].attrs["version"] == VERSION
+def test_sealed_trials_follow_the_definition_and_their_files_do_not_say_so(tmp_path, kit, samples):
+    own, sealed = write_whole(kit, tmp_path, samples)
+    for judge, path in ((nxvalidate, sealed), (nxcheck, sealed), (nxcheck, own)):
+        errors, warnings, output = judge(path)
+        assert (errors, warnings) == (0, 0), output
+    with h5py.File(sealed) as file:
+        assert file["trial_00001/definition"][()] == b"NXfriction_trial"
+        assert file["trial_00001/definition"].attrs["version"] == VERSION
+    with h5py.File(own) as file:
+        assert not {"definition", "instrument"} & set(file["trial_00001"])
+
+
+def test_trials_of_one_bench_share_its_description(tmp_path, kit):
+    other = BENCH | {"name": "other"}
+    trials = [
+        kit.trial(number).model_copy(update={"bench": bench})
+        for number, bench in enumerate((BENCH, other, BENCH), start=1)
+    ]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        recorder = writer.begin(trial)
+        recorder.start(CHANNELS)
+        recorder.append(np.arange(9.0), np.zeros((len(CHANNELS), 9)))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    sealed = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    with h5py.File(sealed) as file:
+        for name in ("definition", "instrument"):
+            first, second, third = (file[f"trial_0000{n}/{name}"] for n in (1, 2, 3))
+            assert first == third  # one object under two names
+            assert first != second
+    for number in (1, 2, 3):
+        assert nxvalidate(sealed, number)[:2] == (0, 0)
 
 
 def test_a_bench_that_tells_no_gains_has_no_controllers(tmp_path, kit):
@@ -150,8 +174,8 @@ def shorter(entry: h5py.Group) -> None:
 
 
 def renamed(entry: h5py.Group) -> None:
-    del entry["record/outcome"]
-    entry["record/outcome"] = "fine"
+    del entry["definition"]
+    entry["definition"] = "NXfiction_trial"
 
 
 @pytest.mark.parametrize(
@@ -161,7 +185,8 @@ def renamed(entry: h5py.Group) -> None:
         (without("data/time"), (1, 0)),
         (without("start_time"), (1, 0)),
         (without("instrument/gyro"), (1, 0)),
-        (without("record/trial"), (1, 0)),
+        (without("record/json"), (1, 0)),
+        (without("record/trees"), (1, 0)),
         (renamed, (1, 0)),
         (shorter, (0, 3)),  # one line for the fact, one for each of some sizes
         (without_units("data/gyro_rate"), (0, 1)),
@@ -170,10 +195,10 @@ def renamed(entry: h5py.Group) -> None:
     ],
 )
 def test_what_does_not_follow_it_is_found(tmp_path, kit, damage, expected):
-    own, _ = write_whole(kit, tmp_path)
-    with h5py.File(own, "r+") as file:
+    _, sealed = write_whole(kit, tmp_path)
+    with h5py.File(sealed, "r+") as file:
         damage(file["trial_00001"])
-    errors, warnings, output = nxvalidate(own)
+    errors, warnings, output = nxvalidate(sealed)
     assert errors == expected[0], output
     assert bool(warnings) == bool(expected[1]), output
 

@@ -6,13 +6,13 @@ import random
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
 
-from campaign.archive import RunWriter
+from campaign.archive import RunWriter, open_run
 from campaign.archive.journal import JOURNAL
-from campaign.archive.verification import STRUCTURE, UNFINISHED, verify_run
+from campaign.archive.verification import PER_DATASET, STRUCTURE, UNFINISHED, verify_run
 from campaign.trial import Ending, Fault, Outcome
+from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 
 KEPT = Path(__file__).parent / "kept"
 PROTOCOL = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}], "published": "x"}
@@ -39,6 +39,7 @@ def folder(tmp_path, kit):
     kit.record(writer, trials[1], 30)
     kit.record(writer, trials[2], 40)
     writer.begin(trials[3])
+    writer.close()  # as a kill leaves it, and no sealed file grows in the folder any more
     return writer.folder
 
 
@@ -46,30 +47,74 @@ def places(path):
     return [damage.place for damage in verify_run(path).problems]
 
 
-@pytest.mark.parametrize("name", ["format-1.nxs", "format-1.partial"])
-def test_an_archive_of_the_first_format_is_sound(name):
+@pytest.mark.parametrize(
+    "name", ["format-1.nxs", "format-1.partial", "format-2.nxs", "format-2.partial"]
+)
+def test_an_archive_of_an_earlier_format_is_sound_as_far_as_that_can_tell(name):
     found = verify_run(KEPT / name)
-    assert (found.problems, found.remarks) == ((), ())
+    assert found.problems == ()
+    assert PER_DATASET in [remark.reason for remark in found.remarks]
+    assert found.root == ""
+
+
+def datasets(path: Path) -> dict[str, h5py.Dataset]:
+    """Name to kind of all datasets in a file; of two names for one the first."""
+    found = {}
+
+    def visit(name, item):
+        if isinstance(item, h5py.Dataset):
+            found[name] = item.dtype.kind
+
+    with h5py.File(path) as file:
+        file.visititems(visit)
+    return found
 
 
 def test_a_sealed_run_is_sound_and_every_dataset_was_read(good):
     found = verify_run(good)
     assert (found.problems, found.remarks, found.trials) == ((), (), 3)
-    with_checksum = []
+    assert found.datasets == len(datasets(good)) - 1  # all but the hash of the file itself
+    assert found.root == open_run(good).root != ""
 
-    def visit(name, item):
-        if "sha256" in item.attrs:
-            with_checksum.append(name)
 
-    with h5py.File(good) as file:
-        file.visititems(visit)
-    assert found.datasets == len(with_checksum)
+UNNAMED = ("run/outcome/file_sha256", "run/outcome/seal", "run/provenance/format")
+
+
+def test_whatever_dataset_is_changed_it_is_named(good):
+    """With a checksum of its own that fits; it is not left to the hash of the file.
+
+    But for the seal, which says the same with a space behind it, and the format, of another one of
+    which nothing is read.
+    """
+    content = good.read_bytes()
+    for name, kind in datasets(good).items():
+        if name in UNNAMED:
+            continue
+        with h5py.File(good, "r+") as file:
+            if kind == "S":
+                put_text(file, name, text_of(file, name) + " ")
+            elif kind == "i":
+                put_integer(file, name, int(file[name][()]) + 1)
+            else:
+                file[name][-1] += 1.0
+        found = places(good)
+        assert any(place.startswith(f"/{name}") for place in found), (name, found)
+        good.write_bytes(content)
 
 
 def test_a_killed_run_is_sound_and_what_is_not_its_is_named(folder):
     found = verify_run(folder)
     assert (found.problems, found.trials) == ((), 4)
     assert [remark.place for remark in found.remarks] == ["trial-00004.nxs.part"]
+    for name in ("sealed.nxs.part", "notes.txt"):
+        (folder / name).write_bytes(b"whatever it holds")
+    found = verify_run(folder)
+    assert found.problems == ()
+    assert {remark.place: remark.reason for remark in found.remarks} == {
+        "trial-00004.nxs.part": "was never finished",
+        "sealed.nxs.part": "is not part of the run",
+        "notes.txt": "is not part of the run",
+    }
 
 
 def flips(path: Path, count: int, seed: int) -> None:
@@ -116,43 +161,109 @@ def test_a_flip_that_no_dataset_shows_is_structure(good):
     assert [damage.reason for damage in verify_run(good).problems] == [STRUCTURE]
 
 
+def agreeing(good):
+    """As the places are that verifying names, of a run that was sound."""
+    assert places(good) == []
+    return h5py.File(good, "r+")
+
+
 @pytest.mark.parametrize(
     ("place", "old", "new", "told"),
     [
-        ("run/provenance/normalised", "map", "mop", "/run/provenance"),
-        ("run/plan/data", '"role":"measurement"', '"role":"warm-up"', "/trial_00001"),
-        ("run/journal/data", '"outcome":"fault"', '"outcome":"limit"', "/trial_00002"),
-        ("run/journal/data", '"status":"failed trials"', '"status":"complete"', "/run/outcome/"),
-        ("run/journal/data", "2026-11-21T09-36-58-tiny", "another", "/run/journal"),
-        ("trial_00001/record/channels", "gyro_rate", "gyro", "/trial_00001/data/gyro"),
-        ("trial_00001/record/fingerprint", "a", "b", "/trial_00001/record"),
+        ("provenance/normalised", "map", "mop", "/run/provenance"),
+        ("plan/data", '"role":"measurement"', '"role":"warm-up"', "/trial_00001"),
+        ("journal/data", '"outcome":"fault"', '"outcome":"limit"', "/trial_00002"),
+        ("journal/data", '"status":"failed trials"', '"status":"complete"', "/run/outcome/"),
+        ("journal/data", "2026-11-21T09-36-58-tiny", "another", "/run/journal"),
+        ("journal/data", '"attempt":1', '"attempt":2', "/trial_00001"),
+        ("index/data", '"label":"map', '"label":"mop', "/run/index"),
+        ("outcome/reason", "no power", "no water", "/run/outcome/reason"),
+        ("provenance/trials", "3", "4", "/run/journal"),
+        ("plan_trials/data", '"duration":2.0', '"duration":3.0', "/run/plan in full"),
+        ("trees/data", "35.0", "36.0", "plan-trees.jsonl: line 1 does not"),
     ],
 )
 def test_parts_that_do_not_agree_are_named(good, place, old, new, told):
-    with h5py.File(good, "r+") as file:
-        text = file[place][()].decode()
+    """Each of them has a checksum that holds, and the seal says that it belongs there."""
+    with agreeing(good) as file:
+        text = text_of(file, f"run/{place}")
         assert old in text
-        del file[place]
-        changed = text.replace(old, new).encode()
-        kind = h5py.string_dtype("utf-8", len(changed))
-        file.create_dataset(place, data=np.array(changed, dtype=kind))
-        file[place].attrs["sha256"] = hashlib.sha256(changed).hexdigest()
+        put_text(file, f"run/{place}", text.replace(old, new))
+        reseal(file)
+    found = [str(damage) for damage in verify_run(good).problems]
+    assert any(line.startswith(told) for line in found), found
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"label": "another"}, "/trial_00001/title"),
+        ({"started": "2026-11-21T09:37:00.251Z"}, "/trial_00001/start_time"),
+        ({"ended": "2026-11-21T09:37:00.251Z"}, "/trial_00001/end_time"),
+        ({"fingerprint": "f" * 64}, "/trial_00001/record"),
+        ({"outcome": "limit"}, "/trial_00001"),
+        ({"samples": 49}, "/trial_00001/data/time"),
+        ({"channels": []}, "/trial_00001/data/command"),
+    ],
+)
+def test_a_record_that_does_not_agree_with_its_trial_is_named(good, change, told):
+    with agreeing(good) as file:
+        change_record(file, "trial_00001", lambda record: record.update(change))
     assert any(found.startswith(told) for found in places(good)), verify_run(good).problems
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("name", "gyro", "/trial_00001/data/gyro"),
+        ("unit", "deg/s", "/trial_00001/data/gyro_rate@units"),
+        ("label", "Speed", "/trial_00001/data/gyro_rate@long_name"),
+        ("sha256", "0" * 64, "/trial_00001/data/gyro_rate"),
+    ],
+)
+def test_a_channel_that_does_not_agree_with_its_record_is_named(good, key, value, told):
+    with agreeing(good) as file:
+        change_record(
+            file, "trial_00001", lambda record: record["channels"][1].update({key: value})
+        )
+    assert told in places(good), verify_run(good).problems
 
 
 def test_what_is_missing_and_what_is_unknown_are_named(good):
     with h5py.File(good, "r+") as file:
-        del file["trial_00001/record/outcome"], file["trial_00003"], file["run/source_001/data"]
-        del file["trial_00001/data"].attrs["axes"]
+        del file["trial_00001/record/json"], file["trial_00003"], file["run/source_001/data"]
+        del file["trial_00001/title"]
         file["run/extra"] = 1.0
+        file["extra"] = 1.0
+        del file["trial_00002/record/trees"]
     found = verify_run(good)
     assert {
-        "/trial_00001/record/outcome",
+        "/trial_00001/record/json",
+        "/trial_00002/record/trees",
         "/trial_00003",
         "/run/source_001/data",
-        "/trial_00001/data@axes",
     } <= {damage.place for damage in found.problems}
-    assert [remark.place for remark in found.remarks] == ["/run/extra"]
+    assert {remark.place for remark in found.remarks} == {"/run/extra", "/extra"}
+
+
+def test_what_is_missing_of_a_trial_and_what_is_unknown_are_named(good):
+    with h5py.File(good, "r+") as file:
+        entry = file["trial_00001"]
+        del entry["title"], entry["data/command"]
+        del entry["data"].attrs["axes"], file["trial_00003/preview"]
+        entry["extra"] = entry["record/extra"] = entry["data/extra"] = 1.0
+    found = verify_run(good)
+    assert {
+        "/trial_00001/title",
+        "/trial_00001/data/command",
+        "/trial_00001/data/extra",
+        "/trial_00001/data@axes",
+        "/trial_00003/preview",
+    } <= {damage.place for damage in found.problems}
+    assert {remark.place for remark in found.remarks} == {
+        "/trial_00001/extra",
+        "/trial_00001/record/extra",
+    }
 
 
 @pytest.mark.parametrize("name", ["run.nxs", "run.partial"])

@@ -218,7 +218,9 @@ def test_the_channels_are_known_without_a_sample_being_read(tmp_path, monkeypatc
     def unread(*arguments: object) -> None:
         raise AssertionError("samples were read")
 
-    monkeypatch.setattr("campaign.archive.guarded.read_samples", unread)
+    monkeypatch.setattr("campaign.archive.series.Series.read", unread)
+    with pytest.raises(AssertionError, match="samples were read"):
+        open_run(path).trials[0].recording()
     assert len(announced) == 11
     assert backend.channels(first) == backend.channels(second) == announced
     other = changed(first, task=first.task.model_copy(update={"duration": 9.0}))
@@ -235,13 +237,14 @@ def test_a_trial_that_recorded_nothing_says_nothing_of_its_channels(tmp_path, tr
     assert served(backend, asking).ending.reason == "no power at 5 °C"
 
 
-def test_a_damaged_list_of_channels_says_nothing_of_them(tmp_path, trial):
+def test_a_trial_whose_record_is_damaged_is_a_fault_that_names_it(tmp_path, trial):
     path = archived(tmp_path / "results", [(trial, marked(1.0))])
-    backend = replay(path)
-    assert backend.channels(trial) == replay(path).channels(trial) == {"gyro_rate"}
+    assert replay(path).channels(trial) == {"gyro_rate"}
     with h5py.File(path, "r+") as file:
-        record = file["trial_00001/record"]
-        del record["channels"]
-        record["channels"] = "[1]"
-    assert replay(path).channels(trial) is None
-    assert served(backend, trial).ending.fault is Fault.OTHER
+        for place in ("run/index/data", "trial_00001/record/json"):
+            file[place][()] = file[place][()].replace(b"gyro_rate", b"gyro_rats")
+    backend = replay(path)
+    assert backend.channels(trial) is None
+    ending = served(backend, trial).ending
+    assert ending.fault is Fault.OTHER
+    assert "trial-00001" in ending.reason

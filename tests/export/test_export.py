@@ -202,7 +202,10 @@ def test_the_command_exports_what_can_be_read_and_names_the_rest(run, capsys, mo
     assert code == 4
     assert told.out.strip() == str(folder)
     assert "gyro_rate" in told.err
-    assert sorted(path.name for path in folder.iterdir()) == ["damaged.csv", "trials.csv"]
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["damaged.csv", "trial-00002.csv", "trials.csv"]
+    heading = (folder / "trial-00002.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert heading.startswith("time (s),end,units (N m),")  # and not the damaged channel
 
 
 def test_a_format_that_is_not_there(run, capsys, monkeypatch):

@@ -1,0 +1,170 @@
+"""A trial's record: what it says comes back as it was, and its text is what the digest is of."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.record import (
+    PreviewRecord,
+    SeriesRecord,
+    TrialRecord,
+    make_record,
+    parse_trees,
+    shared_trees,
+    trees_text,
+)
+from campaign.errors import ArchiveError
+from campaign.estimate import Estimate, Window
+from campaign.trial import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
+
+ENDING = Ending(
+    Outcome.FAULT,
+    "no word for 1 s: «ü»",
+    SafeState.NOT_CONFIRMED,
+    Fault.LOST_CONNECTION,
+    {"latency_ms": {"most": np.float64(4.5), "mean": float("nan")}, "resends": np.int64(3)},
+)
+ESTIMATES = (
+    Estimate("coulomb_torque", 0.25, "N m", 0.2, 0.3, 0.95, "bootstrap"),
+    Estimate("stribeck_rate", np.float64(5e-324), "rad/s", reason="one run only"),
+)
+WINDOWS = (Window("steady", 0.5, 1.75),)
+
+
+@pytest.fixture
+def record(kit) -> TrialRecord:
+    """One with something in every field."""
+    described, _ = shared_trees(kit.trial(7))
+    channels = [
+        SeriesRecord.of(ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s", True, 8000.0), "1" * 64),
+        SeriesRecord.of(ChannelInfo("torque", "N m", "Torque", "N m", False), "2" * 64),
+    ]
+    return make_record(
+        described,
+        kit.trial(7).label,
+        kit.trial(7).fingerprint,
+        3,
+        ENDING,
+        (kit.STARTED, kit.ENDED),
+        [Event(np.float64(0.25), "the load breaks away ↗")],
+        series=(40_000, "0" * 64, channels),
+        preview=PreviewRecord(channel="gyro_rate", samples=20_000, time="3" * 64, values="4" * 64),
+        windows=WINDOWS,
+        estimates=ESTIMATES,
+    )
+
+
+@pytest.fixture
+def least(kit) -> TrialRecord:
+    """One of a trial that recorded nothing."""
+    trial = kit.trial(1)
+    described, _ = shared_trees(trial)
+    ending = Ending(Outcome.COMPLETED)
+    times = (kit.STARTED, kit.ENDED)
+    return make_record(described, trial.label, trial.fingerprint, 1, ending, times, [], series=None)
+
+
+@pytest.mark.parametrize("which", ["record", "least"])
+def test_a_record_is_its_text(which, request):
+    record = request.getfixturevalue(which)
+    again = TrialRecord.model_validate_json(record.text)
+    assert again == record
+    assert again.text == record.text
+    assert record.sha256 == hashlib.sha256(record.text.encode()).hexdigest()
+    canonical = json.dumps(json.loads(record.text), sort_keys=True, separators=(",", ":"))
+    assert record.text == canonical
+    assert "\n" not in record.text  # it is a line of the index
+
+
+def test_what_a_record_says_is_what_was_recorded(record, kit):
+    again = TrialRecord.model_validate_json(record.text)
+    telemetry = {"latency_ms": {"most": 4.5, "mean": "nan"}, "resends": 3}
+    assert again.ending == Ending(
+        Outcome.FAULT, ENDING.reason, SafeState.NOT_CONFIRMED, Fault.LOST_CONNECTION, telemetry
+    )
+    assert again.windows == WINDOWS
+    assert again.estimates == ESTIMATES
+    assert again.series == (
+        ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s", True, 8000.0),
+        ChannelInfo("torque", "N m", "Torque", "N m", False),
+    )
+    assert [(event.time, event.text) for event in again.events] == [
+        (0.25, "the load breaks away ↗")
+    ]
+    assert (again.number, again.attempt, again.samples) == (7, 3, 40_000)
+
+
+def test_what_says_nothing_is_left_out(least):
+    absent = {"fault", "telemetry", "samples", "time", "channels", "preview", "events"}
+    assert not (absent | {"windows", "estimates"}) & json.loads(least.text).keys()
+
+
+def test_a_trial_is_restored_from_its_record_and_the_trees(record, kit):
+    described, trees = shared_trees(kit.trial(7))
+    assert set(trees) == {described["bench"], described["options"]} == record.tree_names
+    assert record.restored(parse_trees(trees_text(trees))) == kit.trial(7)
+    assert record.fingerprint_of(trees) == kit.trial(7).fingerprint
+    with pytest.raises(LookupError):
+        record.restored({})
+
+
+def test_a_tree_that_is_not_that_of_its_digest_is_refused(kit):
+    _, trees = shared_trees(kit.trial(1))
+    text = trees_text(trees)
+    assert parse_trees(text) == trees
+    with pytest.raises(ValueError, match=r"line \d does not match its digest"):
+        parse_trees(text.replace("35.0", "36.0"))
+    for nonsense in ("[]\n", "{}\n", "nonsense\n", "[" * 90_000, '{"sha256":1,"tree":{}}\n'):
+        with pytest.raises(ValueError, match="line 1 does not match"):
+            parse_trees(nonsense)
+
+
+def test_a_record_of_a_later_program_is_read(record):
+    """What it does not know it leaves alone; the digest is of the text, not of what was read."""
+    tree = json.loads(record.text) | {"humidity": 0.4}
+    tree["channels"][0]["colour"] = "red"
+    assert TrialRecord.model_validate(tree) == record
+
+
+def test_windows_and_estimates_come_back_from_a_folder_and_from_a_sealed_run(tmp_path, kit):
+    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
+    recorder = writer.begin(kit.trial(1))
+    recorder.start(kit.CHANNELS)
+    recorder.append(*kit.samples(100))
+    recorder.finish(
+        Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED, windows=WINDOWS, estimates=ESTIMATES
+    )
+    for look in (lambda: writer.folder, lambda: writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)):
+        (archived,) = open_run(look()).trials
+        assert archived.windows == WINDOWS
+        assert archived.estimates == ESTIMATES
+
+
+def test_samples_that_were_not_kept_have_their_digests_and_say_why(tmp_path, kit):
+    trials = [kit.trial(1), kit.trial(2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    recorder = writer.begin(trials[0], not_kept="by the protocol's retention policy")
+    recorder.start(kit.CHANNELS)
+    time, block = kit.samples(100)
+    recorder.append(time, block)
+    recorder.event(Event(0.05, "contact"))
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED, estimates=ESTIMATES)
+    kit.record(writer, trials[1], 10)
+    for look in (lambda: writer.folder, lambda: writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)):
+        run = open_run(look())
+        assert run.damaged == ()
+        assert run.problems() == []
+        archived = run.trials[0]
+        assert archived.trial == trials[0]
+        assert archived.channels() == kit.CHANNELS
+        assert archived.estimates == ESTIMATES
+        with pytest.raises(ArchiveError, match="not kept: by the protocol's retention policy"):
+            archived.recording()
+        told = json.loads(archived.samples.record.text)["channels"]
+        assert len({channel["sha256"] for channel in told}) == len(kit.CHANNELS)
+        assert len(run.trials[1].recording().time) == 10

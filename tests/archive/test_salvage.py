@@ -1,0 +1,227 @@
+"""Something of a run is damaged: what is good is delivered, and what is not is told of.
+
+Damage here is a changed character, whose text keeps the checksums that it had.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import h5py
+import pytest
+
+from campaign.archive import RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.verification import verify_run
+from campaign.errors import ArchiveError
+from campaign.trial import Ending, Fault, Outcome
+from tests.archive.forging import put_text, text_of
+
+
+@pytest.fixture
+def sealed(tmp_path: Path, kit) -> Path:
+    """Three trials with benches of their own, the second one at its second attempt."""
+    trials = [kit.trial(n).model_copy(update={"bench": {"name": f"bench {n}"}}) for n in (1, 2, 3)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    kit.record(writer, trials[0], 20)
+    failed = writer.begin(trials[1])
+    failed.start(kit.CHANNELS)
+    failed.append(*kit.samples(30, 99))
+    failed.finish(Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE), kit.STARTED, kit.ENDED)
+    kit.record(writer, trials[1], 40)
+    kit.record(writer, trials[2], 50)
+    return writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+
+
+def damage(path: Path, place: str, old: str, new: str) -> None:
+    with h5py.File(path, "r+") as file:
+        text = text_of(file, place)
+        assert text.count(old) >= 1
+        put_text(file, place, text.replace(old, new, 1), honest=True)
+
+
+def check_all(run: RunReader, kit, numbers: tuple[int, ...] = (1, 2, 3)) -> None:
+    """These trials are as they were recorded, and so is the earlier attempt."""
+    assert [archived.trial.number for archived in run.trials] == list(numbers)
+    for archived in run.trials:
+        number = archived.trial.number
+        time, block = kit.samples(10 + 10 * number + 10 * (number > 1), number)
+        assert archived.trial.bench == {"name": f"bench {number}"}
+        recording = archived.recording()
+        assert recording.time.tobytes() == time.tobytes()
+        assert recording["friction_torque"].tobytes() == block[2].tobytes()
+    if 2 in numbers:
+        [failed] = run.earlier_attempts[2]
+        assert failed.ending == Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE)
+        assert failed.recording()["command"].tobytes() == kit.samples(30, 99)[1][0].tobytes()
+
+
+def told(run: RunReader, *patterns: str) -> None:
+    """Each line of what is damaged matches a pattern, and the other way about."""
+    lines = [str(found) for found in run.damaged]
+    for pattern in patterns:
+        assert any(re.match(pattern, line) for line in lines), lines
+    for line in lines:
+        assert any(re.match(pattern, line) for pattern in patterns), line
+    assert not verify_run(run.path).sound
+
+
+MISMATCH = ": does not match its checksum; it was damaged or changed"
+
+
+def test_a_run_that_is_whole_tells_of_nothing(sealed, kit):
+    run = open_run(sealed)
+    assert run.damaged == ()
+    check_all(run, kit)
+
+
+@pytest.mark.parametrize("attempt", [1, 2, 3, 4])
+def test_a_lost_line_of_the_journal_is_made_up_for_by_the_index(sealed, kit, attempt):
+    with h5py.File(sealed) as file:
+        lines = text_of(file, "run/journal/data").splitlines()
+    finished = [line for line in lines if "trial finished" in line]
+    damage(sealed, "run/journal/data", finished[attempt - 1] + "\n", "")
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
+
+
+@pytest.mark.parametrize("what", ["started", "finished"])
+def test_a_damaged_line_of_the_journal_costs_nothing_that_the_index_has(sealed, kit, what):
+    damage(sealed, "run/journal/data", what, "_" * len(what))
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
+
+
+def test_without_journal_and_index_no_trial_is_known_and_that_is_said(sealed):
+    """Nothing else vouches for a record."""
+    damage(sealed, "run/journal/data", "started", "s_arted")
+    damage(sealed, "run/index/data", "seed", "s_ed")
+    run = open_run(sealed)
+    assert run.trials == ()
+    told(run, f"/run/(journal|index)/data{MISMATCH}", "/run/journal: is not a whole journal")
+    assert (run.status, run.header.protocol_name) == (RunStatus.COMPLETE, "tiny")
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_damaged_line_of_the_index_is_read_from_the_trials_own_group(sealed, kit, number):
+    damage(sealed, "run/index/data", f'"number":{number},', f'"number":{number + 5},')
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, f"/run/index/data{MISMATCH}")
+
+
+def test_an_index_that_is_gone_is_read_from_the_trials_own_groups(sealed, kit):
+    with h5py.File(sealed, "r+") as file:
+        del file["run/index"]
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, "/run/index: is missing")
+
+
+def test_a_line_of_the_index_and_the_record_in_the_group_cost_one_trial(sealed, kit):
+    for place in ("run/index/data", "trial_00001/record/json"):
+        damage(sealed, place, '"number":1,', '"number":7,')
+    run = open_run(sealed)
+    check_all(run, kit, (2, 3))
+    told(run, f"/run/index/data{MISMATCH}", f"/trial_00001/record/json{MISMATCH}")
+    assert [found.trial for found in run.damaged] == ["", "trial-00001"]
+
+
+def test_a_damaged_record_in_a_group_costs_nothing_and_verifying_names_it(sealed, kit):
+    damage(sealed, "trial_00001/record/json", '"number":1,', '"number":7,')
+    run = open_run(sealed)
+    check_all(run, kit)
+    assert run.damaged == ()
+    places = [found.place for found in verify_run(sealed).problems]
+    assert "/trial_00001/record/json" in places
+
+
+def test_damaged_trees_are_read_from_the_trials_own_groups(sealed, kit):
+    damage(sealed, "run/trees/data", "bench 1", "bench 9")
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, f"/run/trees/data{MISMATCH}")
+    with pytest.raises(ArchiveError, match=f"/run/trees/data{MISMATCH}"):
+        run.planned(1)
+
+
+def test_a_tree_that_is_damaged_everywhere_costs_its_trials(sealed, kit):
+    for place in ("run/trees/data", "trial_00001/record/trees"):
+        damage(sealed, place, "bench 1", "bench 9")
+    run = open_run(sealed)
+    check_all(run, kit, (2, 3))
+    told(run, f"/run/trees/data{MISMATCH}", "/trial_00001/record/trees: line . does not match")
+
+
+def test_a_damaged_seal_leaves_each_text_its_own_checksum(sealed, kit):
+    damage(sealed, "run/outcome/seal", '"run":', '"rum":')
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, f"/run/outcome/seal{MISMATCH}")
+    assert run.root == ""
+    assert run.header == kit.header().model_copy(update={"trials": 3})
+    assert [planned.number for planned in run.plan] == [1, 2, 3]
+    damage(sealed, "run/title", "A tiny run", "A tidy run")
+    damage(sealed, "run/provenance/operator", "Ada", "Eva")
+    told(open_run(sealed), f"/run/(outcome/seal|provenance/operator){MISMATCH}")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "nonsense", '{"format":3}', "[" * 90_000])
+def test_a_seal_that_is_none_leaves_each_text_its_own_checksum(sealed, kit, text):
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, "run/outcome/seal", text)
+    run = open_run(sealed)
+    check_all(run, kit)
+    told(run, "/run/outcome/seal: ")
+    assert run.root == ""
+
+
+def test_a_lost_line_of_a_folders_journal_is_listed_and_the_rest_is_read(tmp_path, kit):
+    trials = [kit.trial(number) for number in (1, 2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        kit.record(writer, trial, 20)
+    writer.close()
+    journal = writer.folder / "journal.jsonl"
+    journal.write_text(journal.read_text().replace('"trial":1}', '"trial":x}'))
+    run = open_run(writer.folder)
+    assert [archived.trial.number for archived in run.trials] == [2]
+    told(run, "journal.jsonl:2: is not a line of a journal")
+
+
+def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path, kit):
+    """Each of them is whole; the journal names the record of each."""
+    trials = [kit.trial(number) for number in (1, 2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        kit.record(writer, trial, 20)
+    writer.close()
+    first, second = (writer.folder / f"trial-0000{n}.nxs" for n in (1, 2))
+    with h5py.File(second, "r+") as file:
+        file.move("trial_00002", "trial_00001")
+    first.unlink()
+    second.rename(first)
+    run = open_run(writer.folder)
+    assert run.trials == ()
+    told(run, f"trial-00001.nxs/trial_00001/record/json{MISMATCH}", "trial-00002.nxs: there is no")
+
+
+def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit):
+    """So a damaged index costs such a trial, and that is said."""
+    trials = [kit.trial(number) for number in (1, 2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    recorder = writer.begin(trials[0], not_kept="to save room")
+    recorder.start(kit.CHANNELS)
+    recorder.append(*kit.samples(20, 1))
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    kit.record(writer, trials[1], 20)
+    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    with h5py.File(path) as file:
+        assert json.loads(text_of(file, "run/not_kept/data")) == {"trial_00001": "to save room"}
+    damage(path, "run/index/data", '"number":1,', '"number":7,')
+    run = open_run(path)
+    assert [archived.trial.number for archived in run.trials] == [2]
+    told(run, f"/run/index/data{MISMATCH}", "/trial_00001: is missing")

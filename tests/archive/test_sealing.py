@@ -1,0 +1,417 @@
+"""Sealing: every sample is read back, trials are copied beside the others, and nothing depends on
+when.
+"""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, open_run, sealed_file, sealing
+from campaign.archive import hdf5 as hdf5_module
+from campaign.archive.header import PARTIAL
+from campaign.archive.run_folder import SEALING
+from campaign.archive.series import Series
+from campaign.archive.verification import verify_run
+from campaign.errors import ArchiveError
+from campaign.trial import Ending, Outcome
+from tests.archive.forging import canonical, put_text, sha256, text_of
+
+WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well
+PROTOCOL = {"tests": [{"name": "map"}]}
+
+
+def begin(results: Path, kit, count: int = 3) -> tuple[RunWriter, list]:
+    trials = [kit.trial(number) for number in range(1, count + 1)]
+    header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
+    return RunWriter.create(results, header, trials), trials
+
+
+def seal(writer: RunWriter) -> Path:
+    return writer.seal(RunStatus.COMPLETE, ended="2026-11-21T09:40:00Z")
+
+
+def refused(writer: RunWriter, match: str) -> None:
+    """Sealing refuses, leaves no file, and the folder has every trial."""
+    with pytest.raises(ArchiveError, match=match):
+        seal(writer)
+    assert not list(writer.folder.parent.glob("*.nxs*"))
+    assert not (writer.folder / SEALING).exists()
+    run = open_run(writer.folder)
+    assert run.damaged == ()
+    assert run.problems() == []
+    assert len(run.trials) == 3
+
+
+def corrupt_copy(monkeypatch, change) -> None:
+    """From now on `change` is done to the copy of the second trial."""
+    real = hdf5_module.copy_entry
+
+    def copy(source, name, target, new_name):
+        real(source, name, target, new_name)
+        if new_name == "trial_00002":
+            change(target[new_name])
+
+    monkeypatch.setattr(sealed_file.hdf5, "copy_entry", copy)
+
+
+def flip_chunk(entry: h5py.Group) -> None:
+    """Another chunk, which is whole."""
+    series = entry["data/friction_torque"]
+    values = series[:]
+    values[7] = np.nextafter(values[7], np.inf)
+    series[:] = values
+
+
+def flip_byte(entry: h5py.Group) -> None:
+    chunk = entry["data/gyro_rate"].id
+    mask, packed = chunk.read_direct_chunk((0,))
+    changed = bytearray(packed)
+    changed[len(changed) // 2] ^= 1
+    chunk.write_direct_chunk((0,), bytes(changed), mask)
+
+
+def exchange(entry: h5py.Group) -> None:
+    data = entry["data"]
+    data.move("gyro_rate", "aside")
+    data.move("command", "gyro_rate")
+    data.move("aside", "command")
+
+
+def lose_channel(entry: h5py.Group) -> None:
+    del entry["data/command"]
+
+
+def change_preview(entry: h5py.Group) -> None:
+    entry["preview/gyro_rate"][3] += 1.0
+
+
+def change_unit(entry: h5py.Group) -> None:
+    entry["data/gyro_rate"].attrs["units"] = "deg/s"
+
+
+def change_record(entry: h5py.Group) -> None:
+    put_text(entry, "record/json", text_of(entry, "record/json").replace("completed", "limit"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [flip_chunk, flip_byte, exchange, lose_channel, change_preview, change_unit, change_record],
+)
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_copy_that_is_not_what_was_recorded_is_not_sealed(
+    tmp_path, kit, monkeypatch, change, beside
+):
+    if not beside:
+        monkeypatch.setattr(sealing.Sealer, "add", lambda self, finished: None)
+    writer, trials = begin(tmp_path, kit)
+    corrupt_copy(monkeypatch, change)
+    for trial in trials:
+        kit.record(writer, trial, 20_001)
+    refused(writer, "could not be sealed: .*trial_00002")
+
+
+def test_without_reading_back_a_wrong_chunk_would_be_sealed(tmp_path, kit, monkeypatch):
+    """The test above would pass for another reason if this one did not: reading back finds it."""
+    monkeypatch.setattr(Series, "check", lambda self, digest: None)
+    writer, trials = begin(tmp_path, kit)
+    corrupt_copy(monkeypatch, flip_chunk)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    path = seal(writer)
+    monkeypatch.undo()
+    assert "trial_00002/data/friction_torque" in "".join(open_run(path).problems())
+
+
+def test_a_chunk_that_was_stored_wrong_in_the_first_place_is_not_sealed(tmp_path, kit, monkeypatch):
+    """The digest is of what was appended, not of what was stored."""
+    real = hdf5_module.pack
+
+    def pack(samples, shuffled):
+        wrong = np.array(samples)
+        if len(wrong) == 77:
+            wrong[20] += 1.0
+        return real(wrong, shuffled)
+
+    writer, trials = begin(tmp_path, kit)
+    monkeypatch.setattr(hdf5_module, "pack", pack)
+    for trial, count in zip(trials, (50, 77, 50), strict=True):
+        kit.record(writer, trial, count)
+    with pytest.raises(ArchiveError, match=r"trial_00002/data/.* does not match its checksum"):
+        seal(writer)
+    run = open_run(writer.folder)
+    assert not list(tmp_path.glob("*.nxs*"))
+    assert [len(list(trial.problems())) for trial in run.trials] == [0, 4, 0]
+
+
+@pytest.mark.parametrize(
+    "place", ["run/journal/data", "run/title", "run/outcome/status", "trial_00001/record/json"]
+)
+def test_a_text_that_changed_between_writing_and_checking_is_found(
+    tmp_path, kit, monkeypatch, place
+):
+    """With a checksum of its own that fits."""
+    real = sealed_file.check_sealed
+
+    def check(part, file):
+        with h5py.File(part, "r+") as opened:
+            put_text(opened, place, text_of(opened, place) + " ")
+        real(part, file)
+
+    monkeypatch.setattr(sealing, "check_sealed", check)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    refused(writer, f"/{place}: does not match its checksum")
+
+
+def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, monkeypatch):
+    real = sealed_file.check_sealed
+
+    def check(part, file):
+        with h5py.File(part, "r+") as opened:
+            exchange(opened["trial_00001"])
+        real(part, file)
+
+    monkeypatch.setattr(sealing, "check_sealed", check)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    refused(writer, "/trial_00001/data/command: does not lie where it was written")
+
+
+class Watched:
+    """Tells when trials were copied, and may hold the copying up.
+
+    Attributes:
+        may_go: copying waits for this.
+        reached: so many trials were copied as somebody waits for.
+        copied: names of the groups, in the order in which they were copied, and by which thread.
+        failures: the next copy fails with the last of these.
+    """
+
+    def __init__(self, monkeypatch, wait_for: int) -> None:
+        self.copied: list[tuple[str, str]] = []
+        self.may_go, self.reached = threading.Event(), threading.Event()
+        self.may_go.set()
+        self.failures: list[Exception] = []
+        real = sealed_file.SealedFile.copy
+
+        def copy(file, folder, finished, entry):
+            assert self.may_go.wait(WAIT)
+            if self.failures:
+                raise self.failures.pop()
+            real(file, folder, finished, entry)
+            self.copied.append((entry, threading.current_thread().name))
+            if len(self.copied) >= wait_for:
+                self.reached.set()
+
+        monkeypatch.setattr(sealed_file.SealedFile, "copy", copy)
+
+    @property
+    def beside(self) -> list[str]:
+        return [entry for entry, thread in self.copied if thread == "sealer"]
+
+    @property
+    def at_the_end(self) -> list[str]:
+        return [entry for entry, thread in self.copied if thread != "sealer"]
+
+
+ALL = ["trial_00001", "trial_00002", "trial_00003"]
+
+
+def test_trials_are_copied_while_others_are_executed(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch, wait_for=2)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials[:2]:
+        kit.record(writer, trial, 50)
+    assert watched.reached.wait(WAIT)
+    assert watched.beside == ALL[:2]
+    assert (writer.folder / SEALING).is_file()
+    kit.record(writer, trials[2], 50)
+    path = seal(writer)
+    assert [entry for entry, _ in watched.copied] == ALL  # each once
+    assert verify_run(path).sound
+
+
+def test_a_trial_waits_for_those_before_it_in_the_plan(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch, wait_for=3)
+    writer, trials = begin(tmp_path, kit)
+    for number in (3, 2, 1):
+        assert watched.copied == []
+        kit.record(writer, trials[number - 1], 50)
+    assert watched.reached.wait(WAIT)
+    assert watched.beside == ALL
+    assert verify_run(seal(writer)).sound
+
+
+def written(results: Path, kit, order: list[int]) -> bytes:
+    writer, trials = begin(results, kit)
+    for number in order:
+        kit.record(writer, trials[number - 1], 50)
+    return seal(writer).read_bytes()
+
+
+def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, monkeypatch):
+    """Whether trials were copied beside the others, after the last one, or by `seal` itself."""
+    files = [written(tmp_path / "as it comes", kit, [1, 2, 3])]
+    with monkeypatch.context() as held:
+        watched = Watched(held, wait_for=3)
+        watched.may_go.clear()
+        real = sealing.Sealer.seal
+
+        def let_go(sealer):
+            assert watched.copied == []
+            watched.may_go.set()
+            return real(sealer)
+
+        held.setattr(sealing.Sealer, "seal", let_go)
+        files.append(written(tmp_path / "held up", kit, [1, 2, 3]))
+        assert watched.beside == ALL
+    with monkeypatch.context() as late:
+        late.setattr(sealing.Sealer, "add", lambda self, finished: None)
+        watched = Watched(late, wait_for=3)
+        files.append(written(tmp_path / "at the end", kit, [1, 2, 3]))
+        assert watched.at_the_end == ALL
+    assert files[0] == files[1] == files[2]
+
+
+@pytest.mark.parametrize(
+    "failure", [OSError(28, "No space left on device"), RuntimeError("HDF5"), ArchiveError("?")]
+)
+def test_a_copy_that_fails_costs_nothing_but_time(tmp_path, kit, monkeypatch, failure):
+    watched = Watched(monkeypatch, wait_for=2)
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    kit.record(writer, trials[1], 50)
+    assert watched.reached.wait(WAIT)
+    watched.failures.append(failure)
+    kit.record(writer, trials[2], 50)
+    path = seal(writer)
+    assert watched.failures == []
+    assert watched.beside == ALL[:2]
+    assert watched.at_the_end == ALL  # begun anew
+    assert verify_run(path).sound
+    assert path.read_bytes() == written(tmp_path / "again", kit, [1, 2, 3])
+
+
+def test_on_a_disk_that_is_nearly_full_nothing_is_copied_before_the_end(tmp_path, kit, monkeypatch):
+    asked = threading.Event()
+
+    def disk_usage(path):
+        asked.set()
+        return SimpleNamespace(total=1 << 40, used=1 << 40, free=1 << 20)
+
+    watched = Watched(monkeypatch, wait_for=3)
+    writer, trials = begin(tmp_path, kit)
+    with monkeypatch.context() as nearly_full:
+        nearly_full.setattr(sealing.shutil, "disk_usage", disk_usage)
+        kit.record(writer, trials[0], 50)
+        assert asked.wait(WAIT)
+        for trial in trials[1:]:
+            kit.record(writer, trial, 50)
+        writer_thread_done(writer)
+    assert watched.copied == []
+    assert not (writer.folder / SEALING).exists()
+    path = seal(writer)
+    assert (watched.beside, watched.at_the_end) == ([], ALL)
+    assert verify_run(path).sound
+
+
+def writer_thread_done(writer: RunWriter) -> None:
+    """Wait until the sealer has given up."""
+    thread = writer._sealer._thread
+    thread.join(WAIT)
+    assert not thread.is_alive()
+
+
+def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypatch):
+    """A first attempt that failed may be repeated, so it waits for the end."""
+    watched = Watched(monkeypatch, wait_for=1)
+    writer, trials = begin(tmp_path, kit)
+
+    def fail(trial, count):
+        recorder = writer.begin(trial)
+        recorder.start(kit.CHANNELS)
+        recorder.append(*kit.samples(count, 9))
+        recorder.finish(Ending(Outcome.FAULT, f"after {count}"), kit.STARTED, kit.ENDED)
+
+    kit.record(writer, trials[0], 50)
+    fail(trials[1], 10)
+    fail(trials[1], 20)
+    assert watched.reached.wait(WAIT)
+    kit.record(writer, trials[1], 30)
+    kit.record(writer, trials[2], 50)
+    run = open_run(seal(writer))
+    first = ["trial_00002_attempt_1", "trial_00002_attempt_2", "trial_00002"]
+    assert set(watched.beside) <= {"trial_00001", "trial_00003"}
+    assert sorted(entry for entry, _ in watched.copied) == sorted(["trial_00001", *first, ALL[2]])
+    earlier = run.earlier_attempts[2]
+    assert [attempt.entry for attempt in earlier] == first[:2]
+    assert [attempt.ending.reason for attempt in earlier] == ["after 10", "after 20"]
+    lengths = [len(attempt.recording().time) for attempt in (*earlier, run.trials[1])]
+    assert lengths == [10, 20, 30]
+    assert verify_run(run.path).sound
+
+
+def test_a_trial_that_completed_and_is_repeated_is_copied_anew(tmp_path, kit, monkeypatch):
+    """It was copied as the trial, and turns out to be its first attempt."""
+    watched = Watched(monkeypatch, wait_for=1)
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    assert watched.reached.wait(WAIT)
+    assert watched.beside == ["trial_00001"]
+    kit.record(writer, trials[0], 60)
+    run = open_run(seal(writer))
+    assert len(run.trials[0].recording().time) == 60
+    assert [len(attempt.recording().time) for attempt in run.earlier_attempts[1]] == [50]
+    assert verify_run(run.path).sound
+
+
+def test_whoever_lets_go_of_a_run_leaves_no_copy(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch, wait_for=1)
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    assert watched.reached.wait(WAIT)
+    writer.close()
+    assert not (writer.folder / SEALING).exists()
+
+
+@pytest.mark.parametrize("how", ["file", "folder"])
+def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
+    """Through sealing, resuming, unsealing and sealing again."""
+
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    notes = {"notes.txt": b"the fan was on"}
+    if how == "folder":
+        notes = {"photos/1.jpg": b"\xff\xd8", "photos/trial-00001.nxs": b"of mine", "a.part": b"?"}
+    for name, content in notes.items():
+        path = writer.folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+
+    def there() -> dict[str, bytes]:
+        found = [path for path in writer.folder.rglob("*") if path.is_file()]
+        return {str(path.relative_to(writer.folder)): path.read_bytes() for path in found}
+
+    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": []}
+    writer.close()
+    RunWriter.resume(writer.folder, **told).close()
+    assert notes.items() <= there().items()
+    path = RunWriter.resume(writer.folder, **told).seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
+    assert there() == notes
+    assert verify_run(path).sound
+    resumed = RunWriter.resume(path, **told)
+    assert notes.items() <= there().items()
+    assert not list(tmp_path.glob(f"*{PARTIAL}.part"))
+    for trial in trials[1:]:
+        kit.record(resumed, trial, 50)
+    path = seal(resumed)
+    assert there() == notes
+    assert verify_run(path).sound
