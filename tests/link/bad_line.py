@@ -13,6 +13,7 @@ import random
 import socket
 import struct
 import threading
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -130,13 +131,17 @@ class BadLine:
 
     Several connections one after the other share the two streams of blocks, so that a trouble that
     has happened does not happen again to who comes back.
+
+    Attributes:
+        met: how many blocks met which trouble.
     """
 
     def __init__(self, port: str, out: Iterable[Block], back: Iterable[Block]) -> None:
         """`port`: the controller's; `out`: what happens to the host's words, `back`: to its own."""
         host, _, target = port.removeprefix("socket://").rpartition(":")
         self._target = host, int(target)
-        self._ways = _Shared(out), _Shared(back)
+        self.met: Counter[Trouble] = Counter()
+        self._ways = _Shared(out, self.met), _Shared(back, self.met)
         self._ends: list[socket.socket] = []
         self._threads: list[threading.Thread] = []
         self._closed = threading.Event()
@@ -196,17 +201,20 @@ class BadLine:
 
 
 class _Shared:
-    """An iterator that several threads may draw from."""
+    """An iterator that several threads may draw from, and that counts what it gave."""
 
-    def __init__(self, blocks: Iterable[Block]) -> None:
-        self._blocks, self._lock = iter(blocks), threading.Lock()
+    def __init__(self, blocks: Iterable[Block], met: Counter[Trouble]) -> None:
+        self._blocks, self._lock, self._met = iter(blocks), threading.Lock(), met
 
     def __iter__(self) -> _Shared:
         return self
 
     def __next__(self) -> Block:
         with self._lock:
-            return next(self._blocks)
+            block = next(self._blocks)
+            if block.trouble is not None:
+                self._met[block.trouble] += 1
+            return block
 
 
 def _reset(end: socket.socket) -> None:
