@@ -8,7 +8,15 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from campaign.errors import Problem
-from campaign.protocol.files import Origin, Patched, Source, UnreadableError, Within, read_source
+from campaign.protocol.files import (
+    Origin,
+    Patched,
+    Source,
+    UnreadableError,
+    Within,
+    looked_for,
+    read_source,
+)
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
@@ -173,7 +181,7 @@ def _include(
     try:
         _collect(file, name, chain, collected)
     except UnreadableError as error:
-        refuse(f"{error} (looked for {file})")
+        refuse(f"{error} {looked_for(file)}")
 
 
 def _draft(source: Source, index: int, tree: Mapping[str, Any]) -> Draft:

@@ -194,8 +194,14 @@ def test_what_comes_twice_or_out_of_order_is_taken_once_in_order(clock: list[flo
 
 def test_an_event_stands_between_the_samples_before_and_after_it(clock: list[float]) -> None:
     event = Event(TRIAL, 1, 0.1, "the axis\x1b[2J turns")
-    _, recording, _ = collected(Line(clock, [samples(0, 0), event, samples(2, 10)], end(3, 20)))
+    line = Line(clock, [samples(0, 0), event, samples(2, 10)], end(3, 20))
+    mine, recorder = collector(line)
+    before: list[int] = []
+    note = recorder.event
+    recorder.event = lambda event: (before.append(len(recorder._blocks)), note(event))[1]  # type: ignore[method-assign]
+    recording = recorder.recording(mine.run(never))
     check(recording, 20)
+    assert before == [1]
     ((time, text),) = told(recording)
     assert time == 0.1
     assert text.startswith("the axis")
@@ -215,9 +221,18 @@ def test_records_of_another_trial_are_nobodys(clock: list[float]) -> None:
 
 def test_nothing_is_taken_when_it_is_over(clock: list[float]) -> None:
     line = Line(clock, samples(0, 0), end(1, 10))
-    _, recording, _ = collected(line)
+    _, recording, mine = collected(line)
+    assert line.records != mine._arrived  # which would keep it in mind for ever
     line.records(samples(2, 10))
     check(recording, 10)
+
+
+def test_what_came_before_the_line_broke_is_recorded(clock: list[float]) -> None:
+    def breaks() -> None:
+        raise SilenceError("the connection was lost")
+
+    line = Line(clock, samples(0, 0), [samples(1, 10), breaks])
+    check(broken_off(line, SilenceError, "the connection was lost"), 20)
 
 
 # What is lost
@@ -225,10 +240,10 @@ def test_nothing_is_taken_when_it_is_over(clock: list[float]) -> None:
 
 def test_lost_samples_are_nan_and_said_to_be(clock: list[float]) -> None:
     """Records 1 and 2 are gone for good: 20 samples in every channel, never zero or the last."""
-    ending, recording, mine = collected(
-        Line(clock, samples(0, 0), [samples(3, 30), Lost(TRIAL, 1, 2)], end(4, 40))
-    )
+    line = Line(clock, samples(0, 0), [samples(3, 30), Lost(TRIAL, 1, 2)], end(4, 40))
+    ending, recording, mine = collected(line)
     check(recording, 40, range(10, 30))
+    assert line.sent == []  # what is no more is not asked for again
     assert told(recording) == [
         (0.1, "2 records of the controller were lost"),
         (0.1, "samples 10 to 29 were lost and are NaN"),
@@ -250,6 +265,12 @@ def test_a_lost_beginning_and_a_lost_end_are_marked_as_well(clock: list[float]) 
     assert recording["current"][10:20].tolist() == [n / 4 for n in range(10, 20)]
     assert mine.telemetry()["lost_samples"] == 20
     assert ending.fault is Fault.LOST_SAMPLES
+
+
+def test_lost_samples_stand_in_their_place_when_all_comes_at_once(clock: list[float]) -> None:
+    everything = [samples(0, 0), samples(2, 20), Lost(TRIAL, 1, 1), end(3, 30)]
+    _, recording, _ = collected(Line(clock, everything))
+    check(recording, 30, range(10, 20))
 
 
 def test_a_lost_event_is_a_fault_though_every_sample_is_there(clock: list[float]) -> None:
@@ -345,6 +366,9 @@ def test_a_length_that_is_no_binary_fraction_is_not_cut_short(clock: list[float]
     ending, recording, _ = collected(Line(clock, samples(0, 0, 30), end(1, 30)), longest=0.29)
     assert ending.outcome is Outcome.COMPLETED
     check(recording, 30)
+    line = Line(clock, samples(0, 0, 31), end(1, 31))
+    with pytest.raises(ViolationError, match="longer than the trial can last"):
+        collected(line, longest=0.29)
 
 
 # Acknowledging
@@ -455,6 +479,18 @@ def test_a_pause_in_which_it_runs_again_begins_the_time_anew(clock: list[float])
     )  # fmt: skip
     ending, _, _ = collected(line)
     assert ending.outcome is Outcome.COMPLETED
+
+
+def test_a_late_record_after_the_end_begins_the_time_anew(clock: list[float]) -> None:
+    """More was to come than it had said."""
+    over, more = (status(state=State.ENDED, next_record=n) for n in (1, 2))
+    line = Line(
+        clock, samples(0, 0), over, wait(clock, ENDING - 1), more, samples(1, 10),
+        wait(clock, ENDING - 1), end(2, 20),
+    )  # fmt: skip
+    ending, recording, _ = collected(line)
+    assert ending.outcome is Outcome.COMPLETED
+    check(recording, 20)
 
 
 def test_a_running_trial_without_a_record_is_given_up(clock: list[float]) -> None:
