@@ -20,7 +20,7 @@ from campaign.protocol.files import (
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, nearest, validate
+from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.protocol.schema import ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
@@ -165,7 +165,7 @@ def _include(
     file, name = sibling(source, written)
 
     def refuse(message: str) -> None:
-        problem = source.problem(("include", index), "value", f"'{written}': {message}")
+        problem = source.problem(("include", index), "value", f"{shown(written)}: {message}")
         collected.problems.append(problem)
 
     before = collected.chains.get(_identity(file))
