@@ -1,4 +1,4 @@
-"""What a piece of code asks of the disk, in its order: the calls of `os` that write, sync and rename.
+"""What a piece of code asks of the disk, in its order: calls of `os` that write, sync, rename.
 
 Recorded inside the process, so it works wherever the tests do. HDF5 writes by calls of its own:
 what is seen of its files is that they are synced, renamed and removed.

@@ -109,7 +109,8 @@ def test_what_follows_the_last_whole_line_was_never_reported(torn: bytes) -> Non
 
 
 @pytest.mark.parametrize(
-    "rubbish", [b"\0\0\0\n", b"{}\n", b"[" * 100_000 + b"\n", b"\xff\n", b'{"event":"new"}\n', b"\n"]
+    "rubbish",
+    [b"\0\0\0\n", b"{}\n", b"[" * 100_000 + b"\n", b"\xff\n", b'{"event":"new"}\n', b"\n"],
 )
 def test_a_last_line_of_rubbish_is_left_out_and_an_earlier_one_is_named(rubbish: bytes) -> None:
     story = told(STARTED, finished(1), after=rubbish)

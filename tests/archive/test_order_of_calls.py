@@ -54,7 +54,7 @@ def finish_one(writer: RunWriter, trial: Trial) -> Calls:
 def test_a_trial_is_on_the_disk_before_the_journal_says_so(
     tmp_path: Path, trials: tuple[Trial, ...]
 ) -> None:
-    """Content, then the name, then the folder, then the line, and the line synced before it ends."""
+    """Content, then the name, then the folder, then the line, synced before `finish` ends."""
     writer = begun(tmp_path, trials)
     folder, journal = writer.folder, writer.folder / JOURNAL
     calls = finish_one(writer, trials[0])

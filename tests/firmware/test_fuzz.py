@@ -77,11 +77,18 @@ def of_states() -> Iterator[bytes]:
     yield whole + bytes([WORLD, 0]) + message(4, wire.Stop()) + pause(2.5)
     yield whole + pause(0.2) + message(4, wire.Clear())
     yield whole + message(0, wire.Safe(OURS + 1, "somebody")) + message(0, wire.Query())
-    yield whole + message(0, wire.Safe()) + bytes([RESET, 0]) + message(0, hello()) + message(
-        1, wire.Unlatch(1, "ada")
-    ) + message(2, wire.Clear())
+    yield (
+        whole
+        + message(0, wire.Safe())
+        + bytes([RESET, 0])
+        + message(0, hello())
+        + message(1, wire.Unlatch(1, "ada"))
+        + message(2, wire.Clear())
+    )
     yield whole + bytes([RESET, 1]) + whole
-    yield whole + bytes([WORLD, 5]) + message(0, wire.Safe()) + pause(0.01) + message(0, wire.Query())
+    yield (
+        whole + bytes([WORLD, 5]) + message(0, wire.Safe()) + pause(0.01) + message(0, wire.Query())
+    )
     yield whole + bytes([FINISH, 3, 8, 1]) + b"hot!" + message(0, wire.Bye(OURS))
     yield bytes([WATCH, 31]) + struct.pack("<HB", 1000, 20) + bytes(range(160))
 

@@ -14,9 +14,7 @@ X = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 Y = np.array([1.1, 2.9, 5.2, 6.8, 9.1, 11.4])
 
 
-def parameter(
-    name: str, *starts: float, lower: float = -100.0, upper: float = 100.0
-) -> Parameter:
+def parameter(name: str, *starts: float, lower: float = -100.0, upper: float = 100.0) -> Parameter:
     return Parameter(name, lower, upper, starts or (0.5,))
 
 
@@ -195,7 +193,7 @@ def nearly(apart: float) -> Array:
 
 
 def test_columns_that_differ_in_the_eighth_digit_are_the_same() -> None:
-    """Their singular values are the angle over the square root of 2, and that root: half the angle."""
+    """Their singular values are the angle over the square root of 2, and that root."""
     residuals = np.array([0.0, 0.0, 0.0, 3.0])
     errors, named = _standard_errors(nearly(2.2e-8), residuals)
     assert named == []

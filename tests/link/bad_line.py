@@ -1,4 +1,4 @@
-"""A TCP line with faults: a proxy that loses, repeats, swaps, delays, dribbles, goes deaf, hangs up.
+"""A TCP line with faults: loses, repeats, swaps, delays, dribbles, goes deaf, hangs up.
 
 TCP itself never loses or reorders a byte; a serial line or a radio does. What happens to which
 bytes is a function of the seed and of their place in the stream alone, so a failure comes back as
@@ -225,9 +225,7 @@ def _reset(end: socket.socket) -> None:
 
 
 @contextmanager
-def bad_line(
-    port: str, out: Iterable[Block] = (), back: Iterable[Block] = ()
-) -> Iterator[BadLine]:
+def bad_line(port: str, out: Iterable[Block] = (), back: Iterable[Block] = ()) -> Iterator[BadLine]:
     """A serving line in front of `port`."""
     line = BadLine(port, out, back)
     thread = threading.Thread(target=line.serve, daemon=True)

@@ -354,7 +354,9 @@ def test_a_trial_of_one_second_has_a_hundred_and_one_samples_at_most(clock: list
     assert ending.outcome is Outcome.COMPLETED
     broken_off(Line(clock, samples(0, 0, 102)), ViolationError, "longer than the trial can last")
     broken_off(Line(clock, samples(0, 101, 1)), ViolationError, "longer than the trial can last")
-    broken_off(Line(clock, samples(0, 102, 1)), ViolationError, "sample 102 cannot follow sample -1")
+    broken_off(
+        Line(clock, samples(0, 102, 1)), ViolationError, "sample 102 cannot follow sample -1"
+    )
     broken_off(Line(clock, samples(0, 0), end(1, 102)), ViolationError, "sample 102 cannot follow")
     ending, recording, _ = collected(Line(clock, samples(0, 0), end(1, 101)))
     check(recording, 101, range(10, 101))
@@ -450,9 +452,7 @@ def test_a_trial_that_is_not_running_any_more_is_given_the_time_for_its_end(
     assert clock[0] == pytest.approx(1000 + ENDING, abs=0.2)
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES)
     assert ending.safe_state is SafeState.NOT_CONFIRMED
-    assert ending.reason == (
-        "the record of how the trial ended was lost: 0 samples in 0 records"
-    )
+    assert ending.reason == ("the record of how the trial ended was lost: 0 samples in 0 records")
     check(recording, 10)
 
 

@@ -57,7 +57,9 @@ def cut(text: str, chance: random.Random) -> str:
 
 def scale_number(text: str, chance: random.Random) -> str:
     def scaled(found: re.Match[str]) -> str:
-        factor = chance.choice([0, -1, 10, 0.1, 1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 1e15, 1e300, 1.001])
+        factor = chance.choice(
+            [0, -1, 10, 0.1, 1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 1e15, 1e300, 1.001]
+        )
         value = float(found[0]) * factor
         whole = "." not in found[0] and "e" not in found[0].lower() and abs(factor) >= 1
         return str(int(value)) if whole and abs(value) < 1e20 else repr(value)

@@ -58,7 +58,7 @@ CHARACTERS: tuple[dict[Trouble, float], ...] = (
     {Trouble.DRIBBLE: 0.02},
     {Trouble.DEAF: 0.003},
     {Trouble.RESET: 0.003},
-    {trouble: 0.005 for trouble in Trouble},
+    dict.fromkeys(Trouble, 0.005),
 )
 """Share of the blocks that meet a trouble; a trial is some hundred blocks."""
 
