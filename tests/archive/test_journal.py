@@ -148,6 +148,12 @@ def test_what_a_line_may_say() -> None:
             model.model_validate({"at": AT, "trial": 0, "step": "s", "answer": "a", "reason": "r"})
         one = {"at": AT, "trial": 1, "step": "s", "answer": "a", "reason": "r"}
         assert model.model_validate(one).trial == 1
+    for decision in ("", "Rest", "rest\n", "x" * 41):
+        with pytest.raises(ValidationError):
+            Decision(at=AT, decision=decision, reason="warm")
+    assert Decision(at=AT, decision="stop cleared-" + "x" * 27, reason="").trial is None
+    older = {k: v for k, v in finished(1).model_dump().items() if k != "attempt"}
+    assert TrialFinished.model_validate(older).attempt == 1  # of before attempts were counted
     newer = {**finished(1).model_dump(mode="json"), "mood": "good"}
     assert TrialFinished.model_validate(newer) == finished(1)
     with pytest.raises(ValidationError):
@@ -163,14 +169,17 @@ def lines(path: Path) -> list[str]:
 
 def test_lines_are_added_and_what_was_torn_is_cut(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
+    before = os.umask(0)
     journal = Journal(path)
+    os.umask(before)
     journal.append(STARTED)
     journal.append(finished(1))
     journal.close()
     journal.close()  # once more does nothing
     whole = path.read_bytes()
     assert lines(path) == ["run started", "trial finished"]
-    assert stat.S_IMODE(path.stat().st_mode) & 0o600 == 0o600
+    if os.name == "posix":  # whatever the user lets others do
+        assert stat.S_IMODE(path.stat().st_mode) == 0o666
     path.write_bytes(whole + b'{"event": "torn')
     again = Journal(path, whole=len(whole))
     assert path.read_bytes() == whole

@@ -117,11 +117,11 @@ def test_arbitrary_input_harms_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("seed", range(2, 10))
+@pytest.mark.parametrize("seed", range(2, 6))
 def test_arbitrary_input_harms_nothing_for_long(tmp_path: Path, seed: int) -> None:
     flags = (*SANITIZE, "-O1", "-DCAMPAIGN_FUZZ_MAIN")
     program = compile_c(tmp_path / "fuzz", *SOURCES, flags=flags)
-    run(program, seed, 1_000_000, corpus(tmp_path / "corpus"))
+    run(program, seed, 250_000, corpus(tmp_path / "corpus"))
 
 
 @pytest.mark.soak
@@ -141,7 +141,7 @@ def test_libfuzzer_finds_nothing(tmp_path: Path) -> None:
     assert build.returncode == 0, build.stderr
     corpus(tmp_path / "corpus")
     done = subprocess.run(
-        [program, "-seed=1", "-runs=2000000", "-max_len=8192", "-timeout=20", tmp_path / "corpus"],
+        [program, "-seed=1", "-runs=200000", "-max_len=8192", "-timeout=20", tmp_path / "corpus"],
         cwd=tmp_path, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-5000:]
