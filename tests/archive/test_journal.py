@@ -8,6 +8,7 @@ import os
 import stat
 import threading
 from collections.abc import Callable
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,8 @@ def test_every_entry_comes_back_with_its_text() -> None:
         ENDED,
     )
     story = told(*entries)
+    with pytest.raises(FrozenInstanceError):
+        story.ended = None
     assert story.started == STARTED
     assert story.entries == entries
     assert story.text.encode() == text(*entries)
@@ -189,6 +192,20 @@ def test_lines_are_added_and_what_was_torn_is_cut(tmp_path: Path) -> None:
     kept = Journal(path)  # without a length nothing is cut
     kept.close()
     assert lines(path) == ["run started", "trial finished", "run resumed"]
+
+
+@pytest.mark.parametrize("descriptor", [0, 1, 7])
+def test_it_is_closed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, descriptor: int
+) -> None:
+    """Twice, it would be somebody else's file the second time; 0 is a file like any other."""
+    closed: list[int] = []
+    monkeypatch.setattr(os, "open", lambda *arguments: descriptor)
+    monkeypatch.setattr(os, "close", closed.append)
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal.close()
+    journal.close()
+    assert closed == [descriptor]
 
 
 def failing_once(real: Callable[..., Any], failure: Callable[[], Any]) -> Callable[..., Any]:
