@@ -72,7 +72,7 @@ class Guardian:
 
 
 def main(parent: int) -> None:
-    """Watch until the program has gone, or has to be ended."""
+    """Watch until the program has gone, or has to be ended. POSIX: Windows has no such signal."""
     guardian = Guardian()
     while True:
         due = guardian.deadline

@@ -110,7 +110,7 @@ class StopSwitch:
 
     @contextmanager
     def _guarded(self, back: int) -> Iterator[None]:
-        """With a guardian that is told of every signal at once."""
+        """With a guardian that is told of every signal at once. POSIX only."""
         theirs, ours = os.pipe()
         os.set_blocking(ours, False)
         beside = Path(__file__).with_name("guardian.py")

@@ -106,9 +106,8 @@ def _standard_errors(jacobian: Array, residuals: Array) -> tuple[Array, list[int
     flat = scale == 0.0
     scaled = jacobian / np.where(flat, 1.0, scale)
     _, singular, vt = np.linalg.svd(scaled, full_matrices=False)
-    small = singular < 1e-8 * singular[0]
-    open_directions = np.abs(vt[small]).max(axis=0, initial=0.0) > 0.1
-    undetermined = open_directions | flat
+    small = singular <= 1e-8 * singular[0]
+    undetermined = np.abs(vt[small]).max(axis=0, initial=0.0) > 0.1
     inverse = np.where(small, 0.0, 1.0 / np.where(small, 1.0, singular))
     errors = np.sqrt(variance * ((vt.T * inverse) ** 2).sum(axis=1)) / np.where(flat, 1.0, scale)
     errors[undetermined] = np.nan

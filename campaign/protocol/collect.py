@@ -17,12 +17,13 @@ from campaign.protocol.files import (
     UnreadableError,
     Within,
     count_values,
+    looked_for,
     read_source,
 )
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, nearest, validate
+from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.protocol.schema import PROTOCOL_SCHEMA, ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
@@ -172,7 +173,7 @@ def _include(
     file, name = sibling(source, written)
 
     def refuse(message: str) -> None:
-        problem = source.problem(("include", index), "value", f"'{written}': {message}")
+        problem = source.problem(("include", index), "value", f"{shown(written)}: {message}")
         collected.problems.append(problem)
 
     before = collected.chains.get(_identity(file))
@@ -188,7 +189,7 @@ def _include(
     try:
         _collect(file, name, chain, collected)
     except UnreadableError as error:
-        refuse(f"{error} (looked for {file})")
+        refuse(f"{error} {looked_for(file)}")
 
 
 def _draft(source: Source, index: int, tree: Mapping[str, Any]) -> Draft:

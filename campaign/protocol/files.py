@@ -21,6 +21,9 @@ MOST_VALUES = 200_000
 DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
 
+LONGEST_PATH = 400
+"""letters of a path that are shown."""
+
 
 class UnreadableError(Exception):
     """Why a file cannot be read as text, for the user."""
@@ -187,6 +190,12 @@ def read_text(file: Path) -> str:
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
         raise UnreadableError(f"not UTF-8 text (byte {error.start + 1}, line {line})") from None
+
+
+def looked_for(file: Path) -> str:
+    """Where a file was looked for, in a line: a name in a protocol may be of any length."""
+    text = str(file)
+    return f"(looked for {text if len(text) <= LONGEST_PATH else f'{text[:LONGEST_PATH]}...'})"
 
 
 _AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*\Z")

@@ -28,6 +28,7 @@ from campaign.protocol.files import (
     Source,
     UnreadableError,
     Within,
+    looked_for,
     read_source,
     read_text,
 )
@@ -244,7 +245,7 @@ class _Loader:
             source = read_source(file, name, newest)
         except UnreadableError as error:
             hint = nearest(file.name, _toml_files(file.parent))
-            message = f"{shown(written)}: {error} (looked for {file}){hint}"
+            message = f"{shown(written)}: {error} {looked_for(file)}{hint}"
             self._report(origin.problem(keys, "value", message))
             return None
         if not isinstance(source, Source):
@@ -270,7 +271,7 @@ class _Loader:
                 try:
                     known = Source(file, name, read_text(file), {})
                 except UnreadableError as error:
-                    message = f"{shown(written)}: {error} (looked for {file})"
+                    message = f"{shown(written)}: {error} {looked_for(file)}"
                     self._report(origin.problem(keys, "value", message))
                     return TextFile(written)
                 self.collected.sources[name] = known

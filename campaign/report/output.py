@@ -28,7 +28,8 @@ def replaced_folder(output: Path) -> Iterator[Path]:
         output.parent.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir()
-        (new / MARKER).write_text("This folder is written by campaign and replaced as a whole.\n")
+        told = "This folder is written by campaign and replaced as a whole.\n"
+        (new / MARKER).write_text(told, encoding="utf-8")
         yield new
         _swap(new, output, old)
     except OSError as error:

@@ -429,6 +429,30 @@ def test_a_sampled_integrator_late_by_a_share_of_a_sample() -> None:
     assert found.growth == pytest.approx(math.log(np.max(np.abs(roots))) * 1e3)
 
 
+@pytest.mark.parametrize("sensor", ["gyro", "encoder", "resolver"])
+@pytest.mark.parametrize(("written", "samples"), [("1.6 ms", 2), ("1.4 ms", 1), ("0.4 ms", 0)])
+def test_a_sensor_is_late_by_the_nearest_number_of_samples(
+    sensor: str, written: str, samples: int
+) -> None:
+    """At 1 kHz, in the linear loop as in the engine."""
+
+    def late(delay: str) -> Bench:
+        def edit(tree: Tree) -> None:
+            sampled(tree)
+            tree["sensors"][sensor]["delay"] = delay
+
+        return bench(edit)
+
+    exact, rounded = late(f"{samples} ms"), late(written)
+    for regime in ("stuck", "sliding"):
+        one, other = (open_loop(each, "lugre", "rate", regime) for each in (exact, rounded))  # type: ignore[arg-type]
+        np.testing.assert_array_equal(one.a, other.a)
+    push = task(command=Sine(amplitude=0.2, frequency=3.0), compensation="lugre", duration=0.2)
+    _, true = run(exact, push)
+    _, mine = run(rounded, push)
+    assert mine["gyro_rate"].tobytes() == true["gyro_rate"].tobytes()
+
+
 def test_the_sliding_loop_by_hand() -> None:
     """Ideal current loop, no friction: 180/pi Kpv (1 + 30/s) N Kt / (J s), crossing in closed form.
 

@@ -74,6 +74,20 @@ def test_a_sensors_delay_shifts_its_own_channel_by_whole_samples(late: str) -> N
             np.testing.assert_array_equal(delayed[channel], prompt[channel])
 
 
+@pytest.mark.parametrize("corner", [0.0, 2.0])
+def test_the_pointing_angle_is_the_trapezoidal_sum_of_the_gyro_readings(corner: float) -> None:
+    """Behind a high-pass of 2 Hz the sum forgets by its pole from sample to sample."""
+    swing = task(command=Sine(amplitude=0.2, frequency=3.0), duration=0.5)
+    _, out = run(sampled(pointing_high_pass=f"{corner} Hz"), swing)
+    rate, pole = out["gyro_rate"], np.exp(-2 * np.pi * corner * 1e-3)
+    expected = np.zeros(len(rate))
+    for n in range(1, len(rate)):
+        expected[n] = pole * expected[n - 1] + 0.5e-3 * (rate[n - 1] + rate[n])
+    np.testing.assert_allclose(out["pointing_angle"], expected, rtol=1e-9, atol=1e-12)
+    by_rectangles = 1e-3 * np.cumsum(rate)  # which anybody would see, half a sample away
+    assert np.max(np.abs(by_rectangles - expected)) > 1e-5
+
+
 def test_the_output_delay_holds_every_command_back() -> None:
     """2 ms at 1 kHz are two samples; before the first command the current is zero."""
     push = task(mode="torque", command=Polyline(times=(0.0,), values=(60.0,)))

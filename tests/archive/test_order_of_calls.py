@@ -1,0 +1,180 @@
+"""What makes an archive survive a power cut is an order of calls: it is recorded and held here.
+
+A kill leaves what the system was told, in any order; only a power cut shows that a sync is
+missing, and no test can cut the power. So the calls themselves are judged.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunWriter
+from campaign.archive.files import PART, write_atomically
+from campaign.archive.journal import JOURNAL
+from campaign.trial import ChannelInfo, Ending, Outcome, SafeState, Trial
+from tests.archive.recorded_calls import Call, Calls, recorded
+from tests.archives import _header, plan_of
+
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="names of open files are had from /proc"
+)
+
+AT = "2026-11-21T09:37:00Z"
+
+
+@pytest.fixture
+def trials(tmp_path: Path) -> tuple[Trial, ...]:
+    return plan_of(tmp_path).trials
+
+
+def begun(folder: Path, trials: tuple[Trial, ...]) -> RunWriter:
+    return RunWriter.create(folder / "results", _header((), folder / "results"), trials)
+
+
+def end_of(calls: Calls) -> int:
+    return len(calls.listed)
+
+
+def finish_one(writer: RunWriter, trial: Trial) -> Calls:
+    """Record a short trial; the calls from its beginning until `finish` has returned."""
+    with recorded() as calls:
+        recorder = writer.begin(trial)
+        recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
+        recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
+        ending = Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED)
+        recorder.finish(ending, AT, AT)
+    return calls
+
+
+def test_a_trial_is_on_the_disk_before_the_journal_says_so(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    """Content, then the name, then the folder, then the line, synced before `finish` ends."""
+    writer = begun(tmp_path, trials)
+    folder, journal = writer.folder, writer.folder / JOURNAL
+    calls = finish_one(writer, trials[0])
+    writer.close()
+    final = folder / "trial-00001.nxs"
+    part = final.with_name(final.name + PART)
+    calls.in_order(
+        ("fsync", part), ("rename", final), ("fsync", folder), ("write", journal),
+        ("fsync", journal),
+    )  # fmt: skip
+    assert [str(call) for call in calls.listed if call.path == final] == []  # not touched again
+    assert calls.synced_before(end_of(calls), journal)
+    (line,) = [call.data for call in calls.listed if call.path == journal and call.data]
+    assert json.loads(line)["event"] == "trial finished"
+    assert line.endswith(b"\n")
+
+
+def test_every_line_of_the_journal_is_synced_before_anybody_is_told(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    writer = begun(tmp_path, trials)
+    journal = writer.folder / JOURNAL
+    for _ in range(3):
+        with recorded() as calls:
+            writer.decision("retry", "the drive was hot", 1)
+        names = [call.name for call in calls.listed if call.path == journal]
+        assert names == ["write", "fsync"]
+    writer.close()
+
+
+def test_a_resumed_run_says_so_on_the_disk_before_it_goes_on(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    writer = begun(tmp_path, trials)
+    folder, journal = writer.folder, writer.folder / JOURNAL
+    writer.close()
+    with journal.open("ab") as file:
+        file.write(b'{"event": "torn')
+    with recorded() as calls:
+        resumed = RunWriter.resume(folder, at=AT, host={}, versions={}, command=["campaign"])
+    resumed.close()
+    calls.in_order(
+        ("truncate", journal), ("fsync", journal), ("write", journal), ("fsync", journal)
+    )
+    assert calls.synced_before(end_of(calls), journal)
+
+
+def test_a_small_file_is_synced_before_it_has_its_name_and_the_folder_after_it(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "x.json"
+    with recorded() as calls:
+        write_atomically(path, "{}")
+    part = tmp_path / f"x.json{PART}"
+    calls.in_order(("write", part), ("fsync", part), ("rename", path), ("fsync", tmp_path))
+    assert end_of(calls) == 4, calls
+
+
+def test_all_that_a_run_begins_with_is_on_the_disk_before_it_has_its_name(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    """Afterwards the results folder is synced: the run is there."""
+    with recorded() as calls:
+        writer = begun(tmp_path, trials)
+    writer.close()
+    folder = writer.folder
+    part = folder.with_name(folder.name + PART)
+    named = calls.index("rename", folder)
+    calls.index("fsync", folder.parent, named)
+    files = sorted(file.name for file in folder.iterdir())
+    assert JOURNAL in files
+    for name in files:
+        written = part / f"{name}{PART}"
+        calls.in_order(("write", written), ("fsync", written), ("rename", part / name))
+        assert calls.index("fsync", part, calls.index("rename", part / name)) < named
+        assert calls.synced_before(named, written)
+    assert not [call for call in calls.listed[:named] if call.path.is_relative_to(folder)]
+
+
+# The recorder itself
+
+
+def test_the_recorder_sees_every_way_to_write(tmp_path: Path) -> None:
+    import os
+
+    path, other = tmp_path / "a", tmp_path / "b"
+    with recorded() as calls:
+        path.write_text("x")
+        with path.open("ab") as file:
+            file.write(b"y")
+            file.flush()
+            os.fsync(file.fileno())
+        descriptor = os.open(path, os.O_WRONLY)
+        os.write(descriptor, b"z")
+        os.ftruncate(descriptor, 1)
+        os.close(descriptor)
+        path.replace(other)
+        other.rename(path)
+        path.unlink()
+        path.mkdir()
+        path.rmdir()
+        (tmp_path / "c").write_bytes(b"")
+        assert (tmp_path / "c").read_bytes() == b""
+    assert [str(call) for call in calls.listed] == [
+        "write a", "write a", "fsync a", "write a", "truncate a", "rename a -> b",
+        "rename b -> a", "unlink a", "mkdir a", "rmdir a", "write c",
+    ]  # fmt: skip
+    assert calls.listed[3] == Call("write", path, data=b"z")
+    after = end_of(calls)
+    path.write_text("not seen")
+    assert end_of(calls) == after
+
+
+def test_a_write_after_the_sync_is_no_synced_file(tmp_path: Path) -> None:
+    calls, path = Calls(), tmp_path / "a"
+    calls.add("write", path)
+    assert not calls.synced_before(1, path)
+    calls.add("fsync", path)
+    assert calls.synced_before(2, path)
+    calls.add("write", path)
+    assert not calls.synced_before(3, path)
+    with pytest.raises(AssertionError, match="no rename"):
+        calls.in_order(("write", path), ("rename", path))
