@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,10 @@ STOPPING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP"}
 @pytest.mark.parametrize(
     "number", [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
 )
-def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.Signals):
+def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.Signals, request):
     write(tmp_path, LONG)
+    # Started under nohup, a program keeps ignoring SIGHUP, as it should; this one is not.
+    request.addfinalizer(partial(signal.signal, number, signal.signal(number, signal.SIG_DFL)))
     with subprocess.Popen(
         command("run", "protocol.toml", "--report"),
         cwd=tmp_path,
