@@ -14,6 +14,10 @@ from campaign.trial import ChannelInfo, Ending, Recording, Trial
 class Samples(Protocol):
     """What a trial recorded, as one format of archives keeps it."""
 
+    @property
+    def not_kept(self) -> str:
+        """Why the samples are not there, and were not lost; empty when they are."""
+
     def recording(self, ending: Ending) -> Recording:
         """The samples, SI. Raises ArchiveError when one fails its checksum."""
 
@@ -47,6 +51,11 @@ class ArchivedTrial:
     samples: Samples = field(repr=False)
     windows: tuple[Window, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+
+    @property
+    def not_kept(self) -> str:
+        """Why it has no samples though it recorded some; empty when it has."""
+        return self.samples.not_kept
 
     def recording(self) -> Recording:
         """The samples, SI. Raises ArchiveError when something of them is not what was archived.

@@ -24,13 +24,14 @@ from campaign.archive.folder import open_folder
 from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.journal import JOURNAL, TrialFinished
 from campaign.archive.record import Trees, TrialRecord
-from campaign.archive.recorded import check_unit, series_of
+from campaign.archive.recorded import TIME, check_unit, series_of
 from campaign.archive.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.run_reader import RunReader
 from campaign.archive.seal import OUTSIDE, SealedTexts
 from campaign.archive.sealed import NOTES, read_entry, read_not_kept, read_sealed
 from campaign.archive.series import series_at
 from campaign.archive.story import Lines, read_lines
+from campaign.archive.trial_file import shown_of
 from campaign.archive.verification import (
     STRUCTURE,
     UNFINISHED,
@@ -86,7 +87,7 @@ class _Check:
         self.unreadable: set[str] = set()
         self.datasets = 0
         self.root = ""
-        self._instruments: set[int] = set()
+        self._instruments: dict[int, nexus.Described] = {}
 
     def sealed(self) -> None:
         """A sealed file: its content first, so that the hash speaks of what that does not show."""
@@ -124,12 +125,18 @@ class _Check:
             self._index(texts, story)
             told = entry_names(story.attempts)
             for entry, finished in told.items():
-                if entry in not_kept:
+                if entry in not_kept and entry not in file:
                     what = f"its samples are not kept: {not_kept[entry]}; their digests are"
                     self.remarks.add(f"/{entry}", what)
                     self._without_samples(run, entry, finished)
                 else:
                     self._trial(file, entry, entry, finished)
+            for entry in sorted(not_kept.keys() - told.keys()):
+                self.problems.add("/run/not_kept", f"names {entry!r}, and no such trial finished")
+            for entry in sorted(not_kept.keys() & told.keys()):
+                if entry in file:
+                    what = "is there, and its samples are said not to be kept"
+                    self.problems.add(f"/{entry}", what)
             for name in guarded.names(file):
                 if name not in told and name != "run":
                     known = ENTRY.fullmatch(name) is not None
@@ -204,7 +211,7 @@ class _Check:
             self.datasets += 1
             self._record(f"/{name}", entry, record, trees)
             self._says(group, record)
-            self._members(group, f"/{name}", record)
+            self._members(group, f"/{name}", record, trees)
             self._series(group, f"/{name}", record)
 
     def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
@@ -240,34 +247,45 @@ class _Check:
                 guarded.text_at(group, name, text_digest(hdf5.storable(wanted)))
                 self.datasets += 1
 
-    def _members(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+    def _members(self, group: h5py.Group, place: str, record: TrialRecord, trees: Trees) -> None:
         """What else an entry holds; what is missing or unknown is told."""
         kept = guarded.names(guarded.inner_group(group, "record"))
         wanted = set(_MEMBERS)
-        if record.samples is not None and "not_kept" not in kept:
+        if record.samples is not None and not self._left_out(group):
             wanted.add("data")
-            if not self.path.name.startswith("trial-") and nexus.follows_definition(record.series):
+            if not self._of_trial and nexus.follows_definition(record.series):
                 wanted |= set(nexus.MEMBERS)
         if record.preview is not None:
             wanted.add("preview")
         there = set(guarded.names(group))
         for name in sorted(wanted - there):
             self.problems.add(f"{place}/{name}", "is missing")
-        unknown = sorted(there - wanted) + sorted(
-            f"record/{name}" for name in set(kept) - {"json", "trees", "not_kept"}
-        )
+        ours = {"json", "trees", "not_kept"} if self._of_trial else {"json", "trees"}
+        unknown = sorted(there - wanted) + sorted(f"record/{name}" for name in set(kept) - ours)
         for name in unknown:
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
         self._by_themselves(group, place, "record", ("trees", "not_kept"))
         if set(nexus.MEMBERS) <= there & wanted:
-            self._instrument(group, place)
+            described = nexus.Described.of(trees[str(record.trial["bench"])])
+            self._instrument(group, place, described)
 
-    def _instrument(self, group: h5py.Group, place: str) -> None:
+    @property
+    def _of_trial(self) -> bool:
+        """Whether this is a trial's own file, which says itself that samples are not kept."""
+        return self.path.name.startswith("trial-")
+
+    def _left_out(self, group: h5py.Group) -> bool:
+        return self._of_trial and "not_kept" in guarded.inner_group(group, "record")
+
+    def _instrument(self, group: h5py.Group, place: str, described: nexus.Described) -> None:
         """The definition and the instrument, which trials of one bench share: each once."""
         address = h5o.get_info(guarded.inner_group(group, "instrument").id).addr
-        if address in self._instruments:
+        if self._instruments.get(address) == described:
             return
-        self._instruments.add(address)
+        self._instruments[address] = described
+        with self.problems.noting(), guarded.guarded(self.path, f"{place}/instrument"):
+            for name, what in nexus.differences(group, described):
+                self.problems.add(f"{place}/{name}", what)
         self._by_themselves(group, place, "", ("definition",))
         for inner in _places(group, "instrument", "instrument/"):
             parent, _, name = inner.rpartition("/")
@@ -287,7 +305,7 @@ class _Check:
 
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
         """The samples, each series against its digest, and that there are no others."""
-        if "not_kept" in group["record"]:
+        if self._left_out(group):
             return
         for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
@@ -302,8 +320,11 @@ class _Check:
                     guarded.text_at(data, "title", text_digest(hdf5.storable(record.label)))
                 for name in sorted(_PLOT - set(data.attrs)):
                     self.problems.add(f"{place}/{inner}@{name}", "is missing")
-                if guarded.attribute(data, "signal") not in told:
-                    self.problems.add(f"{place}/{inner}@signal", "names no channel that is there")
+                shown = [name for name in told if name != "time"]
+                if guarded.attribute(data, "signal") != shown_of(record.mode, shown):
+                    self.problems.add(f"{place}/{inner}@signal", "is not the channel to plot first")
+                if guarded.text_list(data, "axes") != ["time"]:
+                    self.problems.add(f"{place}/{inner}@axes", "is not the time")
 
     def _one_series(
         self,
@@ -319,11 +340,10 @@ class _Check:
             series.check(digest)
             self.progress(series.stored)
             self.datasets += 1
-            told = next((channel for channel in record.channels if channel.name == name), None)
-            if told is not None:
-                check_unit(series, told)
-                if guarded.attribute(series.hdf5, "long_name") != told.info.long_name:
-                    self.problems.add(f"{place}/{name}@long_name", "is not what was recorded")
+            infos = {info.name: info for info in (TIME, *record.series)}
+            check_unit(series, infos[name].unit)
+            if guarded.attribute(series.hdf5, "long_name") != infos[name].long_name:
+                self.problems.add(f"{place}/{name}@long_name", "is not what was recorded")
 
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str

@@ -10,7 +10,7 @@ from a bench without one of the required channels, is archived all the same, wit
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -57,6 +57,22 @@ def write_definition(entry: h5py.Group, bench: Described) -> None:
     hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
     # Copying costs a tenth of making, and the runs of a process share a few benches.
     h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
+
+
+def differences(entry: h5py.Group, bench: Described) -> Iterator[tuple[str, str]]:
+    """What of an entry's definition and instrument is not what the bench says: name, and what."""
+    definition = entry["definition"]
+    if definition[()] != DEFINITION.encode() or definition.attrs.get("version") != VERSION:
+        yield "definition", f"is not {DEFINITION} {VERSION}"
+    wanted: dict[str, h5py.Dataset] = {}
+    _template(bench)["instrument"].visititems(
+        lambda name, item: wanted.update({name: item} if isinstance(item, h5py.Dataset) else {})
+    )
+    for name, expected in wanted.items():
+        found = entry["instrument"].get(name)
+        same = isinstance(found, h5py.Dataset) and found[()] == expected[()]
+        if not same or found.attrs.get("units") != expected.attrs.get("units"):
+            yield f"instrument/{name}", "is not what the bench in the record says"
 
 
 _TEMPLATES = itertools.count(1)

@@ -122,6 +122,12 @@ class TrialRecord(_Part):
     estimates: tuple[Estimate, ...] = ()
 
     @property
+    def mode(self) -> str:
+        """What the bench did: `Task.mode`."""
+        task = self.trial["task"]
+        return str(task["mode"]) if isinstance(task, dict) else ""
+
+    @property
     def number(self) -> int:
         return int(self.trial["number"])  # type: ignore[arg-type]
 

@@ -19,6 +19,7 @@ from campaign.archive.series import Series, series_at
 from campaign.errors import ArchiveError
 from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording
 
+TIME = ChannelInfo("time", "s", "Time", "s")
 PLOTTED = ("data", "preview")
 """The groups of an entry that hold samples."""
 
@@ -58,7 +59,7 @@ class RecordedSamples:
             for told in channels:
                 series = series_at(data, told.name, self.record.samples or 0)
                 samples = series.read(told.sha256)
-                check_unit(series, told)
+                check_unit(series, told.unit)
                 yield told.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
@@ -73,7 +74,9 @@ class RecordedSamples:
 
     def _time(self) -> Array:
         with self._data() as data:
-            return series_at(data, "time", self.record.samples or 0).read(self.record.time)
+            series = series_at(data, TIME.name, self.record.samples or 0)
+            check_unit(series, TIME.unit)
+            return series.read(self.record.time)
 
     @contextmanager
     def _data(self) -> Iterator[h5py.Group]:
@@ -163,12 +166,12 @@ def parse_record(path: Path, place: str, text: str) -> TrialRecord:
         raise ArchiveError(f"{path}: {place}: {first_line(error)}") from None
 
 
-def check_unit(series: Series, told: SeriesRecord) -> None:
-    """ArchiveError unless a channel's dataset has the unit in which it was recorded."""
+def check_unit(series: Series, told: str) -> None:
+    """ArchiveError unless a series has the unit in which it was recorded."""
     unit = guarded.attribute(series.hdf5, "units")
-    if unit != told.unit:
+    if unit != told:
         place = f"{series.place}@units"
-        raise ArchiveError(f"{place}: is {unit!r}, and {told.unit!r} was recorded")
+        raise ArchiveError(f"{place}: is {unit!r}, and {told!r} was recorded")
 
 
 def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
@@ -183,14 +186,13 @@ def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
 
 
 def _problems(path: Path, file: h5py.File, entry_name: str, record: TrialRecord) -> Iterator[str]:
-    units = {channel.name: channel for channel in record.channels}
+    units = {info.name: info.unit for info in (TIME, *record.series)}
     for group, name, length, digest in series_of(record):
         try:
             with guarded.guarded(path, f"/{entry_name}/{group}/{name}"):
                 data = guarded.inner_group(guarded.inner_group(file, entry_name), group)
                 series = series_at(data, name, length)
                 series.check(digest)
-                if name in units:
-                    check_unit(series, units[name])
+                check_unit(series, units[name])
         except ArchiveError as error:
             yield str(error)

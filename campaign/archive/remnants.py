@@ -67,7 +67,7 @@ def clear_remnants(results: Path, run: str) -> list[Path]:
     """Remove what a killed process left of a run of which the caller holds the lock; returns it."""
     names = {path.name for path in results.iterdir()}
     cleared = []
-    for name in (f"{run}{PARTIAL}{PART}", f"{run}{SEALED}{PART}", f"{run}{PARTIAL}"):
+    for name in (f"{run}{PARTIAL}{PART}", f"{run}{PARTIAL}"):
         path = results / name
         if name not in names or not _remnant(name, names):
             continue
@@ -83,8 +83,6 @@ def clear_remnants(results: Path, run: str) -> list[Path]:
 def _remnant(name: str, names: set[str]) -> str:
     if name.endswith(PARTIAL + PART):
         return "the beginning of a run's folder, which was never finished"
-    if name.endswith(SEALED + PART):
-        return "the beginning of a sealed run, which was never finished"
     if name.endswith(PARTIAL) and name.removesuffix(PARTIAL) + SEALED in names:
         return "what is left of the folder of a run that is sealed"
     if name.startswith(".") and name.endswith(".lock"):

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from pathlib import Path
 from typing import Self
 
 from campaign.errors import UsageError
+
+_TRIES, _PAUSE = 5, 0.01
+"""times, and s between them: who lists runs holds a lock for an instant."""
 
 
 class RunLock:
@@ -33,7 +37,7 @@ class RunLock:
         path = results / f".{name}.lock"
         while True:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-            if not _lock(descriptor):
+            if not _lock_soon(descriptor):
                 os.close(descriptor)
                 raise UsageError(
                     f"{results}: another process is writing the run {name!r}; wait for its end"
@@ -58,6 +62,15 @@ def _is_still(path: Path, descriptor: int) -> bool:
         return os.path.samestat(path.stat(), os.fstat(descriptor))
     except FileNotFoundError:
         return False
+
+
+def _lock_soon(descriptor: int) -> bool:
+    """Whether it could be locked before long."""
+    for _ in range(_TRIES):
+        if _lock(descriptor):
+            return True
+        time.sleep(_PAUSE)
+    return False
 
 
 def _lock(descriptor: int) -> bool:

@@ -67,12 +67,18 @@ class SealedTexts:
             self.root = text_digest(text)
 
     def names(self, group: str) -> list[str]:
-        """What the group at `group` in `/run` holds."""
-        return guarded.names(guarded.inner_group(self._run, group))
+        """What the group at `group` in `/run` holds, or held when it was sealed."""
+        sealed = self.seal.texts if self.seal else {}
+        there = guarded.names(guarded.inner_group(self._run, group))
+        inside = f"{group}/"
+        was = (place.removeprefix(inside) for place in sealed if place.startswith(inside))
+        return sorted({*there, *was})
 
     def notes(self, prefix: str) -> list[str]:
-        """The groups of `/run` whose names begin with `prefix`."""
-        return [name for name in guarded.names(self._run) if name.startswith(prefix)]
+        """The groups of `/run` whose names begin with `prefix`; also those that were sealed."""
+        sealed = self.seal.texts if self.seal else {}
+        names = {*guarded.names(self._run), *(place.partition("/")[0] for place in sealed)}
+        return sorted(name for name in names if name.startswith(prefix))
 
     def text(self, place: str) -> str:
         """A text of `/run`, e.g. `journal/data`. Raises ArchiveError when it is damaged."""

@@ -15,7 +15,8 @@ from campaign.archive.checksums import text_digest
 from campaign.archive.damage import DamageList
 from campaign.archive.entries import ENTRY, entry_names, file_name
 from campaign.archive.full_plan import FullPlan
-from campaign.archive.header import RunHeader, RunStatus
+from campaign.archive.hdf5 import storable
+from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import RunStarted, TrialFinished
 from campaign.archive.provenance import read_provenance
 from campaign.archive.record import Trees, TrialRecord, parse_trees
@@ -25,7 +26,7 @@ from campaign.archive.run_reader import Glance, RunReader
 from campaign.archive.seal import SEAL, SealedTexts
 from campaign.archive.story import Lines, read_lines
 from campaign.errors import ArchiveError
-from campaign.trial import SafeState, Tree
+from campaign.trial import Outcome, SafeState, Tree
 
 NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
 """The texts of `/run` that are notes, but for the sources."""
@@ -42,6 +43,10 @@ def read_sealed(path: Path) -> RunReader:
         story = read_lines(damaged.read(lambda: texts.text("journal/data"), "").encode())
         note_journal(story, damaged)
         trials, earlier = _Trials.read(path, file, texts, damaged).archived(story, damaged)
+        plan: tuple[PlannedTrial, ...] = damaged.read(
+            lambda: parse_plan(path, texts.text("plan/data")), ()
+        )
+        _note_contradictions(texts, header, story, len(plan), damaged)
         return RunReader(
             path=path,
             header=header,
@@ -49,7 +54,7 @@ def read_sealed(path: Path) -> RunReader:
             reason=texts.text("outcome/reason"),
             safe_state=SafeState(texts.text("outcome/safe_state")),
             ended=damaged.read(lambda: texts.text("end_time"), ""),
-            plan=damaged.read(lambda: parse_plan(path, texts.text("plan/data")), ()),
+            plan=plan,
             trials=trials,
             journal=story.text,
             full_plan=FullPlan(path, lambda: _plan_texts(path)),
@@ -84,6 +89,40 @@ def _plan_texts(path: Path) -> tuple[str, str]:
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
         return texts.text("plan_trials/data"), texts.text("trees/data")
+
+
+def _note_contradictions(
+    texts: SealedTexts, header: RunHeader, story: Lines, planned: int, damaged: DamageList
+) -> None:
+    """Texts that say the same thing twice and do not agree: somebody changed one of them."""
+    if damaged.found:
+        return  # what cannot be read agrees with nothing
+    finished, ended = story.finished.values(), story.ended
+    failed = sum(each.outcome is not Outcome.COMPLETED for each in finished)
+    title = header.title or header.protocol_name or header.name
+    says: dict[str, str | int] = {
+        "title": title,
+        "entry_identifier": header.name,
+        "start_time": header.created,
+        "outcome/trials_finished": len(finished),
+        "outcome/trials_failed": failed,
+    }
+    if ended is not None:
+        says |= {
+            "end_time": ended.at,
+            "outcome/status": ended.status,
+            "outcome/reason": ended.reason,
+            "outcome/safe_state": ended.safe_state,
+        }
+    else:
+        damaged.add("/run/journal", "does not tell of the end of the run")
+    for place, wanted in says.items():
+        with damaged.noting():
+            read = texts.integer if isinstance(wanted, int) else texts.text
+            if read(place) != (wanted if isinstance(wanted, int) else storable(str(wanted))):
+                damaged.add(f"/run/{place}", "is not what the rest of the run says")
+    if planned != header.trials:
+        damaged.add("/run/plan", f"has {planned} trials, and the header says {header.trials}")
 
 
 def note_journal(story: Lines, damaged: DamageList) -> None:
@@ -140,7 +179,11 @@ class _Trials:
         """The trials that count, and the attempts before them by number; the rest is noted."""
         trials: list[ArchivedTrial] = []
         earlier: dict[int, list[ArchivedTrial]] = {}
-        for entry, told in entry_names(self._told(story)).items():
+        attempts = self._told(story)
+        unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
+        if unknown:
+            damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
+        for entry, told in entry_names(attempts).items():
             with damaged.noting(), guarded.guarded(self.path, f"/{entry}"):
                 archived = self._archived(entry, told)
                 if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
@@ -167,7 +210,8 @@ class _Trials:
             record, trees = read_entry(self.path, self.file, entry, told.record)
         if (record.number, record.attempt) != (told.trial, told.attempt):
             raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
-        not_kept = self.not_kept.get(entry, "")
+        # Where its samples are there, whatever is said of them, they are held against the record.
+        not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
         if entry not in self.groups and not not_kept:
             raise ArchiveError(f"{self.path}: /{entry}: is missing, and the journal tells of it")
         return archived_trial(self.path, entry, record, trees, not_kept)

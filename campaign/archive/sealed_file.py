@@ -16,7 +16,7 @@ from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.header import FORMAT, RunHeader
 from campaign.archive.journal import JOURNAL, RunEnded, Story, TrialFinished
 from campaign.archive.record import TrialRecord, parse_trees, trees_text
-from campaign.archive.recorded import PLOTTED, check_unit, parse_record, series_of
+from campaign.archive.recorded import PLOTTED, TIME, check_unit, parse_record, series_of
 from campaign.archive.run_folder import PLAN, parse_plan, read_optional, read_plan_text
 from campaign.archive.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.sealed import read_entry
@@ -158,15 +158,14 @@ def _check_layout(
     file: h5py.File, entry: str, record: TrialRecord, layouts: Mapping[str, Layout]
 ) -> None:
     """The samples lie where they were read back, with their units."""
-    told = {channel.name: channel for channel in record.channels}
+    units = {info.name: info.unit for info in (TIME, *record.series)}
     for group, name, length, _ in series_of(record):
         with guarded.guarded(Path(file.filename), f"/{entry}/{group}/{name}"):
             data = guarded.inner_group(guarded.inner_group(file, entry), group)
             series = series_at(data, name, length)
             if series.layout() != layouts[f"{entry}/{group}/{name}"]:
                 raise ArchiveError(f"{series.place}: does not lie where it was written")
-            if name in told:
-                check_unit(series, told[name])
+            check_unit(series, units[name])
 
 
 _NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/format")

@@ -82,6 +82,7 @@ class Sealer:
         self._file: SealedFile | None = None
         self._first: dict[int, TrialFinished] = {}
         self._next = 1
+        self._leave = False
 
     def add(self, finished: TrialFinished) -> None:
         """A trial's file is on the disk and the journal tells of it. Called by one thread."""
@@ -98,6 +99,7 @@ class Sealer:
 
     def discard(self) -> None:
         """Leave no file."""
+        self._leave = True
         self._stop()
         self._give_up()
 
@@ -108,7 +110,7 @@ class Sealer:
             self._thread = None
 
     def _work(self) -> None:
-        while (finished := self._queue.get()) is not None:
+        while (finished := self._queue.get()) is not None and not self._leave:
             try:
                 self._copy(finished)
             except _FAILURES:

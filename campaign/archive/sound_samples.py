@@ -33,8 +33,10 @@ def sound_part(path: Path, trial: ArchivedTrial) -> tuple[Recording | None, tupl
     Args:
         path: the run's.
 
-    None when the damage is such that no channel can be told from another.
+    None when no channel can be told from another, or when the samples were not kept.
     """
+    if trial.not_kept:
+        return None, ()
     try:
         recording = trial.recording()
     except ArchiveError as error:
@@ -50,12 +52,12 @@ def sound_part(path: Path, trial: ArchivedTrial) -> tuple[Recording | None, tupl
 
 def readable(path: Path, trials: Sequence[ArchivedTrial]) -> tuple[Trials, tuple[Damage, ...]]:
     """The trials whose every sample can be read, and what is damaged of the others."""
-    good, damaged = [], []
+    good: list[ArchivedTrial] = []
+    damaged: list[Damage] = []
     for trial in trials:
-        try:
-            whole_recording(trial)
-        except ArchiveError as error:
-            damaged.append(_of_trial(path, trial, error))
+        _, found = sound_part(path, trial)
+        if found:
+            damaged += found
         else:
             good.append(trial)
     return tuple(good), tuple(damaged)
@@ -67,10 +69,11 @@ def without_damaged(
     """What `make` makes of `trials`; of those that are whole when it meets one that is not.
 
     Returns what was made, the trials of which it was made, and what is damaged of the others. On
-    undamaged trials nothing is read but by `make`.
+    undamaged trials nothing is read but by `make`. Trials whose samples were not kept are left out.
 
     Raises ArchiveError when it meets damage even so.
     """
+    trials = tuple(trial for trial in trials if not trial.not_kept)
     try:
         return make(trials), trials, ()
     except ArchiveError:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +47,12 @@ TELLING = {
 """By a task's mode, the channel that the default plot shows; else it is the first one."""
 
 _CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
+
+
+def shown_of(mode: str, names: Sequence[str]) -> str:
+    """Of the channels that a trial recorded, the one that the default plot shows."""
+    telling = TELLING.get(mode, "")
+    return telling if telling in names else names[0]
 
 
 @dataclass(frozen=True)
@@ -87,9 +93,8 @@ class TrialFile:
             raise BackendError(f"{self._trial.name}: the channels were announced twice")
         _check_names(self._trial, channels)
         self._channels = channels
-        shown = TELLING[self._trial.task.mode]
         names = [channel.name for channel in channels]
-        self._shown = names.index(shown) if shown in names else 0
+        self._shown = names.index(shown_of(self._trial.task.mode, names))
         others = [name for name in names if name != names[self._shown]]
         data = (
             None if self._not_kept else _plot_group(self._entry, "data", names[self._shown], others)

@@ -186,8 +186,7 @@ class RunWriter:
             self._abandon_open(ended)
             self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
-            sealer, self._sealer = self._sealer, None
-            return sealer.seal() if sealer else seal_folder(self._folder)
+            return self._sealer.seal() if self._sealer else seal_folder(self._folder)
         finally:
             self.close()
 

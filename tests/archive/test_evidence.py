@@ -177,7 +177,7 @@ def edit_index(file, rng, put, effort):
     number = rng.randrange(len(lines))
     lines[number] = lines[number].replace('"samples":50', '"samples":40')
     put("run/index/data", "\n".join(lines) + "\n")
-    return Traces("/run/index", listed="" if effort == "seal" else "/run/index/data: ")
+    return Traces("/run/index", listed="/run/index: " if effort == "seal" else "/run/index/data: ")
 
 
 def exchange_records(file, rng, put, effort):
@@ -186,14 +186,15 @@ def exchange_records(file, rng, put, effort):
     one, other = '"number":1,', '"number":2,'
     assert one in text
     put("run/index/data", text.replace(one, "#").replace(other, one).replace("#", other))
-    return Traces("/run/index", listed="" if effort == "seal" else "/run/index/data: ")
+    return Traces("/run/index", listed="/run/index: " if effort == "seal" else "/run/index/data: ")
 
 
 def edit_journal(file, rng, put, effort):
     text = text_of(file, "run/journal/data")
     put("run/journal/data", text.replace('"outcome":"completed"', '"outcome":"limit"', 1))
     if effort == "seal":
-        return Traces(r"/trial_0000\d.*: has outcome 'completed', and the journal says 'limit'")
+        what = r"/trial_0000\d.*: has outcome 'completed', and the journal says 'limit'"
+        return Traces(what, listed="/run/outcome/trials_failed: ")
     return Traces("/run/journal/data: ", listed="/run/journal/data: ")
 
 
@@ -384,6 +385,7 @@ def everything_removed(file: h5py.File) -> None:
 
 def everything_said_by_another(file: h5py.File) -> None:
     put_text(file, "run/provenance/operator", "Eve")
+    put_text(file, "run/provenance/title", "A better run")
     put_text(file, "run/title", "A better run")
     reseal(file)
 
@@ -430,3 +432,87 @@ def test_a_seal_that_says_less_is_noticed(sealed, place):
         assert found[0].startswith("/run/outcome/status: was not there when the run was sealed")
     else:
         assert f"/run/{place}: is missing from the seal" in found
+
+
+def test_samples_that_are_there_are_checked_whatever_is_said_of_them(sealed):
+    """`not_kept` is not bound by the seal, so that samples may be dropped from a signed run; it
+    excuses samples that are missing, and none that are there."""
+    with h5py.File(sealed, "r+") as file:
+        scale_samples(file, "trial_00001")
+        note = file.create_group("run/not_kept")
+        note.attrs["NX_class"] = "NXnote"
+        for name in ("type", "file_name"):
+            put_text(file, f"run/not_kept/{name}", "x")
+        put_text(file, "run/not_kept/data", canonical({"trial_00001": "the disk was full"}))
+    rehash(sealed)
+    places = [damage.place for damage in verify_run(sealed).problems]
+    assert "/trial_00001" in places
+    assert "/trial_00001/data/gyro_rate" in places
+    with pytest.raises(ArchiveError, match="does not match its checksum"):
+        open_run(sealed).trials[0].recording()["gyro_rate"]
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("run/provenance/notes", "/run/provenance/notes: is missing"),
+        ("run/provenance/overrides", "/run/provenance/overrides: is missing"),
+        ("run/source_001", "/run/source_001/file_name: "),
+    ],
+)
+def test_what_was_sealed_and_is_gone_is_told_by_who_opens(sealed, place, said):
+    with h5py.File(sealed, "r+") as file:
+        del file[place]
+    rehash(sealed)
+    assert any(str(damage).startswith(said) for damage in open_run(sealed).damaged)
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("outcome/status", "interrupted"),
+        ("end_time", "2026-11-21T09:59:00Z"),
+        ("start_time", "2026-11-21T09:00:00Z"),
+        ("entry_identifier", "2026-11-21T09-36-58-another"),
+        ("title", "Another"),
+    ],
+)
+def test_texts_that_contradict_each_other_are_told_though_the_seal_fits(sealed, place, text):
+    with h5py.File(sealed, "r+") as file:
+        put_text(file, f"run/{place}", text)
+        reseal(file)
+    rehash(sealed)
+    (damage,) = open_run(sealed).damaged
+    assert damage.place == f"/run/{place}"
+    assert not verify_run(sealed).sound
+
+
+def test_a_trial_of_which_the_journal_no_longer_tells_is_told(sealed):
+    with h5py.File(sealed, "r+") as file:
+        lines = text_of(file, "run/journal/data").splitlines(keepends=True)
+        kept = [line for line in lines if '"trial":2' not in line]
+        assert len(kept) == len(lines) - 1
+        put_text(file, "run/journal/data", "".join(kept))
+        reseal(file)
+    rehash(sealed)
+    assert "/run/index" in [damage.place for damage in open_run(sealed).damaged]
+
+
+@pytest.mark.parametrize("name", ["units", "long_name"])
+def test_the_time_has_its_unit_too(sealed, name):
+    with h5py.File(sealed, "r+") as file:
+        file["trial_00001/data/time"].attrs[name] = "ms"
+    rehash(sealed)
+    assert not verify_run(sealed).sound
+    if name == "units":
+        with pytest.raises(ArchiveError, match="@units: is 'ms', and 's' was recorded"):
+            open_run(sealed).trials[0].recording()
+
+
+@pytest.mark.parametrize(("name", "value"), [("signal", "friction_torque"), ("axes", ["command"])])
+def test_what_viewers_plot_is_what_was_recorded(sealed, name, value):
+    with h5py.File(sealed, "r+") as file:
+        file["trial_00001/data"].attrs[name] = value
+    rehash(sealed)
+    (damage,) = verify_run(sealed).problems
+    assert damage.place == f"/trial_00001/data@{name}"

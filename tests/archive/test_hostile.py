@@ -112,6 +112,7 @@ def test_an_absurd_size_that_the_record_confirms_is_refused(sealed):
         data = file["trial_00001/data"]
         del data["time"]
         data.create_dataset("time", (2**50,), "<f8", chunks=(1000,), compression="gzip")
+        data["time"].attrs["units"] = "s"
         change_record(file, "trial_00001", lambda record: record.update(samples=2**50))
     refused(sealed, "/trial_00001.*: cannot be read")
 
@@ -411,6 +412,7 @@ def test_a_trial_file_that_is_gone_or_damaged_costs_only_itself(tmp_path, kit):
     writer = RunWriter.create(tmp_path, kit.header(), trials)
     for trial in trials:
         kit.record(writer, trial, 5)
+    writer.close()
     (writer.folder / "trial-00001.nxs").unlink()
     (writer.folder / "trial-00002.nxs").write_bytes(b"\x89HDF\r\n\x1a\n" * 9)
     run = listed(writer.folder, "^trial-00001.nxs: there is no such file")

@@ -21,6 +21,7 @@ class StoredSamples:
 
     path: Path
     entry: str
+    not_kept: str = ""
 
     def recording(self, ending: Ending) -> Recording:
         return read_recording(self.path, self.entry, ending)

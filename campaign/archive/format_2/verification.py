@@ -223,7 +223,7 @@ class _Check:
             consistency.check_plan(run.plan, header, executed, plan, self.problems)
             with self.problems.noting():
                 consistency.check_full_plan(
-                    run.full_plan, run.plan, f"{plan} in full", self.problems
+                    run.full_plan, run.plan, f"{plan} in full", self.problems, may_be_absent=True
                 )
         if not any(place.startswith(header_place) for place in broken):
             consistency.check_protocol(header, header_place, self.problems)
