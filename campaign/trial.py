@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, JsonValue
 
+from campaign.errors import UsageError
 from campaign.options import Options
 from campaign.signals import Signal, Zero
 
@@ -410,6 +412,14 @@ def lost_samples(first: int, time: Array) -> Event:
 def canonical_json(tree: Any) -> str:
     """JSON that is equal for equal content: sorted keys, no spaces, no NaN."""
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def trial_number(wanted: str) -> int:
+    """The number of the trial that is called so: `17`, `trial-00017`. Else UsageError."""
+    match = re.fullmatch(r"(?:trial[-_])?([0-9]{1,10})", wanted)
+    if match is None:
+        raise UsageError(f"{wanted!r} is neither the number nor the name of a trial: trial-00017")
+    return int(match[1])
 
 
 def _short(value: JsonValue) -> str:

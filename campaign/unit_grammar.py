@@ -5,6 +5,9 @@
     power   = ("^" | "**") integer | integer | superscripts        as in s^-1, cm2, min-1, m²
     separator = " " | "*" | "·" | "." | "/"
 
+Names joined by hyphens (`N-m`, `oz-in-s^2`) are a product that stands as one name, `V/oz-in` is
+`V/(ozf in)`; a power belongs to the last of them, as it does in `kgm²`.
+
 A quotient divides by the next factor alone, from left to right: `V/A/s` is `V/(A s)`, and `V/A s`
 is `(V/A) s`. Length, depth and powers are bounded, so that any text is decided at once. Nothing is
 computed but a product of exact fractions.
@@ -110,7 +113,7 @@ _TABLE: tuple[tuple[str, Fraction | int, Mapping[str, int], str, tuple[str, ...]
     ("lbf", POUND * GRAVITY, {"kg": 1, "m": 1, "s": -2}, "", ()),
     ("A", 1, {"A": 1}, "umk", ("ampere", "amperes", "amp", "amps")),
     ("V", 1, {"kg": 1, "m": 2, "s": -3, "A": -1}, "umk", ("volt", "volts")),
-    ("ohm", 1, {"kg": 1, "m": 2, "s": -3, "A": -2}, "umkM", ("Ω", "ohms")),
+    ("ohm", 1, {"kg": 1, "m": 2, "s": -3, "A": -2}, "umkM", ("Ω", "Ohm", "ohms", "Ohms")),
     ("H", 1, {"kg": 1, "m": 2, "s": -2, "A": -2}, "num", ("henry",)),
     ("F", 1, {"kg": -1, "m": -2, "s": 4, "A": 2}, "num", ("farad",)),
     ("Pa", 1, {"kg": 1, "m": -1, "s": -2}, "kMG", ("pascal",)),
@@ -136,17 +139,6 @@ _JOINED = MappingProxyType(
         "gcm": ("g", "cm"),
         "Vs": ("V", "s"),
         "mVs": ("mV", "s"),
-        **{
-            spelled: (force, length)
-            for force in ("ozf", "lbf")
-            for length in ("in", "ft")
-            for spelled in (
-                f"{force}-{length}",
-                f"{force[:2]}-{length}",  # joined by a hyphen with a length, a force is meant
-                f"{length}-{force}",
-                f"{length}-{force[:2]}",
-            )
-        },
     }
 )
 
@@ -160,6 +152,7 @@ _REASONS = MappingProxyType(
         "lb": _FORCE.format("lb"),
         "lbs": _FORCE.format("lb"),
         "mil": "a length or an angle; write in, mrad or deg",
+        "R": "a resistance or a revolution; write ohm or rev",
         "cps": "cycles or counts per second; write Hz or count/s",
     }
 )
@@ -171,7 +164,7 @@ _CHARACTERS = str.maketrans(
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 _TOKEN = re.compile(
     r"""\s*(?:
-        (?P<name>[A-Za-zΩ°%]+(?:[-_][A-Za-z]+)*|['"′″])
+        (?P<name>[A-Za-zΩ°%]+(?:[-_][A-Za-zΩ°]+)*|['"′″])
       | (?P<power>(?:\^|\*\*)\s*[-+]?[0-9]+|[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)
       | (?P<bare>-?[0-9]+)
       | (?P<sign>[*/()])
@@ -189,7 +182,7 @@ def names() -> Mapping[str, Unit]:
         found |= dict.fromkeys((name, *others), unit)
         for prefix in prefixes:
             scaled = Unit(PREFIXES[prefix] * unit.factor, unit.dimensions)
-            symbols = (name, *(other for other in others if other in ("Ω", "r")))
+            symbols = (name, *(other for other in others if other in ("Ω", "Ohm", "r")))
             found |= {prefix + symbol: scaled for symbol in symbols}
     return MappingProxyType(found)
 
@@ -302,7 +295,70 @@ def _named(name: str) -> tuple[Unit, Unit]:
         for unit in first:
             before *= unit
         return before, last
+    if "-" in name:
+        return _hyphened(name.split("-"))
     if name in _REASONS:
         raise ValueError(f"{name!r} may be {_REASONS[name]}")
-    near = [other for other in (*known, *_JOINED) if other.casefold() == name.casefold()]
-    raise ValueError(f"did you mean {near[0]!r}?" if near else f"there is no {name!r}")
+    raise UnknownNameError(name, tuple(_near(name)))
+
+
+def _hyphened(parts: list[str]) -> tuple[Unit, Unit]:
+    """As `_named`. Beside a length, ounces and pounds are forces: `oz-in`, `ft-lb`."""
+    before, last = ONE, ONE
+    for place, part in enumerate(parts):
+        beside = {*parts[max(place - 1, 0) : place], *parts[place + 1 : place + 2]}
+        force = part in ("oz", "lb", "lbs") and beside & {"in", "ft"}
+        joined, unit = _named(f"{part[:2]}f" if force else part)
+        before, last = before * last * joined, unit
+    return before, last
+
+
+class UnknownNameError(ValueError):
+    """There is no unit of that name; `near` are those that it may be a spelling of."""
+
+    def __init__(self, name: str, near: tuple[str, ...]) -> None:
+        super().__init__(f"there is no {name!r}")
+        self.name = name
+        self.near = near
+
+
+_PREFIX_SLIPS = ("Kk", "Uu", "Cc", "gG")
+"""Another case of a prefix that is the sign of no other magnitude."""
+
+
+def _near(name: str) -> Iterator[str]:
+    """Units that differ from `name` in case, but in no letter that tells magnitudes apart.
+
+    `NM` is no `nm`, and `MA` no `mA`.
+    """
+    for other in (*names(), *_JOINED):
+        parts = _JOINED.get(other, (other,))
+        if other.casefold() == name.casefold() and len("".join(parts)) == len(name):
+            place, same = 0, True
+            for part in parts:
+                slip = name[place] + part[0]
+                same &= part not in _prefixed() or slip[0] == slip[1] or slip in _PREFIX_SLIPS
+                place += len(part)
+            if same:
+                yield " ".join(parts)
+
+
+@cache
+def _prefixed() -> frozenset[str]:
+    """The names that begin with a prefix."""
+    spelled = {name for name, *_, others in _TABLE for name in (name, *others)}
+    return frozenset(names().keys() - spelled)
+
+
+def respelled(text: str, names_left: int = 4) -> Iterator[str]:
+    """The units that `text`, which is none, may be meant to be: some names in another case."""
+    try:
+        parse_unit(text)
+    except UnknownNameError as error:
+        name = re.compile(rf"(?<![A-Za-z_]){re.escape(error.name)}(?![A-Za-z_])")
+        for near in error.near if names_left else ():
+            yield from respelled(name.sub(near, text, count=1), names_left - 1)
+    except ValueError:
+        return
+    else:
+        yield text

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
-from campaign.unit_grammar import Unit, parse_unit
+from campaign.unit_grammar import Unit, parse_unit, respelled
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ class Quantity:
         except LookupError:
             raise ValueError(f"{unit!r} is not a unit of {self.name}; {self._allowed()}") from None
         except ValueError as error:
-            raise ValueError(f"{unit!r} is not a unit; {self._allowed()}; {error}") from None
+            why = self._meant(unit) or str(error)
+            raise ValueError(f"{unit!r} is not a unit; {self._allowed()}; {why}") from None
         if not math.isfinite(value):
             raise ValueError(f"{text!r} is not a finite number")
         return value
@@ -64,6 +65,16 @@ class Quantity:
         if unit.dimensions != si.dimensions:
             raise LookupError
         return float(unit.factor / si.factor)
+
+    def _meant(self, unit: str) -> str:
+        """Which unit of this quantity `unit`, which is none, may be meant to be."""
+        for near in respelled(unit):
+            try:
+                self._factor(parse_unit(near))
+            except LookupError:
+                continue
+            return f"did you mean {near!r}?"
+        return ""
 
     @property
     def example(self) -> str:
@@ -135,7 +146,10 @@ def to_si(text: str) -> float:
     try:
         return number * float(parse_unit(unit).factor)
     except ValueError as error:
-        raise ValueError(f"{unit!r} is not a unit: {error}") from None
+        near = list(respelled(unit))
+        alike = len({parse_unit(each) for each in near}) == 1
+        why = f"did you mean {near[0]!r}?" if alike else error
+        raise ValueError(f"{unit!r} is not a unit: {why}") from None
 
 
 @lru_cache(maxsize=1024)

@@ -53,6 +53,15 @@ def test_tests_and_trials_are_tables(run):
     assert list(trials["seed"]) == [view.trial.seed for view in run]
 
 
+def test_a_trial_goes_by_its_number_and_by_its_name(run):
+    for name in ("trial-00002", "trial_2", "2"):
+        assert run.trial(name).number == 2
+    with pytest.raises(UsageError, match="trial 7 is not among the 2 planned"):
+        run.trial("trial-00007")
+    with pytest.raises(UsageError, match="'second' is neither the number nor the name"):
+        run.trial("second")
+
+
 def test_a_frame_has_every_sample_of_the_archive(run):
     whole = open_run(run.path).trials[1].recording()
     frame = run.trial(2).frame()

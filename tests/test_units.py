@@ -89,6 +89,22 @@ def test_every_unit_of_the_table_against_its_published_definition():
         (units.ANGLE, "3\u03bcrad", 3e-6),  # Greek mu
         (units.RESISTANCE, "3 m\u2126", 3e-3),  # ohm sign
         (units.RESISTANCE, "3 m\u03a9", 3e-3),  # Omega
+        (units.RESISTANCE, "136 MOhm", 136e6),
+        (units.RESISTANCE, "136 mOhm", 0.136),
+        (units.RESISTANCE, "0.136 Ohms", 0.136),
+        (units.TORQUE, "1 N-m", 1.0),
+        (units.TORQUE, "1 in-lbs", 0.1129848),
+        (units.TORQUE_CONSTANT, "86 mN-m/A", 0.086),
+        (units.TORQUE_CONSTANT, "1 oz-in/A", 7.061552e-3),
+        (units.BACK_EMF_CONSTANT, "1 V-s/rad", 1.0),
+        (units.INERTIA, "1 kg-m^2", 1.0),
+        (units.INERTIA, "4 kg-cm²", 4e-4),
+        (units.INERTIA, "1 oz-in-s^2", 7.061552e-3),
+        (units.INERTIA, "1 lb-in-s2", 0.1129848),
+        (units.INERTIA, "1 lb-ft-sec^2", 1.355818),
+        (units.ROTATIONAL_DAMPING, "1 N-m-s/rad", 1.0),
+        (units.ROTATIONAL_DAMPING, "1 Nm-s/°", 57.29578),
+        (units.CURRENT_INTEGRAL_GAIN, "1 V/A-s", 1.0),
         (units.LENGTH, "+.5e1 mm", 5e-3),
     ],
 )
@@ -140,6 +156,42 @@ def test_what_data_sheets_print(quantity: Quantity, text: str, value: float):
 def test_what_is_refused_and_why(quantity: Quantity, text: str, message: str):
     with pytest.raises(ValueError, match=message):
         quantity.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text", "meant"),
+    [
+        (units.TORQUE_CONSTANT, "1 NM/A", "N m/A"),
+        (units.TORQUE_CONSTANT, "1 N-M/a", "N-m/A"),
+        (units.TORQUE_CONSTANT, "1 mNM/A", "mN m/A"),
+        (units.FREQUENCY, "1 KHZ", "kHz"),
+        (units.FREQUENCY, "1 MHZ", "MHz"),
+        (units.RESISTANCE, "1 MOHM", "Mohm"),
+        (units.LENGTH, "1 NM", None),  # nano is no N
+        (units.TORQUE, "1 NM", "N m"),
+        (units.TORQUE, "1 nM", "N m"),
+        (units.CURRENT, "1 MA", None),
+        (units.INDUCTANCE, "1 MH", None),
+        (units.RESISTANCE, "1 r", None),
+        (units.RESISTANCE, "1 M", None),
+        (units.RESISTANCE, "0.136 R", None),
+    ],
+)
+def test_another_case_is_proposed_where_it_is_the_same_unit(
+    quantity: Quantity, text: str, meant: str | None
+):
+    with pytest.raises(ValueError, match="is not a unit") as raised:
+        quantity.parse(text)
+    proposed = re.findall("did you mean '(.*)'", str(raised.value))
+    assert proposed == ([] if meant is None else [meant])
+    assert ("write ohm" in str(raised.value)) == text.endswith("R")
+
+
+def test_without_a_quantity_only_the_one_meaning_is_proposed():
+    with pytest.raises(ValueError, match="did you mean 'N m/A'"):
+        to_si("1 NM/A")
+    with pytest.raises(ValueError, match="there is no 'nM'"):  # nm, or N m
+        to_si("1 nM")
 
 
 def test_any_unit_that_a_quantity_names_is_its_own():

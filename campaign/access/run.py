@@ -16,7 +16,7 @@ from campaign.archive import RunHeader, RunReader, RunStatus
 from campaign.archive.damage import Damage
 from campaign.archive.damage_words import in_words, lost_trials, of_test
 from campaign.errors import ArchiveError, UsageError
-from campaign.trial import Outcome
+from campaign.trial import Outcome, trial_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,11 +101,12 @@ class RunView:
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(views) or 'none'}"
         raise UsageError(f"{self.name}: there is no test {name!r}; {hint}")
 
-    def trial(self, number: int) -> TrialView:
-        """The trial of that number.
+    def trial(self, number: int | str) -> TrialView:
+        """The trial of that number, or of that name: `trial-00017`.
 
         Raises UsageError when it was not executed, ArchiveError when it was and cannot be read.
         """
+        number = trial_number(number) if isinstance(number, str) else number
         for archived in self.archive.trials:
             if archived.trial.number == number:
                 return TrialView(archived, damaged=self.damaged)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import tempfile
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.protocol.files import UnreadableError, read_source, read_text
+from campaign.protocol.files import Source, UnreadableError, read_source, read_text
 from campaign.protocol.migrations import Change, Kind, kind_of, migrate, newest
 
 
@@ -24,7 +29,8 @@ def migrate_files(files: Sequence[Path], output: Path | None, *, check: bool) ->
         why = "is there already" if output.exists() else "is one file; migrate one at a time"
         raise UsageError(f"--output {output}: {why}")
     left = False
-    for file, (kind, text, changes) in [(file, migrated(file)) for file in files]:
+    found = [(file, migrated(file)) for file in files]
+    for file, (kind, text, changes) in found:
         by_hand = any(change.by_hand for change in changes)
         left |= by_hand or (check and bool(changes))
         for change in changes:
@@ -36,14 +42,16 @@ def migrate_files(files: Sequence[Path], output: Path | None, *, check: bool) ->
         elif not check and (changes or output is not None):
             _write(output or file, text)
             print_line(f"{output or file}: {kind} schema {newest(kind)} now")
+    # When every file is written: a bench may be given together with its protocols.
+    for file in [file for file, (kind, *_) in found if kind == "protocol"]:
+        if older := _older_benches(file):
+            names = ", ".join(older)
+            print_note(f"{file}: names benches of an older schema; migrate them, too: {names}")
     return ExitCode.TRIALS_FAILED if left else ExitCode.DONE
 
 
 def migrated(file: Path) -> tuple[Kind, str, list[Change]]:
     """What kind of file it is, its text in the present schema, and what had to change."""
-    import tomlkit
-    from tomlkit.exceptions import TOMLKitError
-
     try:
         source = read_source(file, file.name)
         written = read_text(file)
@@ -55,19 +63,124 @@ def migrated(file: Path) -> tuple[Kind, str, list[Change]]:
     if isinstance(source, list):
         raise ProtocolError(source)
     text = written.replace("\r\n", "\n")
+    values = tomllib.loads(text)
+    changes = migrate(values, kind)
+    if not changes or any(change.by_hand for change in changes):
+        return kind, written, changes
+    try:
+        text = _edited(text, kind, {**values, "schema": newest(kind)})
+    except _NotEditableError as error:
+        return kind, written, [_by_hand(change, str(error)) for change in changes]
+    return kind, text.replace("\n", "\r\n") if "\r\n" in written else text, changes
+
+
+class _NotEditableError(Exception):
+    """Why the text of a file cannot be rewritten without losing something of it."""
+
+
+def _by_hand(change: Change, why: str) -> Change:
+    return replace(change, what=f"{change.what}; {why}", by_hand=True)
+
+
+_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?"""+|"(?:\\.|[^"\\\n])*"'
+    r"|'''.*?'''+|'[^'\n]*'"
+    r"|(?P<comment>#[^\n]*)",
+    re.S,
+)
+"""A string, which may have a # in it, or a comment."""
+
+
+def _edited(text: str, kind: Kind, values: dict[str, Any]) -> str:
+    """`text` with `values` and all of its comments. Raises _NotEditableError.
+
+    Comments are numbered while it is edited, so that each is known again. One behind a value that
+    the edit drops gets a line of its own before it.
+    """
+    comments = [match["comment"] for match in _COMMENT.finditer(text) if match["comment"]]
+    numbers = iter(range(len(comments)))
+    text = _COMMENT.sub(lambda m: f"#{next(numbers)}" if m["comment"] else m[0], text)
+    new = _migrated_text(text, kind)
+    if lost := set(range(len(comments))) - set(_numbers(new)):
+        new = _migrated_text(_above(text, lost), kind)
+    if sorted(_numbers(new)) != list(range(len(comments))):
+        raise _NotEditableError("a comment would be lost")
+    new = _COMMENT.sub(lambda m: comments[int(m[0][1:])] if m["comment"] else m[0], new)
+    if _comparable(tomllib.loads(new)) != _comparable(values):
+        raise _NotEditableError(_FORM)
+    return new
+
+
+_FORM = "its keys are written in a form that cannot be edited"
+
+
+def _migrated_text(text: str, kind: Kind) -> str:
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
     try:
         document = tomlkit.parse(text)
-    except TOMLKitError as error:  # what tomllib accepts, and this does not
-        raise UsageError(f"{file}: cannot be edited: {error}") from None
-    changes = migrate(document, kind)
-    if not changes:
-        return kind, written, changes
-    if "schema" in document:
-        document["schema"] = newest(kind)
-        text = document.as_string()
-    else:
-        text = f"schema = {newest(kind)}\n{document.as_string()}"
-    return kind, text.replace("\n", "\r\n") if "\r\n" in written else text, changes
+        migrate(document, kind)
+        if "schema" in document:
+            document["schema"] = newest(kind)
+            new = document.as_string()
+        else:
+            new = f"schema = {newest(kind)}\n{document.as_string()}"
+        tomllib.loads(new)
+    except (TOMLKitError, LookupError, ValueError, TypeError, AttributeError, AssertionError):
+        raise _NotEditableError(_FORM) from None  # what tomllib accepts, and tomlkit does not
+    return new
+
+
+def _numbers(text: str) -> Iterator[int]:
+    for match in _COMMENT.finditer(text):
+        if match["comment"]:
+            yield int(match["comment"][1:])
+
+
+def _above(text: str, lost: set[int]) -> str:
+    """`text` with those comments, each behind a value, on a line before it."""
+    lines = []
+    for line in text.split("\n"):
+        match = re.fullmatch(r"(\s*)(\S.*?)\s*#([0-9]+)", line)
+        if match is not None and int(match[3]) in lost:
+            lines += [f"{match[1]}#{match[3]}", match[1] + match[2]]
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def _comparable(values: dict[str, Any]) -> str:
+    """Equal for equal values, NaN included, whatever the order of keys."""
+    return json.dumps(values, sort_keys=True, default=repr)
+
+
+def _older_benches(file: Path) -> list[str]:
+    """The benches of a protocol, as it names them, that have former spellings."""
+    older = []
+    for name in dict.fromkeys(_bench_names(tomllib.loads(read_text(file)))):
+        try:
+            bench = read_source(file.parent / name, name)
+        except UnreadableError:
+            continue  # loading the protocol says so
+        if isinstance(bench, Source):
+            given = bench.tree.get("schema", 1)
+            if isinstance(given, int) and given >= 1 and migrate(bench.tree, "bench"):
+                older.append(name)
+    return older
+
+
+def _bench_names(value: Any) -> Iterator[str]:
+    """Every bench that is named by its file, wherever in a protocol."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _bench_names(item)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            if key == "bench" and isinstance(item, str) and re.search(r"[/\\]|\.toml$", item):
+                yield item
+            else:
+                yield from _bench_names(item)
 
 
 def _say(file: Path, change: Change, *, planned: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.comparison import differences
 from campaign.policy import Policy
-from campaign.trial import Recording
+from campaign.trial import Recording, trial_number
 
 SIM = "sim"
 
@@ -67,10 +66,7 @@ def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
 
     Raises UsageError when there is none, ArchiveError when it cannot be read.
     """
-    match = re.fullmatch(r"(?:trial[-_])?([0-9]{1,10})", wanted)
-    if match is None:
-        raise UsageError(f"{wanted!r} is neither the number nor the name of a trial: trial-00017")
-    number = int(match.group(1))
+    number = trial_number(wanted)
     for archived in run.trials:
         if archived.trial.number == number:
             return archived

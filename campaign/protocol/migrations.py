@@ -129,11 +129,16 @@ def _protocol_by_path(protocol: Document) -> Iterator[Change]:
 
 
 def _swept(matrix: Document, place: str) -> Iterator[Change]:
-    for path in list(_flat(matrix)):
+    given = list(_flat(matrix))
+    for path in given:
         if path == _OLD_TRIAL:
             what = f"is a table of the bench now: give it there, and sweep {_JOINT} if it has one"
             yield Change(f"{place}.{path}", what, by_hand=True)
         if path not in _PATHS:
+            continue
+        if _PATHS[path] in given:
+            what = f"is given as {_PATHS[path]}, too; remove one of them"
+            yield Change(f"{place}.{path}", what, by_hand=True)
             continue
         if path not in matrix:
             what = f"is {_PATHS[path]} now; written as tables, it is left to you"

@@ -126,6 +126,12 @@ def test_the_text_says_what_the_migrated_values_are(tmp_path: Path, text, kind, 
             PROTOCOL.replace('"bench.variation.static_torque"', "bench.variation.static_torque"),
             "written as tables, it is left to you",
         ),
+        (
+            PROTOCOL.replace(
+                "cycles =", '"bench.variation.day_to_day.static_torque" = [0.5]\ncycles ='
+            ),
+            "matrix.bench.variation.static_torque: BY HAND: is given as bench.variation.day_to_day",
+        ),
     ],
 )
 def test_what_a_person_must_decide_is_said_and_nothing_is_written(
@@ -203,3 +209,49 @@ def test_a_migrated_document_is_still_one_of_tomlkit():
     document = tomlkit.parse(FORMER)
     migrate(document, "bench")
     Bench.model_validate(tomllib.loads(document.as_string()))
+
+
+DOTTED = """\
+variation.coulomb_torque = 0.05
+variation.trial = 0
+motor.x = 1
+gear.preload.static_share = 0
+"""
+
+
+@pytest.mark.parametrize("lines", [DOTTED.splitlines(), DOTTED.splitlines()[::-1]])
+def test_dotted_keys_are_migrated_or_left_to_a_person(tmp_path: Path, capsys, lines):
+    text = "\n".join(lines)
+    path = file(tmp_path, text)
+    code = migrate_files([path], None, check=False)
+    if code is ExitCode.TRIALS_FAILED:
+        assert path.read_text(encoding="utf-8") == text
+        assert "variation.coulomb_torque: BY HAND" in capsys.readouterr().out
+    else:
+        plain = tomllib.loads(text)
+        migrate(plain, "bench")
+        assert tomllib.loads(path.read_text(encoding="utf-8")) == {**plain, "schema": 2}
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_comment_on_a_line_that_goes_gets_a_line_of_its_own(tmp_path: Path, end: str):
+    text = FORMER.replace("viscous_friction = 0.01", "viscous_friction = 0 # not measured", 1)
+    text = text.replace("static_torque = 0.02", 'static_torque = 0.02 # a "quoted" # one')
+    text = text.replace("trial = 0.002", "trial = 0.002 # not measured")
+    path = file(tmp_path, text.replace("\n", end))
+    assert migrate_files([path], None, check=False) is ExitCode.DONE
+    lines = path.read_bytes().decode().split(end)
+    assert lines.count("# not measured") == 1
+    assert "relative = 0.002 # not measured" in lines
+    assert 'static_torque = 0.02 # a "quoted" # one' in lines
+    kept = [line.partition("#")[2] for line in text.splitlines() if "#" in line]
+    assert sorted(kept) == sorted(line.partition("#")[2] for line in lines if "#" in line)
+
+
+def test_a_protocol_says_which_of_its_benches_are_left_behind(tmp_path: Path, capsys):
+    bench, path = file(tmp_path, FORMER), file(tmp_path, PROTOCOL, "days.toml")
+    said = "days.toml: names benches of an older schema; migrate them, too: own.toml"
+    assert migrate_files([path], None, check=False) is ExitCode.DONE
+    assert said in capsys.readouterr().err
+    assert migrate_files([path, bench], None, check=False) is ExitCode.DONE
+    assert "older schema" not in capsys.readouterr().err
