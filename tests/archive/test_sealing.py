@@ -527,8 +527,9 @@ def test_a_run_that_has_not_ended_is_not_sealed(tmp_path, kit):
     for trial in trials:
         kit.record(writer, trial, 50)
     writer.close()
-    with pytest.raises(ArchiveError, match=r"journal\.jsonl: the run has not ended; every fin"):
+    with pytest.raises(ArchiveError) as caught:
         sealing.seal_folder(writer.folder)
+    assert f"{writer.folder / JOURNAL}: the run has not ended; every" in str(caught.value)
     assert not list(tmp_path.glob("*.nxs*"))
     assert len(open_run(writer.folder).trials) == 3
 
