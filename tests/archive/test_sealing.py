@@ -22,7 +22,7 @@ from campaign.archive.series import Series
 from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError
 from campaign.trial import Ending, Outcome
-from tests.archive.forging import canonical, put_text, sha256, text_of
+from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of
 
 WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well
 PROTOCOL = {"tests": [{"name": "map"}]}
@@ -170,6 +170,46 @@ def test_a_text_that_changed_between_writing_and_checking_is_found(
     for trial in trials:
         kit.record(writer, trial, 50)
     refused(writer, f"/{place}: does not match its checksum")
+
+
+def put_seal(opened: h5py.File) -> None:
+    put_text(opened, "run/outcome/seal", text_of(opened, "run/outcome/seal") + " ", honest=True)
+
+
+def put_count(opened: h5py.File) -> None:
+    put_integer(opened, "run/outcome/trials_finished", 2)
+
+
+def lose_trial(opened: h5py.File) -> None:
+    del opened["trial_00002"]
+
+
+def put_unit(opened: h5py.File) -> None:
+    opened["trial_00003/data/command"].attrs["units"] = "deg/s"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (put_seal, "/run/outcome/seal: does not match its checksum"),
+        (put_count, "/run/outcome/trials_finished: does not match its checksum"),
+        (lose_trial, "/trial_00002"),
+        (put_unit, "/trial_00003/data/command@units: is 'deg/s', and 'rad/s' was recorded"),
+    ],
+)
+def test_whatever_is_not_as_it_was_written_is_not_sealed(tmp_path, kit, monkeypatch, change, told):
+    real = sealed_file.check_sealed
+
+    def check(part, file):
+        with h5py.File(part, "r+") as opened:
+            change(opened)
+        real(part, file)
+
+    monkeypatch.setattr(sealing, "check_sealed", check)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    refused(writer, told)
 
 
 def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, monkeypatch):
