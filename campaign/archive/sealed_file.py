@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -35,17 +36,18 @@ class SealedFile:
     Attributes:
         copied: what was copied, by the name of its group.
         layouts: where the samples lie that were read back, by the path of their dataset.
+        not_kept: why an attempt has only its record, by the name that its group would have.
     """
 
     def __init__(self, part: Path) -> None:
         self.copied: dict[str, TrialFinished] = {}
         self.layouts: dict[str, Layout] = {}
+        self.not_kept: dict[str, str] = {}
         self._part = part
         self._lines: dict[str, str] = {}
         self._trees: dict[str, Tree] = {}
-        self._not_kept: dict[str, str] = {}
         self._instruments: dict[nexus.Described, str] = {}
-        self._hash_place = (0, 0)
+        self._hash_place: tuple[int, int]  # once it is finished
         self._file = hdf5.create_file(part)
 
     def is_part_of(self, wanted: Mapping[str, TrialFinished]) -> bool:
@@ -66,7 +68,7 @@ class SealedFile:
             record = parse_record(path, f"/{name}/record", line)
             trees = parse_trees(guarded.unchecked_text_at(own, "trees"))
             if "not_kept" in own:
-                self._not_kept[entry] = guarded.text_at(own, "not_kept")
+                self.not_kept[entry] = guarded.text_at(own, "not_kept")
             else:
                 hdf5.copy_entry(source, name, self._file, entry)
                 self._describe(entry, record, trees)
@@ -86,8 +88,8 @@ class SealedFile:
             run = hdf5.make_group(file, "run", "NXentry")
             for place, text in texts.items():
                 _put(run, place, text, header)
-            if self._not_kept:
-                not_kept = canonical_json(self._not_kept)
+            if self.not_kept:
+                not_kept = canonical_json(self.not_kept)
                 for name, text in _note("application/json", "not-kept.json", not_kept).items():
                     _put(run, f"not_kept/{name}", text, header)
             _put(run, SEAL, seal_text(header.name, texts), header)
@@ -149,7 +151,7 @@ def check_sealed(part: Path, file: SealedFile) -> None:
         for place in _NUMBERS:
             texts.integer(place)
         for entry, finished in file.copied.items():
-            if entry in opened:
+            if entry not in file.not_kept:
                 record, _ = read_entry(part, opened, entry, finished.record)
                 _check_layout(opened, entry, record, file.layouts)
 
@@ -228,10 +230,10 @@ def _put(run: h5py.Group, place: str, text: str | int, header: RunHeader) -> Non
         hdf5.put_text(group, name, text)
 
 
-def _by_number(entry: str) -> tuple[int, int]:
+def _by_number(entry: str) -> tuple[int, float]:
     """The order of trials, an earlier attempt before the one that counts."""
     _, number, *attempt = entry.split("_")
-    return int(number), int(attempt[1]) if attempt else 1 << 62
+    return int(number), int(attempt[1]) if attempt else math.inf
 
 
 def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:

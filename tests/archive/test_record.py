@@ -15,6 +15,7 @@ from campaign.archive.record import (
     TrialRecord,
     make_record,
     parse_trees,
+    plain,
     shared_trees,
     trees_text,
 )
@@ -168,3 +169,134 @@ def test_samples_that_were_not_kept_have_their_digests_and_say_why(tmp_path, kit
         told = json.loads(archived.samples.record.text)["channels"]
         assert len({channel["sha256"] for channel in told}) == len(kit.CHANNELS)
         assert len(run.trials[1].recording().time) == 10
+
+
+def test_a_record_is_written_as_the_format_says(record, kit):
+    """Every field under its name, what is as usual left out."""
+    tree = json.loads(record.text)
+    trial = tree.pop("trial")
+    assert trial["number"] == 7
+    assert record.tree_names == {trial["bench"], trial["options"]}
+    assert tree == {
+        "label": kit.trial(7).label,
+        "fingerprint": kit.trial(7).fingerprint,
+        "attempt": 3,
+        "started": kit.STARTED,
+        "ended": kit.ENDED,
+        "outcome": "fault",
+        "reason": "no word for 1 s: «ü»",
+        "safe_state": SafeState.NOT_CONFIRMED.value,
+        "fault": Fault.LOST_CONNECTION.value,
+        "telemetry": {"latency_ms": {"most": 4.5, "mean": "nan"}, "resends": 3},
+        "samples": 40_000,
+        "time": "0" * 64,
+        "channels": [
+            {
+                "name": "gyro_rate",
+                "unit": "rad/s",
+                "label": "Rate",
+                "display_unit": "deg/s",
+                "own_rate": 8000.0,
+                "sha256": "1" * 64,
+            },
+            {
+                "name": "torque",
+                "unit": "N m",
+                "label": "Torque",
+                "display_unit": "N m",
+                "measured": False,
+                "sha256": "2" * 64,
+            },
+        ],
+        "preview": {
+            "channel": "gyro_rate",
+            "samples": 20_000,
+            "time": "3" * 64,
+            "values": "4" * 64,
+        },
+        "events": [{"time": 0.25, "text": "the load breaks away ↗"}],
+        "windows": [{"name": "steady", "start": 0.5, "stop": 1.75}],
+        "estimates": [
+            {
+                "name": "coulomb_torque",
+                "value": 0.25,
+                "unit": "N m",
+                "low": 0.2,
+                "high": 0.3,
+                "level": 0.95,
+                "method": "bootstrap",
+            },
+            {
+                "name": "stribeck_rate",
+                "value": 5e-324,
+                "unit": "rad/s",
+                "reason": "one run only",
+            },
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("place", "least_value"), [("attempt", 1), ("samples", 0), ("preview.samples", 0)]
+)
+def test_counts_have_their_least_value(record, place, least_value):
+    def with_count(count: int) -> dict[str, object]:
+        tree = json.loads(record.text)
+        *outer, name = place.split(".")
+        (tree[outer[0]] if outer else tree)[name] = count
+        return tree
+
+    TrialRecord.model_validate(with_count(least_value))
+    with pytest.raises(ValueError, match="greater than or equal to"):
+        TrialRecord.model_validate(with_count(least_value - 1))
+
+
+def test_a_record_cannot_be_changed(record):
+    """Its text and its digest are made once."""
+    for part, field in ((record, "attempt"), (record.channels[0], "unit")):
+        with pytest.raises(ValueError, match="frozen"):
+            setattr(part, field, None)
+    assert record.text is record.text
+
+
+class _Odd:
+    def __str__(self) -> str:
+        return "odd"
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        (None, None),
+        (True, True),
+        (np.bool_(True), True),
+        (3, 3),
+        (np.int32(3), 3),
+        (0.5, 0.5),
+        (np.float32(0.5), 0.5),
+        (float("inf"), "inf"),
+        (np.float64("-inf"), "-inf"),
+        ("text", "text"),
+        (np.str_("text"), "text"),
+        ((1, [2.0, None]), [1, [2.0, None]]),
+        (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]]),
+        ({1: {"a": (np.nan,)}}, {"1": {"a": ["nan"]}}),
+        (_Odd(), "odd"),
+        (b"bytes", "b'bytes'"),
+        ({"a"}, "{'a'}"),
+    ],
+)
+def test_whatever_a_backend_measured_of_itself_becomes_json(value, told):
+    found = plain(value)
+    assert found == told
+    assert type(found) is type(told)
+    assert json.loads(json.dumps(found, allow_nan=False)) == told
+
+
+def test_trees_stand_in_the_order_of_their_digests_however_they_came(kit):
+    _, trees = shared_trees(kit.trial(1))
+    backwards = dict(sorted(trees.items(), reverse=True))
+    lines = trees_text(backwards).splitlines()
+    assert [json.loads(line)["sha256"] for line in lines] == sorted(trees)
+    with pytest.raises(ValueError, match="line 2 does not match"):
+        parse_trees("\n".join([lines[0], lines[1][:-1]]))

@@ -4,6 +4,7 @@ when.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,12 +16,13 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, open_run, sealed_file, sealing
 from campaign.archive import hdf5 as hdf5_module
 from campaign.archive.header import PARTIAL
+from campaign.archive.journal import JOURNAL, TrialFinished, read_journal
 from campaign.archive.run_folder import SEALING
 from campaign.archive.series import Series
 from campaign.archive.verification import verify_run
 from campaign.errors import ArchiveError
 from campaign.trial import Ending, Outcome
-from tests.archive.forging import canonical, put_text, sha256, text_of
+from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of
 
 WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well
 PROTOCOL = {"tests": [{"name": "map"}]}
@@ -168,6 +170,46 @@ def test_a_text_that_changed_between_writing_and_checking_is_found(
     for trial in trials:
         kit.record(writer, trial, 50)
     refused(writer, f"/{place}: does not match its checksum")
+
+
+def put_seal(opened: h5py.File) -> None:
+    put_text(opened, "run/outcome/seal", text_of(opened, "run/outcome/seal") + " ", honest=True)
+
+
+def put_count(opened: h5py.File) -> None:
+    put_integer(opened, "run/outcome/trials_finished", 2)
+
+
+def lose_trial(opened: h5py.File) -> None:
+    del opened["trial_00002"]
+
+
+def put_unit(opened: h5py.File) -> None:
+    opened["trial_00003/data/command"].attrs["units"] = "deg/s"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (put_seal, "/run/outcome/seal: does not match its checksum"),
+        (put_count, "/run/outcome/trials_finished: does not match its checksum"),
+        (lose_trial, "/trial_00002"),
+        (put_unit, "/trial_00003/data/command@units: is 'deg/s', and 'rad/s' was recorded"),
+    ],
+)
+def test_whatever_is_not_as_it_was_written_is_not_sealed(tmp_path, kit, monkeypatch, change, told):
+    real = sealed_file.check_sealed
+
+    def check(part, file):
+        with h5py.File(part, "r+") as opened:
+            change(opened)
+        real(part, file)
+
+    monkeypatch.setattr(sealing, "check_sealed", check)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    refused(writer, told)
 
 
 def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, monkeypatch):
@@ -415,3 +457,166 @@ def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
     path = seal(resumed)
     assert there() == notes
     assert verify_run(path).sound
+
+
+def open_files(folder: Path) -> list[str]:
+    """What this process has open there; a file that was removed counts."""
+    found = []
+    for link in Path("/proc/self/fd").glob("*"):
+        with contextlib.suppress(OSError):
+            found.append(str(link.readlink()))
+    return [name for name in found if name.startswith(str(folder))]
+
+
+def finished_in(writer: RunWriter) -> list[TrialFinished]:
+    return list(read_journal(writer.folder / JOURNAL).files)
+
+
+@pytest.mark.parametrize(("short", "copied"), [(0, ALL[:1]), (1, [])])
+def test_beside_the_trials_is_copied_as_long_as_room_is_left_for_them(
+    tmp_path, kit, monkeypatch, short, copied
+):
+    """A trial and its copy, and what stays free: to the byte."""
+    writer, (trial, *_) = begin(tmp_path, kit)
+    kit.record(writer, trial, 50)
+    writer._sealer.discard()
+    (finished,) = finished_in(writer)
+    free = sealing._FREE + 2 * finished.bytes - short
+    monkeypatch.setattr(sealing.shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
+    watched = Watched(monkeypatch, wait_for=1)
+    sealer = sealing.Sealer(writer.folder)
+    sealer.add(finished)
+    sealer._stop()
+    assert watched.beside == copied
+    sealer.discard()
+    writer.close()
+
+
+def test_one_thread_copies_that_keeps_no_process_alive(tmp_path, kit):
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    thread = writer._sealer._thread
+    assert (thread.name, thread.daemon) == ("sealer", True)
+    kit.record(writer, trials[1], 50)
+    assert writer._sealer._thread is thread
+    seal(writer)
+    assert not thread.is_alive()
+
+
+def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    writer._sealer.discard()
+    writer._sealer.discard()
+    assert writer._sealer._thread is None
+    assert not (writer.folder / SEALING).exists()
+    assert not [name for name in open_files(writer.folder) if SEALING in name]
+    sealer = sealing.Sealer(writer.folder)
+    watched = Watched(monkeypatch, wait_for=1)
+    sealer.add(*finished_in(writer))
+    assert watched.reached.wait(WAIT)
+    sealer.discard()
+    assert watched.beside == ALL[:1]
+    writer.close()
+
+
+def test_after_a_failure_nothing_more_is_copied_beside(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch, wait_for=3)
+    watched.failures.append(OSError(28, "No space left on device"))
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    writer_thread_done(writer)
+    for trial in trials[1:]:
+        kit.record(writer, trial, 50)
+    assert not (writer.folder / SEALING).exists()
+    path = seal(writer)
+    assert (watched.beside, watched.at_the_end) == ([], ALL)
+    assert verify_run(path).sound
+
+
+def test_what_did_not_complete_waits_for_the_end_and_holds_nobody_up(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch, wait_for=2)
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], 50)
+    kit.record(writer, trials[1], None)
+    kit.record(writer, trials[2], 50)
+    assert watched.reached.wait(WAIT)
+    assert watched.beside == ["trial_00001", "trial_00003"]
+    path = seal(writer)
+    assert watched.at_the_end == ["trial_00002"]
+    assert verify_run(path).sound
+
+
+def test_a_later_attempt_that_completed_waits_for_the_end(tmp_path, kit, monkeypatch):
+    """Another one may follow; and copies stand in the order of the plan."""
+    writer, trials = begin(tmp_path, kit)
+    kit.record(writer, trials[0], None)
+    kit.record(writer, trials[0], 50)
+    writer._sealer.discard()
+    first, second = finished_in(writer)
+    watched = Watched(monkeypatch, wait_for=1)
+    sealer = sealing.Sealer(writer.folder)
+    sealer.add(second)  # as if the journal had lost the first one
+    sealer._stop()
+    assert (watched.copied, first.attempt, second.attempt) == ([], 1, 2)
+    writer.close()
+
+
+def test_a_run_that_has_not_ended_is_not_sealed(tmp_path, kit):
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    writer.close()
+    with pytest.raises(ArchiveError) as caught:
+        sealing.seal_folder(writer.folder)
+    assert f"{writer.folder / JOURNAL}: the run has not ended; every" in str(caught.value)
+    assert not list(tmp_path.glob("*.nxs*"))
+    assert len(open_run(writer.folder).trials) == 3
+
+
+@pytest.mark.parametrize("step", ["copy", "finish", "put_hash"])
+def test_a_refusal_leaves_no_file_open(tmp_path, kit, monkeypatch, step):
+    def fail(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sealing.Sealer, "add", lambda self, finished: None)
+    monkeypatch.setattr(sealed_file.SealedFile, step, fail)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    before = open_files(tmp_path)
+    with pytest.raises(ArchiveError) as caught:
+        seal(writer)
+    told = f"could not be sealed: No space left on device; every finished trial is in {tmp_path}"
+    assert told in str(caught.value)
+    assert not [name for name in open_files(tmp_path) if SEALING in name], before
+    assert not list(writer.folder.glob("*.part"))
+    assert len(open_run(writer.folder).trials) == 3
+
+
+def test_who_interrupts_sealing_leaves_no_file_open(tmp_path, kit, monkeypatch):
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sealed_file.SealedFile, "finish", interrupt)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    with pytest.raises(KeyboardInterrupt):
+        seal(writer)
+    assert not [name for name in open_files(tmp_path) if SEALING in name]
+    assert not (writer.folder / SEALING).exists()
+
+
+def test_a_folder_that_cannot_be_removed_harms_nobody(tmp_path, kit, monkeypatch):
+    def fail(folder):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(sealing, "remove_folder", fail)
+    writer, trials = begin(tmp_path, kit)
+    for trial in trials:
+        kit.record(writer, trial, 50)
+    path = seal(writer)
+    assert path == tmp_path / f"{kit.header().name}.nxs"
+    assert verify_run(path).sound
+    assert writer.folder.is_dir()

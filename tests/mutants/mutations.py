@@ -136,12 +136,20 @@ class _Bare(ast.NodeTransformer):
     def visit_Module(self, node: ast.Module) -> ast.AST:
         for statement in node.body:
             match statement:
-                case ast.Assign(
-                    targets=[ast.Name(id=name)], value=ast.Constant(value=int() | float())
-                ):
+                case ast.Assign(targets=[ast.Name(id=name)], value=value) if _is_number(value):
                     statement.value = ast.Constant(name)
         node.body = [statement for statement in node.body if not _is_alias(statement)]
         return self.generic_visit(node)
+
+
+def _is_number(value: ast.expr) -> bool:
+    """Whether it is a number as it is written, e.g. `0.5` or `1 << 20`."""
+    match value:
+        case ast.Constant(value=number):
+            return isinstance(number, int | float)
+        case ast.BinOp(left=left, right=right):
+            return _is_number(left) and _is_number(right)
+    return False
 
 
 def _is_alias(statement: ast.stmt) -> bool:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from campaign.archive import ArchivedTrial, PlannedTrial, RunHeader, RunReader, RunStatus
+from campaign.archive.full_plan import FullPlan
+from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -22,7 +25,7 @@ from campaign.result import (
     Result,
     Table,
 )
-from campaign.trial import Ending, Outcome, SafeState, Task, Trial
+from campaign.trial import ChannelInfo, Ending, Outcome, Recording, SafeState, Task, Trial
 from campaign.units import AngularAcceleration, Frequency
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -200,6 +203,19 @@ def trial(number: int, kind: str, bench: Bench, **more: object) -> Trial:
     )
 
 
+class NoSamples:
+    """Of a trial that nobody executed; the experiments here look at none."""
+
+    def recording(self, ending: Ending) -> Recording:
+        raise ArchiveError("nothing was recorded")
+
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        return ()
+
+    def problems(self) -> Iterator[str]:
+        return iter(())
+
+
 def made_up_run(
     folder: Path,
     *,
@@ -229,9 +245,8 @@ def made_up_run(
             if compensation == "observer":
                 ending = Ending(Outcome.LIMIT, "current 93.1 A is over the limit of 90 A")
             point = {"compensation": compensation}
-            trials.append(
-                ArchivedTrial(trial(number, kind, used, point=point), ending, "", "", archive, "")
-            )
+            made_up = trial(number, kind, used, point=point)
+            trials.append(ArchivedTrial(made_up, ending, "", "", archive, "", NoSamples()))
     sources = {"made-up.toml": '[[test]]\nkind = "stabilization"\n'}
     normalised: dict[str, object] = {}
     if published:
@@ -272,4 +287,5 @@ def made_up_run(
         plan=tuple(PlannedTrial.of(t.trial) for t in trials),
         trials=tuple(trials),
         journal="",
+        full_plan=FullPlan(archive, lambda: ("", "")),
     )

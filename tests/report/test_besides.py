@@ -34,7 +34,7 @@ def of(run: RunReader, number: int, role: Role, ending: Ending) -> ArchivedTrial
     task = like.trial.task.model_copy(update={"window": (0.0, like.trial.task.duration)})
     task = type(task).model_validate({**task.model_dump(), "base_acceleration": {"shape": "zero"}})
     trial = like.trial.model_copy(update={"number": number, "role": role, "task": task})
-    return InMemory(trial, ending, "", "", like.path, "")
+    return InMemory(trial, ending, "", "", like.path, "", like.samples)
 
 
 class Damaged(InMemory):
@@ -77,7 +77,7 @@ def test_a_damaged_check_is_left_out_of_the_drift_and_told(
     roles = {1: Role.MEASUREMENT, 21: Role.CHECK, 42: Role.CHECK}
     trials = [of(run, n, role, done) for n, role in roles.items()]
     bad = trials[1]
-    trials[1] = Damaged(bad.trial, bad.ending, "", "", run.path, "")
+    trials[1] = Damaged(bad.trial, bad.ending, "", "", run.path, "", bad.samples)
     run = replace(run, trials=tuple(trials))
     (drift,), problems, damaged = drifts_of(run)
     assert [trial.trial.number for trial in drift.trials] == [1, 42]

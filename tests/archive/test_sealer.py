@@ -1,0 +1,145 @@
+"""Copying beside the trials, without waiting for anybody: what was added is copied at `_stop`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from campaign.archive import RunStatus, RunWriter, sealing
+from campaign.archive.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.run_folder import SEALING
+from campaign.archive.sealed_file import SealedFile
+from campaign.archive.verification import verify_run
+from tests.archive.forging import canonical, sha256
+
+PROTOCOL = {"tests": [{"name": "map"}]}
+ALL = ["trial_00001", "trial_00002", "trial_00003"]
+
+
+@pytest.fixture
+def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
+    """A run of three trials, of which nothing is copied yet: four attempts, the second failed."""
+    trials = [kit.trial(number) for number in (1, 2, 3)]
+    with pytest.MonkeyPatch.context() as late:
+        late.setattr(sealing.Sealer, "add", lambda self, finished: None)
+        header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
+        writer = RunWriter.create(tmp_path, header, trials)
+        kit.record(writer, trials[0], 20)
+        kit.record(writer, trials[1], None)
+        kit.record(writer, trials[1], 30)
+        kit.record(writer, trials[2], 40)
+    yield writer
+    writer.close()
+
+
+@pytest.fixture
+def attempts(writer: RunWriter) -> list[TrialFinished]:
+    return list(read_journal(writer.folder / JOURNAL).files)
+
+
+@pytest.fixture
+def sealer(writer: RunWriter) -> Iterator[sealing.Sealer]:
+    sealer = sealing.Sealer(writer.folder)
+    yield sealer
+    sealer._queue.put(None)  # whatever it does, no thread is left
+
+
+def copied(sealer: sealing.Sealer) -> list[str] | None:
+    """What was copied of all that was added; None without a file."""
+    sealer._stop()
+    return None if sealer._file is None else list(sealer._file.copied)
+
+
+def test_a_thread_that_keeps_no_process_alive_is_there_from_the_first_trial_on(sealer, attempts):
+    assert sealer._thread is None
+    sealer.add(attempts[0])
+    thread = sealer._thread
+    assert (thread.name, thread.daemon) == ("sealer", True)
+    sealer.add(attempts[1])
+    assert sealer._thread is thread
+    sealer._queue.put(None)
+    thread.join(60.0)
+    assert not thread.is_alive()
+
+
+def test_first_attempts_that_completed_are_copied_in_the_order_of_the_plan(sealer, attempts):
+    first, failed, again, third = attempts
+    sealer.add(third)
+    assert copied(sealer) is None
+    for finished in (failed, again, first):
+        sealer.add(finished)
+    assert copied(sealer) == [ALL[0], ALL[2]]
+    assert sealer._thread is None
+    sealer.discard()
+    assert sealer._file is None
+
+
+def test_a_second_attempt_is_not_copied_before_the_end(sealer, attempts):
+    first, _, again, third = attempts
+    for finished in (first, again, third):
+        sealer.add(finished)
+    assert copied(sealer) == [ALL[0], ALL[2]]
+
+
+def test_what_is_left_out_after_the_first_attempt_that_failed_is_left_out(sealer, attempts):
+    """Of several attempts the first one counts here, whatever came later."""
+    for finished in attempts:
+        sealer.add(finished)
+    assert copied(sealer) == [ALL[0], ALL[2]]
+
+
+@pytest.mark.parametrize(("short", "expected"), [(0, ALL[:1]), (1, None)])
+def test_room_is_left_for_the_trials_to_the_byte(sealer, attempts, monkeypatch, short, expected):
+    asked = []
+
+    def disk_usage(path):
+        asked.append(path)
+        return SimpleNamespace(free=sealing._FREE + 2 * attempts[0].bytes - short)
+
+    monkeypatch.setattr(sealing.shutil, "disk_usage", disk_usage)
+    sealer.add(attempts[0])
+    assert copied(sealer) == expected
+    assert asked == [sealer._folder]
+
+
+def test_after_a_failure_there_is_no_file_and_nothing_is_copied(sealer, attempts, monkeypatch):
+    real = SealedFile.copy
+
+    def fail(*arguments):
+        monkeypatch.setattr(SealedFile, "copy", real)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(SealedFile, "copy", fail)
+    sealer.add(attempts[0])
+    sealer.add(attempts[3])
+    assert copied(sealer) is None
+    assert not (sealer._folder / SEALING).exists()
+    sealer.add(attempts[0])
+    sealer.discard()
+    assert not (sealer._folder / SEALING).exists()
+
+
+def test_the_file_that_was_begun_is_the_one_that_is_sealed(sealer, writer, attempts, monkeypatch):
+    given = []
+    monkeypatch.setattr(sealing, "seal_folder", lambda *both: given.append(both))
+    sealer.add(attempts[0])
+    sealer.seal()
+    ((folder, begun),) = given
+    assert folder == writer.folder
+    assert list(begun.copied) == ALL[:1]
+    assert (sealer._file, sealer._thread) == (None, None)
+    begun.discard()
+
+
+def test_what_was_begun_under_other_names_is_begun_anew(sealer, writer, attempts, kit):
+    """The first trial was repeated after its copy, so its copy has the wrong name."""
+    sealer.add(attempts[0])
+    kit.record(writer, kit.trial(1), 50)
+    writer._sealer.discard()
+    writer._sealer = sealer
+    path = writer.seal(RunStatus.COMPLETE, ended="2026-11-21T09:40:00Z")
+    assert verify_run(path).sound
+    assert not writer.folder.exists()
