@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from itertools import count
 from pathlib import Path
@@ -25,6 +25,7 @@ def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[
     Runs that are begun in the same second get different names. Raises UsageError when nothing can
     be written in `results`, which is made if need be.
     """
+    new = not results.exists()
     try:
         results.mkdir(parents=True, exist_ok=True)
         lock = _first_lock(results, protocol_stem, now)
@@ -38,6 +39,9 @@ def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[
         yield lock
     finally:
         lock.release()
+        if new:
+            with suppress(OSError):  # a run was begun there
+                results.rmdir()
 
 
 def _first_lock(results: Path, stem: str, now: datetime) -> RunLock:

@@ -213,7 +213,9 @@ class _Trials:
         # Where its samples are there, whatever is said of them, they are held against the record.
         not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
         if entry not in self.groups and not not_kept:
-            raise ArchiveError(f"{self.path}: /{entry}: is missing, and the journal tells of it")
+            raise ArchiveError(
+                f"{self.path}: /{entry}: is missing, and the journal says that it finished"
+            )
         return archived_trial(self.path, entry, record, trees, not_kept)
 
 

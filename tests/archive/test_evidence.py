@@ -438,7 +438,7 @@ def test_samples_that_are_there_are_checked_whatever_is_said_of_them(sealed):
     """`not_kept` is not bound by the seal, so that samples may be dropped from a signed run; it
     excuses samples that are missing, and none that are there."""
     with h5py.File(sealed, "r+") as file:
-        scale_samples(file, "trial_00001")
+        file["trial_00001/data/gyro_rate"][...] = 0.5 * file["trial_00001/data/gyro_rate"][...]
         note = file.create_group("run/not_kept")
         note.attrs["NX_class"] = "NXnote"
         for name in ("type", "file_name"):
@@ -457,7 +457,7 @@ def test_samples_that_are_there_are_checked_whatever_is_said_of_them(sealed):
     [
         ("run/provenance/notes", "/run/provenance/notes: is missing"),
         ("run/provenance/overrides", "/run/provenance/overrides: is missing"),
-        ("run/source_001", "/run/source_001/file_name: "),
+        ("run/source_001", "/run/source_001"),
     ],
 )
 def test_what_was_sealed_and_is_gone_is_told_by_who_opens(sealed, place, said):
@@ -478,12 +478,14 @@ def test_what_was_sealed_and_is_gone_is_told_by_who_opens(sealed, place, said):
     ],
 )
 def test_texts_that_contradict_each_other_are_told_though_the_seal_fits(sealed, place, text):
+    name = open_run(sealed).name
     with h5py.File(sealed, "r+") as file:
         put_text(file, f"run/{place}", text)
         reseal(file)
+        seal = json.loads(text_of(file, "run/outcome/seal"))
+        put_text(file, "run/outcome/seal", canonical(seal | {"run": name}))
     rehash(sealed)
-    (damage,) = open_run(sealed).damaged
-    assert damage.place == f"/run/{place}"
+    assert f"/run/{place}" in [damage.place for damage in open_run(sealed).damaged]
     assert not verify_run(sealed).sound
 
 

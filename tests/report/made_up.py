@@ -206,6 +206,8 @@ def trial(number: int, kind: str, bench: Bench, **more: object) -> Trial:
 class NoSamples:
     """Of a trial that nobody executed; the experiments here look at none."""
 
+    not_kept = ""
+
     def recording(self, ending: Ending) -> Recording:
         raise ArchiveError("nothing was recorded")
 

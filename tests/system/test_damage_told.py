@@ -44,10 +44,9 @@ def archive(made: Path, tmp_path: Path) -> Path:
 
 
 def lose_a_record(archive: Path, number: int = 2) -> None:
-    """The trial's metadata no longer match their checksum; its samples are as they were."""
+    """The trial's group is no longer there; index and journal tell of it."""
     with h5py.File(archive, "r+") as file:
-        ended = file[f"trial_{number:05d}/end_time"]
-        ended[()] = b"9" + ended[()][1:]
+        del file[f"trial_{number:05d}"]
 
 
 def lose_a_sample(archive: Path, number: int = 2, channel: str = "pointing_error") -> None:
@@ -142,7 +141,7 @@ def test_an_analysis_that_leaves_a_trial_out_says_so(archive: Path):
     lose_a_sample(archive)
     run = campaign.open(archive)  # samples are read when they are asked for
     with pytest.raises(ArchiveError, match="checksum"):
-        run.trial(2).recording()
+        run.trial(2).recording()["pointing_error"]
     test = run.test("stabilization")
     with pytest.warns(campaign.ArchiveWarning, match="trial-00002, pointing_error"):
         found = test.tables["stabilization-error"]
@@ -171,11 +170,14 @@ def test_an_export_lists_what_is_damaged_and_every_file_with_metadata_names_it(
         assert done.exit_code == 4
         assert "trial-00002, gyro_rate: /trial_00002/data/gyro_rate: " in done.stderr
         names = sorted(path.name for path in (tmp_path / to).iterdir())
-        assert names == ["damaged.csv", f"trial-00001.{to}", "trials.csv"]
+        recordings = [f"trial-00001.{to}", f"trial-00002.{to}"]  # one without the damaged channel
+        assert names == ["damaged.csv", *recordings, "trials.csv"]
         with (tmp_path / to / "damaged.csv").open(encoding="utf-8", newline="") as file:
             (row,) = csv.DictReader(file)
         assert list(row) == ["place", "trial", "channel", "reason"]
         assert (row["trial"], row["channel"]) == ("trial-00002", "gyro_rate")
+    heads = [(tmp_path / "csv" / f"trial-0000{n}.csv").read_text().split("\n")[0] for n in (1, 2)]
+    assert ["gyro_rate" in head for head in heads] == [True, False]
     from pyarrow.parquet import read_schema
     from scipy.io import loadmat
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign.archive import RunWriter
 from campaign.backends.sim import SimBackend
 from campaign.cli.ask import NotStartedError
 from campaign.cli.prepare import Request
@@ -117,6 +118,20 @@ def test_a_backend_that_cannot_let_go_hides_neither_the_code_nor_the_archive(
     assert "could not let go of the bench: OSError: the port is gone" in shown.err
 
 
+def no_room(*arguments: object) -> RunWriter:
+    raise UsageError("no room")
+
+
+def test_results_that_cannot_be_kept_are_said_before_a_bench_is_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(SimBackend, "__enter__", lambda backend: pytest.fail("it was connected"))
+    (tmp_path / "results").write_text("no folder")
+    request = Request(str(write(tmp_path, SEA)))
+    with pytest.raises(UsageError, match="is not a folder"):
+        run_protocol(request, tmp_path / "results", workers=1, report=False)
+
+
 def test_an_archive_that_cannot_be_begun_is_said_with_the_bench_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
@@ -125,9 +140,9 @@ def test_an_archive_that_cannot_be_begun_is_said_with_the_bench_at_rest(
         SimBackend, "make_safe", lambda backend: asked_to_rest.append(1) or SafeState.CONFIRMED
     )
     monkeypatch.setattr(SimBackend, "__exit__", fail_to_let_go)
-    (tmp_path / "results").write_text("no folder")
+    monkeypatch.setattr(RunWriter, "create", no_room)
     request = Request(str(write(tmp_path, SEA)))
-    with pytest.raises(UsageError, match="is not a folder"):
+    with pytest.raises(UsageError, match="no room"):
         run_protocol(request, tmp_path / "results", workers=1, report=False)
     assert asked_to_rest == [1]
     assert "the port is gone" in capsys.readouterr().err
