@@ -11,6 +11,8 @@ from campaign import interrupts
 def main() -> None:
     """Run the command line."""
     interrupts.listen()
+    # pydantic looks into every installed package for plug-ins of its own, and a broken one ends it.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         from campaign.cli.main import main as run
 

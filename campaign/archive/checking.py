@@ -51,7 +51,7 @@ _REQUIRED = frozenset(
         *(f"{note}/{name}" for note in NOTES for name in ("type", "file_name", "data")),
     ]
 ) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
-_OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}
+_OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING}
 _MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
 _PLOT = frozenset(("axes", "time_indices"))
 """Attributes by which viewers plot a group, besides its signal."""
@@ -107,8 +107,7 @@ class _Check:
         named = {finished.file for finished in story.attempts}
         for file in sorted(self.path.iterdir()):
             if file.name not in named | _OWN_FILES:
-                unfinished = file.suffix == PART and file.name != SEALING
-                kind = "was never finished" if unfinished else "is not part of the run"
+                kind = "was never finished" if file.suffix == PART else "is not part of the run"
                 self.remarks.add(file.name, kind)
         self._agreement(run, story, HEADER, JOURNAL, PLAN)
 

@@ -63,28 +63,21 @@ def find_remnants(results: Path) -> dict[Path, str]:
     return found
 
 
-def clear_remnants(results: Path, run: str) -> list[Path]:
-    """Remove what a killed process left of a run of which the caller holds the lock; returns it."""
-    names = {path.name for path in results.iterdir()}
-    cleared = []
-    for name in (f"{run}{PARTIAL}{PART}", f"{run}{PARTIAL}"):
-        path = results / name
-        if name not in names or not _remnant(name, names):
-            continue
-        if path.is_dir():
-            if remove_folder(path):
-                continue
-        else:
-            path.unlink()
-        cleared.append(path)
-    return cleared
+def clear_beginning(results: Path, run: str) -> None:
+    """Remove a folder of a run that was never finished; the caller holds the run's lock.
+
+    A folder beside its sealed file is left alone: should that file be damaged, it may have the run.
+    """
+    part = results / f"{run}{PARTIAL}{PART}"
+    if part.is_dir():
+        remove_folder(part)
 
 
 def _remnant(name: str, names: set[str]) -> str:
     if name.endswith(PARTIAL + PART):
         return "the beginning of a run's folder, which was never finished"
     if name.endswith(PARTIAL) and name.removesuffix(PARTIAL) + SEALED in names:
-        return "what is left of the folder of a run that is sealed"
+        return "what is left of the folder of a run that is sealed; verify that run first"
     if name.startswith(".") and name.endswith(".lock"):
         return "the lock of a process that was killed; it locks nothing"
     return ""

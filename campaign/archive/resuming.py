@@ -10,7 +10,7 @@ from campaign.archive.files import PART, sha256_of, why
 from campaign.archive.header import FORMAT, PARTIAL, SEALED, RunStatus
 from campaign.archive.journal import JOURNAL, Journal, Story, read_journal
 from campaign.archive.opening import read_sealed, sealed_format
-from campaign.archive.remnants import clear_remnants, is_own
+from campaign.archive.remnants import clear_beginning, is_own
 from campaign.archive.run_folder import read_format
 from campaign.archive.run_lock import RunLock
 from campaign.archive.signature_file import set_aside_signature
@@ -33,7 +33,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
     if path.suffix not in (PARTIAL, SEALED) or not path.exists():
         raise UsageError(f"{path}: is no run")
     with _locked(folder) as lock:
-        clear_remnants(folder.parent, folder.stem)
+        clear_beginning(folder.parent, folder.stem)
         if sealed.is_file():
             _check_sealed(sealed)
             from campaign.archive.unsealing import unseal

@@ -43,7 +43,9 @@ def _print(found: Verification, signature: Checked) -> None:
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets{root})")
     for damage in found.remarks:
         print_note(f"{found.path}: note: {damage}", style="yellow")
-    if signature.valid is not None:
+    if signature.valid and not found.sound:
+        print_line(f"{signature.text}; but the run is not what was signed")
+    elif signature.valid is not None:
         print_line(signature.text)
     elif signature.text:
         print_note(signature.text)

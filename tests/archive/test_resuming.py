@@ -493,3 +493,22 @@ def test_twenty_minutes_take_no_more_memory_than_two(tmp_path):
     )
     assert long["archive"] > 8 * short["archive"]
     assert long["sealed again"] < short["sealed again"] + 30  # MB; the samples are 124 MB
+
+
+def test_a_folder_beside_a_damaged_sealed_file_is_left_alone(tmp_path, kit):
+    """Killed between the two, the program leaves both; should the file be damaged since, the folder
+    has the run."""
+    trials = [kit.trial(1), kit.trial(2)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    kit.record(writer, trials[0], 50)
+    folder = writer.folder
+    shutil.copytree(folder, tmp_path / "copy")
+    sealed = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
+    (tmp_path / "copy").rename(folder)
+    before = sorted(path.name for path in folder.iterdir())
+    content = bytearray(sealed.read_bytes())
+    content[len(content) // 2] ^= 1
+    sealed.write_bytes(content)
+    with pytest.raises(ArchiveError):
+        RunWriter.resume(sealed, **RESUMED)
+    assert sorted(path.name for path in folder.iterdir()) == before

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -258,3 +260,21 @@ def test_an_edited_helper_changes_the_numbers_of_the_next_run(lab: Laboratory) -
         recording = open_run(lab.folder.parent / archive).trials[0].recording()
         frictions.append(abs(recording["friction_torque"]).max())
     assert frictions[0] + 0.3 < frictions[1]
+
+
+def test_a_package_whose_entry_points_are_no_table_ends_no_command(tmp_path: Path):
+    """pydantic looks for plug-ins of its own in every package, and such a one ended it."""
+    info = tmp_path / "bad-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: bad\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[campaign.friction]\nnothing\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "campaign", "kinds"],
+        env=os.environ
+        | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "bad" in done.stderr
