@@ -50,6 +50,8 @@ NAMES = frozenset({
 
 ALLOWED: dict[tuple[str, str], str] = {
     ("campaign/archive/run_lock.py", "_lock"): 'if os.name == "nt":',
+    ("campaign/archive/remnants.py", "_in_use"): 'if os.name == "nt"',
+    ("campaign/signing/tool.py", "_kill"): 'os.name == "posix"',
     ("campaign/device/line.py", "PtyStream.__init__"): "this system has no pseudo-terminals",
     ("campaign/execution/guardian.py", "main"): "POSIX",
     ("campaign/execution/stop.py", "StopSwitch._guarded"): "POSIX",

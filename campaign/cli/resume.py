@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
+from campaign.archive.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
 from campaign.cli.damage import say_damaged
@@ -80,7 +81,8 @@ def resume_run(
     allow_motion(remade.kind, left, remade.tests, yes=yes)
 
     def open_archive() -> RunWriter:
-        return RunWriter.resume(
+        signed = run.sealed and has_signature(run.path)
+        writer = RunWriter.resume(
             path,
             at=utc_now(),
             host=provenance.host(),
@@ -88,6 +90,9 @@ def resume_run(
             command=provenance.command(),
             changes=remade.changes,
         )
+        if signed:
+            print_warning(f"{run.name}: was signed; it changes, so its signature is set aside")
+        return writer
 
     session = Session(
         remade.kind,

@@ -548,7 +548,9 @@ def test_a_run_that_was_gone_on_with_is_signed_anew_and_its_old_signature_is_no_
     with pytest.raises(UsageError, match="passphrase"):
         resume(locked)
     assert sealed.read_bytes() == before
+    capsys.readouterr()
     assert resume(ada) is ExitCode.DONE
+    assert "was signed; it changes, so its signature is set aside" in capsys.readouterr().err
     assert verify(sealed, "ada@lab", allowed) is ExitCode.DONE
     old = Path(f"{sealed}.sig.before-resume-1")
     old.replace(signature_path(sealed))
