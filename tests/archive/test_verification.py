@@ -112,7 +112,6 @@ def test_a_killed_run_is_sound_and_what_is_not_its_is_named(folder):
     assert found.problems == ()
     assert {remark.place: remark.reason for remark in found.remarks} == {
         "trial-00004.nxs.part": "was never finished",
-        "sealed.nxs.part": "is not part of the run",
         "notes.txt": "is not part of the run",
     }
 
