@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -135,3 +136,18 @@ def test_the_version_names_what_is_numbered_for_itself(monkeypatch, capsys):
     assert re.fullmatch(r"campaign \d+\.\d+\.\d+.*", first)
     names = r"engine \d+, format \d+, wire \d+, bench schema \d+, protocol schema \d+"
     assert re.fullmatch(names, second)
+
+
+def test_an_error_ends_by_an_exception_while_the_archive_waits_for_work(monkeypatch):
+    """Else `os._exit` would take the process that only called `main`."""
+    from campaign.cli import main as module
+
+    monkeypatch.setattr(module.os, "_exit", lambda code: pytest.fail("left at once"))
+    monkeypatch.setattr("sys.argv", ["campaign", "show", "no-such-run"])
+    waiting = threading.Event()
+    thread = threading.Thread(target=waiting.wait, name="sealer", daemon=True)
+    thread.start()
+    with pytest.raises(SystemExit):
+        module.main()
+    waiting.set()
+    thread.join()

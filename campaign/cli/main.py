@@ -61,10 +61,15 @@ def _explain_in_debug() -> None:
         traceback.print_exc()
 
 
+def _may_be_stuck(thread: threading.Thread) -> bool:
+    """Whether Python would wait for it; the archive's sealer only waits for work itself."""
+    return thread is not threading.main_thread() and thread.name != "sealer"
+
+
 def _leave(message: str, code: int) -> None:
     """Print one message and end the program, even while a stuck backend's thread goes on."""
     print_note(message)
-    if threading.active_count() == 1:
+    if not any(map(_may_be_stuck, threading.enumerate())):
         sys.exit(code)
     sys.stdout.flush()
     sys.stderr.flush()
