@@ -140,14 +140,14 @@ def test_the_version_names_what_is_numbered_for_itself(monkeypatch, capsys):
 
 def test_an_error_ends_by_an_exception_while_the_archive_waits_for_work(monkeypatch):
     """Else `os._exit` would take the process that only called `main`."""
-    from campaign.cli import main as module
+    from campaign.cli.main import main
 
-    monkeypatch.setattr(module.os, "_exit", lambda code: pytest.fail("left at once"))
+    monkeypatch.setattr("os._exit", lambda code: pytest.fail("left at once"))
     monkeypatch.setattr("sys.argv", ["campaign", "show", "no-such-run"])
     waiting = threading.Event()
     thread = threading.Thread(target=waiting.wait, name="sealer", daemon=True)
     thread.start()
     with pytest.raises(SystemExit):
-        module.main()
+        main()
     waiting.set()
     thread.join()
