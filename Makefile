@@ -21,11 +21,12 @@ demo: $(VENV)/installed
 	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) \
 		&& echo "archive  $$run" && echo "report   $${run%.nxs}-report/report.html"
 
+# A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_OPTIONS)
+	$(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 $(PYTEST_OPTIONS)
 
 soak: $(VENV)/installed-test
-	$(BIN)/python -m pytest -m soak -n auto $(PYTEST_OPTIONS)
+	$(BIN)/python -m pytest -m soak -n auto --max-worker-restart 0 $(PYTEST_OPTIONS)
 
 mutants: $(VENV)/installed-mutants
 	$(BIN)/python tests/mutants/run.py $(MUTANTS_OPTIONS)

@@ -21,11 +21,15 @@ def main() -> None:
         interrupts.leave()
     except SystemExit as leaving:
         interrupts.deaf()
-        if leaving.code == interrupts.INTERRUPTED:
-            # Python would end itself by SIGINT, had a KeyboardInterrupt passed through `exec`.
+        import threading
+
+        # Python would end itself by SIGINT, had a KeyboardInterrupt passed through `exec`; and
+        # after an error it would wait for a stuck backend's thread.
+        interrupted = leaving.code == interrupts.INTERRUPTED
+        if interrupted or (leaving.code and threading.active_count() > 1):
             sys.stdout.flush()
             sys.stderr.flush()
-            os._exit(interrupts.INTERRUPTED)
+            os._exit(leaving.code if isinstance(leaving.code, int) else 1)
         raise
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -90,9 +89,7 @@ def leave_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> int:
     def fail(prog_name: str) -> None:
         raise error
 
-    module = sys.modules["campaign.cli.main"]
-    monkeypatch.setattr(module, "app", fail)
-    monkeypatch.setattr(module.threading, "active_count", lambda: 1)  # xdist has its own threads
+    monkeypatch.setattr(sys.modules["campaign.cli.main"], "app", fail)
     with pytest.raises(SystemExit) as end:
         command_line()
     return int(end.value.code)
@@ -138,16 +135,23 @@ def test_the_version_names_what_is_numbered_for_itself(monkeypatch, capsys):
     assert re.fullmatch(names, second)
 
 
-def test_an_error_ends_by_an_exception_while_the_archive_waits_for_work(monkeypatch):
-    """Else `os._exit` would take the process that only called `main`."""
-    from campaign.cli.main import main
+STUCK = """
+import threading, sys
+import campaign.__main__ as program
+import campaign.cli.main
 
-    monkeypatch.setattr("os._exit", lambda code: pytest.fail("left at once"))
-    monkeypatch.setattr("sys.argv", ["campaign", "show", "no-such-run"])
-    waiting = threading.Event()
-    thread = threading.Thread(target=waiting.wait, name="sealer", daemon=True)
-    thread.start()
-    with pytest.raises(SystemExit):
-        main()
-    waiting.set()
-    thread.join()
+def fail():
+    threading.Thread(target=threading.Event().wait).start()  # a backend that never comes back
+    print("said", flush=False)
+    sys.exit(3)
+
+sys.modules["campaign.cli.main"].main = fail
+program.main()
+"""
+
+
+def test_a_thread_that_never_comes_back_does_not_keep_a_failed_command_from_ending():
+    ended = subprocess.run(
+        [sys.executable, "-c", STUCK], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (ended.returncode, ended.stdout) == (3, "said\n"), ended.stderr

@@ -11,7 +11,6 @@ import contextlib
 import shutil
 import threading
 from pathlib import Path
-from queue import SimpleQueue
 
 from campaign.archive.entries import entry_name, entry_names
 from campaign.archive.files import publish, why
@@ -24,6 +23,7 @@ from campaign.errors import ArchiveError
 from campaign.trial import Outcome
 
 _FREE = 1 << 28  # bytes that stay free for the trials while their copies are made beside them
+_AT_ONCE = 2  # more than one finishes at a time, so that those that waited are caught up with
 _FAILURES = (OSError, RuntimeError, ValueError, ArchiveError)
 
 
@@ -67,69 +67,69 @@ def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
 
 
 class Sealer:
-    """Copies trials into the sealed file while others are executed.
+    """Copies trials into the sealed file while others are executed, by whoever finished one.
 
-    In the order of the plan, so that equal runs make equal files whatever the machine was busy
-    with: a trial waits for those before it, and what did not complete at the first attempt, and may
-    be executed again, waits for the end. Whatever goes wrong here costs time only: `seal` then
-    begins anew.
+    No thread of its own: beside those that execute trials it would only wait with them for h5py's
+    one lock, and on a bench that moves this is done between trials, while the bench is at rest.
+
+    Trials are copied in the order of the plan, so that equal runs make equal files whatever the
+    machine was busy with: a trial waits for those before it, and what did not complete at the first
+    attempt, and may be executed again, waits for the end. Whatever goes wrong here costs time only:
+    `seal` then begins anew.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._queue: SimpleQueue[TrialFinished | None] = SimpleQueue()
-        self._thread: threading.Thread | None = None
+        self._busy = threading.Lock()
         self._file: SealedFile | None = None
         self._first: dict[int, TrialFinished] = {}
         self._next = 1
-        self._leave = False
+        self._gave_up = False
 
     def add(self, finished: TrialFinished) -> None:
-        """A trial's file is on the disk and the journal tells of it. Called by one thread."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="sealer", daemon=True)
-            self._thread.start()
-        self._queue.put(finished)
+        """A trial's file is on the disk and the journal tells of it."""
+        self._first.setdefault(finished.trial, finished)
+
+    def advance(self) -> None:
+        """Copy what is next, if it is there and no other thread is about it. It never fails."""
+        if not self._busy.acquire(blocking=False):
+            return
+        try:
+            for _ in range(_AT_ONCE):
+                if self._gave_up or self._next not in self._first:
+                    return
+                self._copy(self._first.pop(self._next))
+                self._next += 1
+        except BaseException as error:
+            self._give_up()
+            if not isinstance(error, _FAILURES):
+                raise
+        finally:
+            self._busy.release()
 
     def seal(self) -> Path:
         """Make the file whole: `seal_folder`."""
-        self._stop()
-        begun, self._file = self._file, None
-        return seal_folder(self._folder, begun)
+        with self._busy:
+            begun, self._file = self._file, None
+            self._gave_up = True
+            return seal_folder(self._folder, begun)
 
     def discard(self) -> None:
         """Leave no file."""
-        self._leave = True
-        self._stop()
-        self._give_up()
+        with self._busy:
+            self._give_up()
 
-    def _stop(self) -> None:
-        if self._thread is not None:
-            self._queue.put(None)
-            self._thread.join()
-            self._thread = None
-
-    def _work(self) -> None:
-        while (finished := self._queue.get()) is not None and not self._leave:
-            try:
-                self._copy(finished)
-            except _FAILURES:
-                self._give_up()
-                return
-
-    def _copy(self, finished: TrialFinished) -> None:
-        self._first.setdefault(finished.trial, finished)
-        while (first := self._first.pop(self._next, None)) is not None:
-            self._next += 1
-            if first.outcome is not Outcome.COMPLETED or first.attempt != 1:
-                continue
-            if shutil.disk_usage(self._folder).free < _FREE + 2 * first.bytes:
-                raise ArchiveError("the room that is left is for the trials")
-            if self._file is None:
-                self._file = SealedFile(self._folder / SEALING)
-            self._file.copy(self._folder, first, entry_name(first.trial))
+    def _copy(self, first: TrialFinished) -> None:
+        if first.outcome is not Outcome.COMPLETED or first.attempt != 1:
+            return
+        if shutil.disk_usage(self._folder).free < _FREE + 2 * first.bytes:
+            raise ArchiveError("the room that is left is for the trials")
+        if self._file is None:
+            self._file = SealedFile(self._folder / SEALING)
+        self._file.copy(self._folder, first, entry_name(first.trial))
 
     def _give_up(self) -> None:
+        self._gave_up = True
         if self._file is not None:
             self._file.discard()
             self._file = None

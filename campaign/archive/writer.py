@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from campaign.archive.beginning import make_folder
 from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
@@ -25,9 +25,6 @@ from campaign.archive.trial_writer import TrialWriter
 from campaign.errors import UsageError
 from campaign.trial import Outcome, SafeState, Trial
 
-if TYPE_CHECKING:
-    from campaign.archive.sealing import Sealer
-
 __all__ = ["RunWriter", "TrialWriter"]
 
 
@@ -38,6 +35,8 @@ class RunWriter:
     """
 
     def __init__(self, folder: Path, journal: Journal, lock: RunLock) -> None:
+        from campaign.archive.sealing import Sealer
+
         self._folder = folder
         self._journal = journal
         self._run_lock = lock
@@ -45,7 +44,7 @@ class RunWriter:
         self._writers: list[TrialWriter] = []
         self._last: dict[int, TrialFinished] = {}
         self._told: tuple[Entry, ...] = ()
-        self._sealer: Sealer | None = None
+        self._sealer = Sealer(folder)
 
     @classmethod
     def create(
@@ -105,7 +104,7 @@ class RunWriter:
         writer = cls(folder, journal, lock)
         writer._last = dict(story.finished)
         for finished in story.files:
-            writer._seal_later(finished)
+            writer._sealer.add(finished)
         writer._told = story.entries
         try:
             journal.append(
@@ -180,21 +179,17 @@ class RunWriter:
         Raises:
             ArchiveError: no file could be made; the folder stays, with all that was finished.
         """
-        from campaign.archive.sealing import seal_folder
-
         try:
             self._abandon_open(ended)
             self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
-            return self._sealer.seal() if self._sealer else seal_folder(self._folder)
+            return self._sealer.seal()
         finally:
             self.close()
 
     def close(self) -> None:
         """Let go of the run as it is, unsealed: another process may go on with it."""
-        if self._sealer is not None:
-            self._sealer.discard()
-            self._sealer = None
+        self._sealer.discard()
         self._journal.close()
         self._run_lock.release()
 
@@ -209,14 +204,8 @@ class RunWriter:
         if isinstance(entry, TrialFinished):
             with self._lock:
                 self._last[entry.trial] = entry
-                self._seal_later(entry)
-
-    def _seal_later(self, finished: TrialFinished) -> None:
-        from campaign.archive.sealing import Sealer
-
-        if self._sealer is None:
-            self._sealer = Sealer(self._folder)
-        self._sealer.add(finished)
+                self._sealer.add(entry)
+            self._sealer.advance()
 
 
 def _now() -> str:

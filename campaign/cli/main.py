@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
 import traceback
+from typing import NoReturn
 
 from campaign.cli.bench_commands import app  # with all commands
 from campaign.cli.output import plain_streams, print_note
@@ -61,16 +61,6 @@ def _explain_in_debug() -> None:
         traceback.print_exc()
 
 
-def _may_be_stuck(thread: threading.Thread) -> bool:
-    """Whether Python would wait for it; the archive's sealer only waits for work itself."""
-    return thread is not threading.main_thread() and thread.name != "sealer"
-
-
-def _leave(message: str, code: int) -> None:
-    """Print one message and end the program, even while a stuck backend's thread goes on."""
+def _leave(message: str, code: int) -> NoReturn:
     print_note(message)
-    if not any(map(_may_be_stuck, threading.enumerate())):
-        sys.exit(code)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
+    sys.exit(code)

@@ -1,4 +1,4 @@
-"""Copying beside the trials, without waiting for anybody: what was added is copied at `_stop`."""
+"""Copying beside the trials: which, in which order, and what a failure leaves."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
     """A run of three trials, of which nothing is copied yet: four attempts, the second failed."""
     trials = [kit.trial(number) for number in (1, 2, 3)]
     with pytest.MonkeyPatch.context() as late:
-        late.setattr(sealing.Sealer, "add", lambda self, finished: None)
+        late.setattr(sealing.Sealer, "advance", lambda self: None)
         header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
         writer = RunWriter.create(tmp_path, header, trials)
         kit.record(writer, trials[0], 20)
@@ -44,25 +44,14 @@ def attempts(writer: RunWriter) -> list[TrialFinished]:
 def sealer(writer: RunWriter) -> Iterator[sealing.Sealer]:
     sealer = sealing.Sealer(writer.folder)
     yield sealer
-    sealer._queue.put(None)  # whatever it does, no thread is left
+    sealer.discard()
 
 
 def copied(sealer: sealing.Sealer) -> list[str] | None:
     """What was copied of all that was added; None without a file."""
-    sealer._stop()
+    for _ in range(4):  # more often than there are attempts
+        sealer.advance()
     return None if sealer._file is None else list(sealer._file.copied)
-
-
-def test_a_thread_that_keeps_no_process_alive_is_there_from_the_first_trial_on(sealer, attempts):
-    assert sealer._thread is None
-    sealer.add(attempts[0])
-    thread = sealer._thread
-    assert (thread.name, thread.daemon) == ("sealer", True)
-    sealer.add(attempts[1])
-    assert sealer._thread is thread
-    sealer._queue.put(None)
-    thread.join(60.0)
-    assert not thread.is_alive()
 
 
 def test_first_attempts_that_completed_are_copied_in_the_order_of_the_plan(sealer, attempts):
@@ -72,7 +61,6 @@ def test_first_attempts_that_completed_are_copied_in_the_order_of_the_plan(seale
     for finished in (failed, again, first):
         sealer.add(finished)
     assert copied(sealer) == [ALL[0], ALL[2]]
-    assert sealer._thread is None
     sealer.discard()
     assert sealer._file is None
 
@@ -126,17 +114,19 @@ def test_the_file_that_was_begun_is_the_one_that_is_sealed(sealer, writer, attem
     given = []
     monkeypatch.setattr(sealing, "seal_folder", lambda *both: given.append(both))
     sealer.add(attempts[0])
+    sealer.advance()
     sealer.seal()
     ((folder, begun),) = given
     assert folder == writer.folder
     assert list(begun.copied) == ALL[:1]
-    assert (sealer._file, sealer._thread) == (None, None)
+    assert sealer._file is None
     begun.discard()
 
 
 def test_what_was_begun_under_other_names_is_begun_anew(sealer, writer, attempts, kit):
     """The first trial was repeated after its copy, so its copy has the wrong name."""
     sealer.add(attempts[0])
+    sealer.advance()
     kit.record(writer, kit.trial(1), 50)
     writer._sealer.discard()
     writer._sealer = sealer

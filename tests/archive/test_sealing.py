@@ -110,7 +110,7 @@ def test_a_copy_that_is_not_what_was_recorded_is_not_sealed(
     tmp_path, kit, monkeypatch, change, beside
 ):
     if not beside:
-        monkeypatch.setattr(sealing.Sealer, "add", lambda self, finished: None)
+        monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
     writer, trials = begin(tmp_path, kit)
     corrupt_copy(monkeypatch, change)
     for trial in trials:
@@ -228,67 +228,90 @@ def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, m
 
 
 class Watched:
-    """Tells when trials were copied, and may hold the copying up.
+    """Tells when trials were copied.
 
     Attributes:
-        may_go: copying waits for this.
-        reached: so many trials were copied as somebody waits for.
-        copied: names of the groups, in the order in which they were copied, and by which thread.
+        beside: names of the groups that were copied while trials could still come, in order.
+        at_the_end: those that were copied by `seal`.
         failures: the next copy fails with the last of these.
     """
 
-    def __init__(self, monkeypatch, wait_for: int) -> None:
-        self.copied: list[tuple[str, str]] = []
-        self.may_go, self.reached = threading.Event(), threading.Event()
-        self.may_go.set()
-        self.failures: list[Exception] = []
-        real = sealed_file.SealedFile.copy
+    def __init__(self, monkeypatch) -> None:
+        self.beside: list[str] = []
+        self.at_the_end: list[str] = []
+        self.failures: list[BaseException] = []
+        self._to = self.beside
+        copy, seal_folder = sealed_file.SealedFile.copy, sealing.seal_folder
 
-        def copy(file, folder, finished, entry):
-            assert self.may_go.wait(WAIT)
+        def copied(file, folder, finished, entry):
             if self.failures:
                 raise self.failures.pop()
-            real(file, folder, finished, entry)
-            self.copied.append((entry, threading.current_thread().name))
-            if len(self.copied) >= wait_for:
-                self.reached.set()
+            copy(file, folder, finished, entry)
+            self._to.append(entry)
 
-        monkeypatch.setattr(sealed_file.SealedFile, "copy", copy)
+        def sealed(*both):
+            self._to = self.at_the_end
+            try:
+                return seal_folder(*both)
+            finally:
+                self._to = self.beside
 
-    @property
-    def beside(self) -> list[str]:
-        return [entry for entry, thread in self.copied if thread == "sealer"]
-
-    @property
-    def at_the_end(self) -> list[str]:
-        return [entry for entry, thread in self.copied if thread != "sealer"]
+        monkeypatch.setattr(sealed_file.SealedFile, "copy", copied)
+        monkeypatch.setattr(sealing, "seal_folder", sealed)
 
 
 ALL = ["trial_00001", "trial_00002", "trial_00003"]
 
 
 def test_trials_are_copied_while_others_are_executed(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch, wait_for=2)
+    watched = Watched(monkeypatch)
     writer, trials = begin(tmp_path, kit)
-    for trial in trials[:2]:
+    for number, trial in enumerate(trials, start=1):
         kit.record(writer, trial, 50)
-    assert watched.reached.wait(WAIT)
-    assert watched.beside == ALL[:2]
-    assert (writer.folder / SEALING).is_file()
-    kit.record(writer, trials[2], 50)
+        assert watched.beside == ALL[:number]
+        assert (writer.folder / SEALING).is_file()
     path = seal(writer)
-    assert [entry for entry, _ in watched.copied] == ALL  # each once
+    assert watched.at_the_end == []
     assert verify_run(path).sound
 
 
 def test_a_trial_waits_for_those_before_it_in_the_plan(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch, wait_for=3)
-    writer, trials = begin(tmp_path, kit)
-    for number in (3, 2, 1):
-        assert watched.copied == []
+    """Whoever finishes one catches up with one that waited, and no more: others wait for him."""
+    watched = Watched(monkeypatch)
+    writer, trials = begin(tmp_path, kit, 5)
+    for number in (4, 3, 2):
         kit.record(writer, trials[number - 1], 50)
-    assert watched.reached.wait(WAIT)
-    assert watched.beside == ALL
+        assert watched.beside == []
+    kit.record(writer, trials[0], 50)
+    assert watched.beside == ALL[:2]
+    kit.record(writer, trials[4], 50)
+    assert watched.beside == [*ALL, "trial_00004"]
+    assert verify_run(seal(writer)).sound
+    assert watched.at_the_end == ["trial_00005"]
+
+
+def test_who_finishes_a_trial_while_another_is_copied_does_not_wait(tmp_path, kit, monkeypatch):
+    watched = Watched(monkeypatch)
+    writer, trials = begin(tmp_path, kit)
+    copying, may_go = threading.Event(), threading.Event()
+    copy = sealed_file.SealedFile.copy
+
+    def held_up(*arguments):
+        copying.set()
+        assert may_go.wait(WAIT)
+        copy(*arguments)
+
+    with monkeypatch.context() as held:
+        held.setattr(sealed_file.SealedFile, "copy", held_up)
+        other = threading.Thread(target=kit.record, args=(writer, trials[0], 50))
+        other.start()
+        assert copying.wait(WAIT)
+        kit.record(writer, trials[1], 50)  # returns
+        assert watched.beside == []
+        may_go.set()
+        other.join(WAIT)
+    assert watched.beside == ALL[:2]  # the other has caught up
+    kit.record(writer, trials[2], 50)
     assert verify_run(seal(writer)).sound
 
 
@@ -300,26 +323,23 @@ def written(results: Path, kit, order: list[int]) -> bytes:
 
 
 def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, monkeypatch):
-    """Whether trials were copied beside the others, after the last one, or by `seal` itself."""
+    """Whether trials were copied beside the others, sooner or later, or by `seal` itself."""
     files = [written(tmp_path / "as it comes", kit, [1, 2, 3])]
+    watched = Watched(monkeypatch)
+    advance = sealing.Sealer.advance
+
+    def late(sealer):
+        if 3 in sealer._first:
+            advance(sealer)
+
     with monkeypatch.context() as held:
-        watched = Watched(held, wait_for=3)
-        watched.may_go.clear()
-        real = sealing.Sealer.seal
-
-        def let_go(sealer):
-            assert watched.copied == []
-            watched.may_go.set()
-            return real(sealer)
-
-        held.setattr(sealing.Sealer, "seal", let_go)
-        files.append(written(tmp_path / "held up", kit, [1, 2, 3]))
-        assert watched.beside == ALL
-    with monkeypatch.context() as late:
-        late.setattr(sealing.Sealer, "add", lambda self, finished: None)
-        watched = Watched(late, wait_for=3)
-        files.append(written(tmp_path / "at the end", kit, [1, 2, 3]))
-        assert watched.at_the_end == ALL
+        held.setattr(sealing.Sealer, "advance", late)
+        files.append(written(tmp_path / "as it can", kit, [1, 2, 3]))
+    assert (watched.beside, watched.at_the_end) == (ALL[:2], ALL[2:])
+    monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
+    watched = Watched(monkeypatch)
+    files.append(written(tmp_path / "at the end", kit, [1, 2, 3]))
+    assert (watched.beside, watched.at_the_end) == ([], ALL)
     assert files[0] == files[1] == files[2]
 
 
@@ -327,54 +347,57 @@ def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, mon
     "failure", [OSError(28, "No space left on device"), RuntimeError("HDF5"), ArchiveError("?")]
 )
 def test_a_copy_that_fails_costs_nothing_but_time(tmp_path, kit, monkeypatch, failure):
-    watched = Watched(monkeypatch, wait_for=2)
-    writer, trials = begin(tmp_path, kit)
+    watched = Watched(monkeypatch)
+    writer, trials = begin(tmp_path, kit, 4)
     kit.record(writer, trials[0], 50)
     kit.record(writer, trials[1], 50)
-    assert watched.reached.wait(WAIT)
     watched.failures.append(failure)
     kit.record(writer, trials[2], 50)
-    path = seal(writer)
     assert watched.failures == []
+    assert not (writer.folder / SEALING).exists()
+    kit.record(writer, trials[3], 50)
+    path = seal(writer)
     assert watched.beside == ALL[:2]
-    assert watched.at_the_end == ALL  # begun anew
+    assert watched.at_the_end == [*ALL, "trial_00004"]  # begun anew
     assert verify_run(path).sound
-    assert path.read_bytes() == written(tmp_path / "again", kit, [1, 2, 3])
+
+
+def test_who_interrupts_a_copy_is_heard_and_the_run_can_be_sealed(tmp_path, kit, monkeypatch):
+    """The trial is in the journal by then."""
+    real = sealed_file.SealedFile._read_back
+    writer, trials = begin(tmp_path, kit)
+    with monkeypatch.context() as interrupted:
+
+        def interrupt(*arguments):
+            raise KeyboardInterrupt
+
+        interrupted.setattr(sealed_file.SealedFile, "_read_back", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            kit.record(writer, trials[0], 50)
+    assert sealed_file.SealedFile._read_back is real
+    kit.record(writer, trials[1], 50)
+    path = seal(writer)
+    assert len(open_run(path).trials) == 2
 
 
 def test_on_a_disk_that_is_nearly_full_nothing_is_copied_before_the_end(tmp_path, kit, monkeypatch):
-    asked = threading.Event()
-
-    def disk_usage(path):
-        asked.set()
-        return SimpleNamespace(total=1 << 40, used=1 << 40, free=1 << 20)
-
-    watched = Watched(monkeypatch, wait_for=3)
+    watched = Watched(monkeypatch)
     writer, trials = begin(tmp_path, kit)
     with monkeypatch.context() as nearly_full:
-        nearly_full.setattr(sealing.shutil, "disk_usage", disk_usage)
-        kit.record(writer, trials[0], 50)
-        assert asked.wait(WAIT)
-        for trial in trials[1:]:
+        usage = SimpleNamespace(total=1 << 40, used=1 << 40, free=1 << 20)
+        nearly_full.setattr(sealing.shutil, "disk_usage", lambda path: usage)
+        for trial in trials:
             kit.record(writer, trial, 50)
-        writer_thread_done(writer)
-    assert watched.copied == []
+    assert watched.beside == []
     assert not (writer.folder / SEALING).exists()
     path = seal(writer)
     assert (watched.beside, watched.at_the_end) == ([], ALL)
     assert verify_run(path).sound
 
 
-def writer_thread_done(writer: RunWriter) -> None:
-    """Wait until the sealer has given up."""
-    thread = writer._sealer._thread
-    thread.join(WAIT)
-    assert not thread.is_alive()
-
-
 def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypatch):
     """A first attempt that failed may be repeated, so it waits for the end."""
-    watched = Watched(monkeypatch, wait_for=1)
+    watched = Watched(monkeypatch)
     writer, trials = begin(tmp_path, kit)
 
     def fail(trial, count):
@@ -386,13 +409,12 @@ def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypa
     kit.record(writer, trials[0], 50)
     fail(trials[1], 10)
     fail(trials[1], 20)
-    assert watched.reached.wait(WAIT)
     kit.record(writer, trials[1], 30)
     kit.record(writer, trials[2], 50)
     run = open_run(seal(writer))
     first = ["trial_00002_attempt_1", "trial_00002_attempt_2", "trial_00002"]
-    assert set(watched.beside) <= {"trial_00001", "trial_00003"}
-    assert sorted(entry for entry, _ in watched.copied) == sorted(["trial_00001", *first, ALL[2]])
+    assert watched.beside == ["trial_00001", "trial_00003"]
+    assert watched.at_the_end == first
     earlier = run.earlier_attempts[2]
     assert [attempt.entry for attempt in earlier] == first[:2]
     assert [attempt.ending.reason for attempt in earlier] == ["after 10", "after 20"]
@@ -403,10 +425,9 @@ def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypa
 
 def test_a_trial_that_completed_and_is_repeated_is_copied_anew(tmp_path, kit, monkeypatch):
     """It was copied as the trial, and turns out to be its first attempt."""
-    watched = Watched(monkeypatch, wait_for=1)
+    watched = Watched(monkeypatch)
     writer, trials = begin(tmp_path, kit)
     kit.record(writer, trials[0], 50)
-    assert watched.reached.wait(WAIT)
     assert watched.beside == ["trial_00001"]
     kit.record(writer, trials[0], 60)
     run = open_run(seal(writer))
@@ -416,10 +437,9 @@ def test_a_trial_that_completed_and_is_repeated_is_copied_anew(tmp_path, kit, mo
 
 
 def test_whoever_lets_go_of_a_run_leaves_no_copy(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch, wait_for=1)
     writer, trials = begin(tmp_path, kit)
     kit.record(writer, trials[0], 50)
-    assert watched.reached.wait(WAIT)
+    assert (writer.folder / SEALING).is_file()
     writer.close()
     assert not (writer.folder / SEALING).exists()
 
@@ -483,24 +503,13 @@ def test_beside_the_trials_is_copied_as_long_as_room_is_left_for_them(
     (finished,) = finished_in(writer)
     free = sealing._FREE + 2 * finished.bytes - short
     monkeypatch.setattr(sealing.shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
-    watched = Watched(monkeypatch, wait_for=1)
+    watched = Watched(monkeypatch)
     sealer = sealing.Sealer(writer.folder)
     sealer.add(finished)
-    sealer._stop()
+    sealer.advance()
     assert watched.beside == copied
     sealer.discard()
     writer.close()
-
-
-def test_one_thread_copies_that_keeps_no_process_alive(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
-    thread = writer._sealer._thread
-    assert (thread.name, thread.daemon) == ("sealer", True)
-    kit.record(writer, trials[1], 50)
-    assert writer._sealer._thread is thread
-    seal(writer)
-    assert not thread.is_alive()
 
 
 def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
@@ -508,24 +517,22 @@ def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
     kit.record(writer, trials[0], 50)
     writer._sealer.discard()
     writer._sealer.discard()
-    assert writer._sealer._thread is None
     assert not (writer.folder / SEALING).exists()
     assert not [name for name in open_files(writer.folder) if SEALING in name]
     sealer = sealing.Sealer(writer.folder)
-    watched = Watched(monkeypatch, wait_for=1)
+    watched = Watched(monkeypatch)
     sealer.add(*finished_in(writer))
-    assert watched.reached.wait(WAIT)
+    sealer.advance()
     sealer.discard()
     assert watched.beside == ALL[:1]
     writer.close()
 
 
 def test_after_a_failure_nothing_more_is_copied_beside(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch, wait_for=3)
+    watched = Watched(monkeypatch)
     watched.failures.append(OSError(28, "No space left on device"))
     writer, trials = begin(tmp_path, kit)
     kit.record(writer, trials[0], 50)
-    writer_thread_done(writer)
     for trial in trials[1:]:
         kit.record(writer, trial, 50)
     assert not (writer.folder / SEALING).exists()
@@ -535,12 +542,11 @@ def test_after_a_failure_nothing_more_is_copied_beside(tmp_path, kit, monkeypatc
 
 
 def test_what_did_not_complete_waits_for_the_end_and_holds_nobody_up(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch, wait_for=2)
+    watched = Watched(monkeypatch)
     writer, trials = begin(tmp_path, kit)
     kit.record(writer, trials[0], 50)
     kit.record(writer, trials[1], None)
     kit.record(writer, trials[2], 50)
-    assert watched.reached.wait(WAIT)
     assert watched.beside == ["trial_00001", "trial_00003"]
     path = seal(writer)
     assert watched.at_the_end == ["trial_00002"]
@@ -554,11 +560,11 @@ def test_a_later_attempt_that_completed_waits_for_the_end(tmp_path, kit, monkeyp
     kit.record(writer, trials[0], 50)
     writer._sealer.discard()
     first, second = finished_in(writer)
-    watched = Watched(monkeypatch, wait_for=1)
+    watched = Watched(monkeypatch)
     sealer = sealing.Sealer(writer.folder)
     sealer.add(second)  # as if the journal had lost the first one
-    sealer._stop()
-    assert (watched.copied, first.attempt, second.attempt) == ([], 1, 2)
+    sealer.advance()
+    assert (watched.beside, first.attempt, second.attempt) == ([], 1, 2)
     writer.close()
 
 
@@ -579,7 +585,7 @@ def test_a_refusal_leaves_no_file_open(tmp_path, kit, monkeypatch, step):
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sealing.Sealer, "add", lambda self, finished: None)
+    monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
     monkeypatch.setattr(sealed_file.SealedFile, step, fail)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
