@@ -22,8 +22,10 @@ demo: $(VENV)/installed
 		&& echo "archive  $$run" && echo "report   $${run%.nxs}-report/report.html"
 
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
+# A test that hangs tells where after 20 minutes, and ends its worker.
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 $(PYTEST_OPTIONS)
+	$(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 \
+		-o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true $(PYTEST_OPTIONS)
 
 soak: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m soak -n auto --max-worker-restart 0 $(PYTEST_OPTIONS)

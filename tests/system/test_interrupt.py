@@ -59,7 +59,8 @@ def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
     write(tmp_path, LONG)
     terminal, theirs = pty.openpty()
     own_terminal = (
-        "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+        "import fcntl, os, signal, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # these tests may be under nohup
         "os.execv(sys.argv[1], sys.argv[1:])"
     )
     with subprocess.Popen(
