@@ -27,7 +27,7 @@ from campaign.archive.record import Trees, TrialRecord
 from campaign.archive.recorded import TIME, check_unit, series_of
 from campaign.archive.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.run_reader import RunReader
-from campaign.archive.seal import OUTSIDE, SealedTexts
+from campaign.archive.seal import NUMBERS, OUTSIDE, SealedTexts
 from campaign.archive.sealed import NOTES, read_entry, read_not_kept, read_sealed
 from campaign.archive.series import series_at
 from campaign.archive.story import Lines, read_lines
@@ -42,10 +42,9 @@ from campaign.archive.verification import (
 from campaign.errors import ArchiveError
 
 _HASH = "outcome/file_sha256"
-_NUMBERS = ("provenance/format", "outcome/trials_finished", "outcome/trials_failed")
 _REQUIRED = frozenset(
     [
-        *("title", "entry_identifier", "start_time", "end_time", "program_name", *_NUMBERS),
+        *("title", "entry_identifier", "start_time", "end_time", "program_name", *NUMBERS),
         *("provenance/name", "provenance/created"),
         *("outcome/status", "outcome/reason", "outcome/safe_state"),
         *(f"{note}/{name}" for note in NOTES for name in ("type", "file_name", "data")),
@@ -155,10 +154,7 @@ class _Check:
             self.problems.add(f"/run/{place}", "is missing from the seal")
         for place in bound:
             with self.problems.noting():
-                if place in _NUMBERS:
-                    texts.integer(place)
-                else:
-                    texts.text(place)
+                texts.check(place)
             self.datasets += 1
         for place in sorted(set(_places(file, "run")) - bound - OUTSIDE):
             self.remarks.add(f"/run/{place}", "is nothing that the format knows")
@@ -340,7 +336,7 @@ class _Check:
             self.progress(series.stored)
             self.datasets += 1
             infos = {info.name: info for info in (TIME, *record.series)}
-            check_unit(series, infos[name].unit)
+            check_unit(series.hdf5, infos[name].unit)
             if guarded.attribute(series.hdf5, "long_name") != infos[name].long_name:
                 self.problems.add(f"{place}/{name}@long_name", "is not what was recorded")
 

@@ -15,7 +15,7 @@ from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import SEALED
 from campaign.archive.record import SeriesRecord, Trees, TrialRecord
 from campaign.archive.run_folder import first_line
-from campaign.archive.series import Series, series_at
+from campaign.archive.series import series_at
 from campaign.errors import ArchiveError
 from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording
 
@@ -59,7 +59,7 @@ class RecordedSamples:
             for told in channels:
                 series = series_at(data, told.name, self.record.samples or 0)
                 samples = series.read(told.sha256)
-                check_unit(series, told.unit)
+                check_unit(series.hdf5, told.unit)
                 yield told.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
@@ -75,7 +75,7 @@ class RecordedSamples:
     def _time(self) -> Array:
         with self._data() as data:
             series = series_at(data, TIME.name, self.record.samples or 0)
-            check_unit(series, TIME.unit)
+            check_unit(series.hdf5, TIME.unit)
             return series.read(self.record.time)
 
     @contextmanager
@@ -166,11 +166,11 @@ def parse_record(path: Path, place: str, text: str) -> TrialRecord:
         raise ArchiveError(f"{path}: {place}: {first_line(error)}") from None
 
 
-def check_unit(series: Series, told: str) -> None:
+def check_unit(series: h5py.Dataset, told: str) -> None:
     """ArchiveError unless a series has the unit in which it was recorded."""
-    unit = guarded.attribute(series.hdf5, "units")
+    unit = guarded.attribute(series, "units")
     if unit != told:
-        place = f"{series.place}@units"
+        place = f"{series.file.filename}: {series.name}@units"
         raise ArchiveError(f"{place}: is {unit!r}, and {told!r} was recorded")
 
 
@@ -193,6 +193,6 @@ def _problems(path: Path, file: h5py.File, entry_name: str, record: TrialRecord)
                 data = guarded.inner_group(guarded.inner_group(file, entry_name), group)
                 series = series_at(data, name, length)
                 series.check(digest)
-                check_unit(series, units[name])
+                check_unit(series.hdf5, units[name])
         except ArchiveError as error:
             yield str(error)

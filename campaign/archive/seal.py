@@ -29,6 +29,10 @@ OUTSIDE = frozenset({SEAL, "outcome/file_sha256", "not_kept/type", "not_kept/fil
 kept, so that samples may be dropped from a run that was signed."""
 
 
+NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/format")
+"""What of `/run` is a whole number; all else is a text."""
+
+
 class Seal(BaseModel):
     """The digests of a run's texts by their place in `/run`; of a number, those of its digits."""
 
@@ -96,6 +100,13 @@ class SealedTexts:
         with guarded.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
             return guarded.integer_at(parent, name, self._digest(place))
+
+    def check(self, place: str) -> None:
+        """A text or a number of `/run`. Raises ArchiveError when it is damaged."""
+        if place in NUMBERS:
+            self.integer(place)
+        else:
+            self.text(place)
 
     def _parent(self, place: str) -> tuple[h5py.Group, str]:
         group, _, name = place.rpartition("/")

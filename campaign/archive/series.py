@@ -67,11 +67,6 @@ class Series:
             found.update(block)
         self._compare(found.hexdigest(), digest)
 
-    def layout(self) -> tuple[tuple[int, int], ...]:
-        """Where in the file the chunks lie: offset and bytes of each."""
-        chunks = map(self.dataset.get_chunk_info, range(self.dataset.get_num_chunks()))
-        return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)
-
     @cached_property
     def hdf5(self) -> h5py.Dataset:
         """As h5py's other interface knows it, for attributes."""
@@ -119,6 +114,12 @@ def series_at(parent: h5py.Group, name: str, length: int) -> Series:
         what = f"has {stated} samples, and {length} were recorded"
         raise ArchiveError(f"{_place(parent, name)}: {what}")
     return Series(found, parent, name, length, chunk, filters == _SHUFFLED)
+
+
+def layout_of(dataset: h5d.DatasetID) -> tuple[tuple[int, int], ...]:
+    """Where in the file the chunks of a series lie: offset and bytes of each."""
+    chunks = map(dataset.get_chunk_info, range(dataset.get_num_chunks()))
+    return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)
 
 
 def _place(parent: h5py.Group, name: str) -> str:

@@ -17,7 +17,8 @@ def results(tmp_path, kit):
     trials = [kit.trial(1), kit.trial(2)]
     writer = RunWriter.create(tmp_path, kit.header("2026-11-22T09-00-00-map"), trials)
     kit.record(writer, trials[0], 10)
-    return tmp_path
+    yield tmp_path
+    writer.close()
 
 
 def not_opened(monkeypatch):

@@ -258,10 +258,14 @@ def test_a_copy_is_told_of_with_where_its_samples_lie(one):
     folder, file, (first, _) = one
     file.copy(folder, first, "trial_00001_attempt_1")
     assert file.copied == {"trial_00001_attempt_1": first}
-    names = ("time", "command", "gyro_rate", "friction_torque")
-    assert file.layouts.keys() == {f"trial_00001_attempt_1/data/{name}" for name in names}
-    assert len(set(file.layouts.values())) == 4
-    for ((offset, size),) in file.layouts.values():
+    assert file.placed.keys() == {"trial_00001_attempt_1"}
+    placed = file.placed["trial_00001_attempt_1"]
+    units = {"time": "s", "command": "rad/s", "gyro_rate": "rad/s", "friction_torque": "N m"}
+    assert {each.name: each.unit for each in placed} == units
+    assert len({each.layout for each in placed}) == 4
+    for each in placed:
+        ((offset, size),) = each.layout
+        assert each.group == "data"
         assert offset > 0
         assert size > 0
     file.discard()
