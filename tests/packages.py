@@ -40,9 +40,8 @@ class GreaseOptions(FrictionOptions):
     """A matter of numerics."""
 
 
-def _step(parameters, state, v0, v1, h, compliance, line):
-    line[0] = share(parameters[0]) * math.tanh(v0 / 1e-3)
-    line[1] = 0.0
+def _step(parameters, state, motion):
+    return share(parameters[0]) * math.tanh(motion.rate_start / 1e-3), 0.0
 
 
 FRICTION = FrictionModel(
@@ -50,7 +49,7 @@ FRICTION = FrictionModel(
     summary="a film with a yield torque",
     options=GreaseOptions,
     parameters=lambda options: np.array([options.yield_torque]),
-    state_size=0,
+    state_size=lambda options: 0,
     step=_step,
     viscous=lambda options: 0.0,
     steady_state=lambda options, v: options.yield_torque * np.sign(v),

@@ -259,23 +259,22 @@ sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_model
 """
     done = page.python(code)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "2 passed" in done.stdout
+    assert "3 passed" in done.stdout
 
 
 def test_the_page_s_model_can_be_named_by_a_bench_and_compiles(page: Packages) -> None:
     code = """
-import ctypes, json
+import json
+import numpy as np
 from campaign.physics.friction import FrictionField, friction_models
-from campaign.physics.step_function import address_of
+from campaign.physics.step_function import Motion, single_step
 from pydantic import TypeAdapter
 tree = {"model": "grease", "yield_torque": "8 N m", "shear_rate": "0.1 rad/s"}
 options = TypeAdapter(FrictionField).validate_python(tree)
 model = friction_models()["grease"]
-doubles, double = ctypes.POINTER(ctypes.c_double), ctypes.c_double
-step = ctypes.CFUNCTYPE(None, doubles, doubles, double, double, double, double, doubles)
-line, none = (double * 2)(), (double * 1)()
-parameters = (double * 2)(*model.parameters(options))
-step(address_of(model.step))(parameters, none, 0.1, 0.1, 1e-3, 0.0, line)
+line = single_step(
+    model.step, model.parameters(options), np.zeros(0), Motion.at(0.1, 0.1, step=1e-3)
+)
 print(json.dumps([options.model_dump(mode="json")["model"], line[0], line[1]]))
 """
     name, torque, change = said(page, code)

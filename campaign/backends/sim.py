@@ -63,7 +63,7 @@ class SimOptions(Options):
     """Options of the simulated bench."""
 
     longest_step: Time | None = Field(default=None, gt=0, le=0.01)
-    """Longest integration step; absent: 0.25 ms, with a sampled controller 1 ms. Sample rates and
+    """Longest integration step; absent: what the trial needs, 1 ms or 1/2^k of it. Sample rates and
     the frequencies of sines make it shorter."""
 
 

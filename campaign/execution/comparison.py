@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,6 +17,30 @@ def differences(was: Recording, now: Recording) -> list[str]:
     another outcome are differences of their own.
     """
     return list(_differences(was, now))
+
+
+def changes(was: Recording, now: Recording) -> dict[str, float]:
+    """By channel, the rms of what changed over the rms of what was.
+
+    Infinite for a channel that was zero throughout and is not, that only one of them has, or whose
+    number of samples changed.
+    """
+    names = dict.fromkeys((*was.channels, *now.channels))
+    both = was.channels.keys() & now.channels.keys()
+    return {n: _change(was[n], now[n]) if n in both else math.inf for n in names}
+
+
+def _change(was: Array, now: Array) -> float:
+    if was.tobytes() == now.tobytes():
+        return 0.0
+    if len(was) != len(now):
+        return math.inf
+    gone, size = _rms(now - was), _rms(was)
+    return gone / size if size > 0.0 else math.inf
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0
 
 
 def _differences(was: Recording, now: Recording) -> Iterator[str]:

@@ -118,16 +118,25 @@ def compiled(function: F) -> F:
     """Decorator: compile at the first call, keep on disk, release the GIL while running."""
     folder = cache_folder(function.__module__)
     with _kept_in(folder):
-        return cast(F, numba.njit(cache=folder is not None, nogil=True)(function))
+        compile_ = numba.njit(cache=folder is not None, nogil=True, error_model="numpy")
+        return cast(F, compile_(function))
 
 
 def inlined(function: F) -> F:
     """Decorator: a part of the engine's loop, pasted into its caller so that it costs no call."""
-    return cast(F, numba.njit(inline="always")(function))
+    return cast(F, numba.njit(inline="always", error_model="numpy")(function))
 
 
-def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
-    """Compile `function` now, with a C signature; the result has an `address`."""
-    folder = cache_folder(function.__module__)
+def called(function: F) -> F:
+    """Decorator: a part of the engine that is compiled for itself, where a call costs little."""
+    return cast(F, numba.njit(error_model="numpy")(function))
+
+
+def compiled_callback(signature: Any, function: Callable[..., Any], module: str) -> Any:
+    """Compile `function`, which calls one of `module`, now; the result has an `address`.
+
+    Whether it is kept is asked anew each time: the module may have been edited and loaded again.
+    """
+    folder = cache_folder.__wrapped__(module)
     with _kept_in(folder):
-        return numba.cfunc(signature, cache=folder is not None)(function)
+        return numba.cfunc(signature, cache=folder is not None, error_model="numpy")(function)

@@ -26,14 +26,23 @@ from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import Compensator, LinearBlock
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionOptions
+from campaign.physics.rows import (
+    ANGLE,
+    APPENDAGE_RATE,
+    BASE_RATE,
+    COMPENSATION,
+    CURRENT,
+    CURRENT_INTEGRAL,
+    DEFLECTION,
+    DRIVE,
+    FRICTION,
+    INPUTS,
+    PLANT_STATES,
+    RATE,
+    RELATIVE_ANGLE,
+)
 
 Array = NDArray[np.float64]
-
-# States that every loop has, in this order; the appendage's two and the continuous controller's
-# own follow.
-RATE, ANGLE, RELATIVE_ANGLE, CURRENT, CURRENT_INTEGRAL = range(5)
-# Inputs. DRIVE is the commanded rate or torque, or, with a sampled controller, the current.
-DRIVE, BASE_RATE, FRICTION, COMPENSATION = range(4)
 
 
 @dataclass(frozen=True)
@@ -43,13 +52,14 @@ class Loop:
     Attributes:
         a: (n, n), per second and SI.
         b: (n, 4), columns DRIVE, BASE_RATE, FRICTION (N m at the load), COMPENSATION (N m).
-        relative_rate: (n,) and (4,): the relative rate that compensation sees, of x and u.
+        seen: the state that compensation reads as the relative rate: RATE, of which the base's is
+            taken, or that of the filter.
         linear_compensation: (n,) and (4,): torque of the linear compensation block, of x and u.
     """
 
     a: Array
     b: Array
-    relative_rate: tuple[Array, Array]
+    seen: int
     linear_compensation: tuple[Array, Array]
 
 
@@ -87,7 +97,7 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
     filter_state = rate_integral + 1
     first = filter_state + filtered
     a, b = _plant(bench, first + order)
-    filter_x, filter_u = np.zeros(len(a)), np.zeros(4)
+    filter_x, filter_u = np.zeros(len(a)), np.zeros(INPUTS)
     if filtered:
         filter_x[filter_state] = 1.0
         a[filter_state, RATE] = 1.0 / bench.controller.relative_rate_filter
@@ -96,7 +106,7 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
     else:
         filter_x[RATE], filter_u[BASE_RATE] = 1.0, -1.0
 
-    torque_x, torque_u = np.zeros(len(a)), np.zeros(4)
+    torque_x, torque_u = np.zeros(len(a)), np.zeros(INPUTS)
     if block is not None:
         _add_block(a, b, block, first, bench.torque_per_current, filter_x, filter_u)
         torque_x[first:] = block.c
@@ -105,7 +115,7 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
         torque_x += block.d[2] * filter_x
         torque_u += block.d[2] * filter_u
 
-    command_x, command_u = np.zeros(len(a)), np.zeros(4)
+    command_x, command_u = np.zeros(len(a)), np.zeros(INPUTS)
     if mode == "rate":
         gains = bench.controller.rate
         command_x[RATE], command_u[DRIVE] = -gains.proportional, gains.proportional
@@ -121,7 +131,7 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
         command_x += viscous * filter_x
         command_u += viscous * filter_u
     _close_current_loop(a, b, bench, command_x, command_u)
-    return Loop(a, b, (filter_x, filter_u), (torque_x, torque_u))
+    return Loop(a, b, filter_state if filtered else RATE, (torque_x, torque_u))
 
 
 def make_spring(bench: Bench, stiffness: float) -> Loop:
@@ -133,29 +143,25 @@ def make_spring(bench: Bench, stiffness: float) -> Loop:
     inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
     a[RATE, RELATIVE_ANGLE] -= stiffness / inertia
     b[RATE, DRIVE] += stiffness / inertia
-    relative_x, relative_u = np.zeros(order), np.zeros(4)
-    relative_x[RATE], relative_u[BASE_RATE] = 1.0, -1.0
-    return Loop(a, b, (relative_x, relative_u), (np.zeros(order), np.zeros(4)))
+    return Loop(a, b, RATE, (np.zeros(order), np.zeros(INPUTS)))
 
 
 def make_plant(bench: Bench) -> Loop:
     """The axis with its current loop; DRIVE is the commanded current that a controller holds."""
     order = _plant_order(bench)
     a, b = _plant(bench, order)
-    command_u = np.zeros(4)
+    command_u = np.zeros(INPUTS)
     command_u[DRIVE] = 1.0
     _close_current_loop(a, b, bench, np.zeros(order), command_u)
-    relative_x, relative_u = np.zeros(order), np.zeros(4)
-    relative_x[RATE], relative_u[BASE_RATE] = 1.0, -1.0
-    return Loop(a, b, (relative_x, relative_u), (np.zeros(order), np.zeros(4)))
+    return Loop(a, b, RATE, (np.zeros(order), np.zeros(INPUTS)))
 
 
 def _plant_order(bench: Bench) -> int:
-    return 5 if bench.appendage is None else 7
+    return PLANT_STATES if bench.appendage is None else PLANT_STATES + 2
 
 
 def _plant(bench: Bench, size: int) -> tuple[Array, Array]:
-    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    a, b = np.zeros((size, size)), np.zeros((size, INPUTS))
     inertia, motor = bench.axis.inertia, bench.motor
     if bench.appendage is not None:
         inertia -= bench.appendage.inertia
@@ -175,15 +181,14 @@ def _plant(bench: Bench, size: int) -> tuple[Array, Array]:
 
 
 def _add_appendage(a: Array, appendage: AppendageOptions, body: float) -> None:
-    """States 5, 6: deflection and rate of the appendage, elastically hung on the load."""
+    """Deflection and rate of the appendage, elastically hung on the load."""
     omega = 2.0 * np.pi * appendage.frequency
     stiffness = omega**2 * appendage.inertia
     damping = 2.0 * appendage.damping_ratio * omega * appendage.inertia
-    deflection, rate = 5, 6
-    a[deflection, rate], a[deflection, RATE] = 1.0, -1.0
-    for row, share in ((rate, -1.0 / appendage.inertia), (RATE, 1.0 / body)):
-        a[row, deflection] += share * stiffness
-        a[row, rate] += share * damping
+    a[DEFLECTION, APPENDAGE_RATE], a[DEFLECTION, RATE] = 1.0, -1.0
+    for row, share in ((APPENDAGE_RATE, -1.0 / appendage.inertia), (RATE, 1.0 / body)):
+        a[row, DEFLECTION] += share * stiffness
+        a[row, APPENDAGE_RATE] += share * damping
         a[row, RATE] -= share * damping
 
 

@@ -31,7 +31,8 @@ from campaign.physics.linear_friction import (
     bench_friction,
     compensation_friction,
 )
-from campaign.physics.loop import (
+from campaign.physics.loop import discretise, make_compensator, make_loop, make_plant
+from campaign.physics.rows import (
     ANGLE,
     COMPENSATION,
     CURRENT,
@@ -39,10 +40,6 @@ from campaign.physics.loop import (
     FRICTION,
     RATE,
     RELATIVE_ANGLE,
-    discretise,
-    make_compensator,
-    make_loop,
-    make_plant,
 )
 from campaign.physics.variation import of_its_day
 from campaign.signals import Array
@@ -93,7 +90,8 @@ def _continuous(
     mode: Mode,
 ) -> OpenLoop:
     loop = make_loop(bench, "torque", compensator)  # compensation is closed, the rate loop open
-    seen, low_pass = loop.relative_rate[0], bench.controller.relative_rate_filter
+    seen, low_pass = np.zeros(len(loop.a)), bench.controller.relative_rate_filter
+    seen[loop.seen] = 1.0
     # The bristles of a model move with the integral of the rate it sees; behind a low-pass that
     # is the angle less what the low-pass still holds back.
     angle = np.zeros(len(seen))
@@ -244,7 +242,9 @@ class _Sampled:
         for model in self.models:
             side = 1 if model.motor_side else 0
             now, before = rates[side], self.state("rates")[side]
-            torque = torque + model.viscous * now + 0.5 * model.damping * (before + now)
+            # Bristles answer where their line ends; a curve without a state by its mean.
+            met = now if model.stiffness else 0.5 * (before + now)
+            torque = torque + model.viscous * now + model.damping * met
             if model.stiffness:
                 # z, the trapezoidal sum of the filtered differences, is the angle less what
                 # the low-pass still holds back and half a step.

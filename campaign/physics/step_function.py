@@ -1,87 +1,250 @@
 """The step function of a friction model, and how the engine calls one it has never seen.
 
-A step function is plain Python of a few lines::
+A step function is plain Python of a few lines, for one interface of one trial::
 
-    step(parameters, state, v0, v1, h, compliance, line) -> None
+    step(parameters, state, motion) -> tuple[float, float]
 
 parameters: the model's numbers, read only.   state: the model's numbers, advanced in place.
-v0: relative velocity (rad/s) when the step begins.   v1: the velocity expected at its end if this
-friction's torque were as at the end of the last step (zero for a model without state).
-h: the step (s).   compliance: how much the velocity at the end of the step falls per unit of mean
-torque (rad/s per N m); 0 where the velocity does not answer within the step.
-line: out. line[0] is the mean torque over the step, line[1] its change over the step (N m); the
-torque enters the plant as that straight line. The viscous part is not in it.
+motion: what the interface meets over the step, see `Motion`.
+It returns the mean torque over the step and its change over the step (N m): the torque enters the
+plant as that straight line. The viscous part is not in it. It must not raise: native code cannot
+pass an exception on, and what is not a number ends the trial as diverged.
 
-numba compiles each step function once to native code with a fixed C signature. The engine gets its
-address as a number, so one compiled engine serves every model, of this package or of another.
+The same function serves one trial and many. numba compiles it twice to native code with a fixed
+signature: for one lane, and for a block of LANES lanes, where the processor does several at once
+if the function has no branches but `a if condition else b` between numbers that are there already,
+and calls nothing but `campaign.physics.elementary`. Any other function works and is slower. The
+engine gets addresses, so one compiled engine serves every model, of this package or of another.
 """
 
 from __future__ import annotations
 
+import ctypes
+import threading
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from numba import types
-from numba.extending import intrinsic
+import numpy as np
+from numba import carray, types
+from numba.extending import intrinsic, overload
+from numpy.typing import NDArray
 
-from campaign.physics.compiled import compiled_callback
+from campaign.physics.compiled import compiled_callback, inlined
+from campaign.physics.elementary import where
+from campaign.physics.rows import (
+    ANSWERS,
+    CHANGE,
+    HAS,
+    HAS_NORMAL_LOAD,
+    HAS_PARAMETERS,
+    HAS_PER_TORQUE,
+    HAS_RATE,
+    HAS_STATE,
+    HAS_STATES,
+    HAS_TEMPERATURE,
+    HAS_TORQUE,
+    HELD,
+    KEEPS,
+    KEEPS_TORQUE,
+    MEAN,
+    MEETS_COMPLIANCE,
+    MEETS_PER_STEP,
+    MEETS_POSITION,
+    MEETS_PUSH,
+    MEETS_RATE_END,
+    MEETS_RATE_MEAN,
+    MEETS_RATE_START,
+    MEETS_RIPPLE,
+    MEETS_STEP,
+)
+
+Array = NDArray[np.float64]
+
+LANES = 16
+"""Trials of a block: fewer leave the processor's vectors empty, more its first-level cache."""
+
+ROOM_TEMPERATURE = 293.15
+"""K; no bench tells another one yet."""
+MOST_ROWS = 1 << 16
+"""What the compiler may assume an array to have at most; nothing is as long."""
+
+
+class Motion(NamedTuple):
+    """What one interface meets over a step, in its own units: the motor's, for a motor-side one.
+
+    Attributes:
+        rate_start: relative rate when the step begins (rad/s).
+        rate_end: the rate expected when it ends if all torques stay as they are.
+        rate_mean: its mean over the step, expected likewise; a straight line would have the mean
+            of both ends.
+        applied: mean torque of all else on the interface over the step (N m): what friction would
+            have to hold to keep the rate; 0 where there is no compliance.
+        position: relative angle (rad) in the middle of the step, of the load.
+        temperature: K.
+        normal_load: of the interface, relative to the nominal one.
+        step: s.
+        per_step: its reciprocal.
+        compliance: how much the rate at the end falls per N m of mean torque (rad/s per N m); 0
+            where the rate does not answer within the step, as in compensation.
+    """
+
+    rate_start: float
+    rate_end: float
+    rate_mean: float
+    applied: float
+    position: float
+    temperature: float
+    normal_load: float
+    step: float
+    per_step: float
+    compliance: float
+
+    @staticmethod
+    def at(
+        rate_start: float,
+        rate_end: float,
+        step: float,
+        *,
+        applied: float = 0.0,
+        position: float = 0.0,
+        temperature: float = ROOM_TEMPERATURE,
+        normal_load: float = 1.0,
+        compliance: float = 0.0,
+    ) -> Motion:
+        """A motion of which little is to be said, for tests of a model."""
+        return Motion(
+            rate_start, rate_end, 0.5 * (rate_start + rate_end), applied, position, temperature,
+            normal_load, step, 1.0 / step, compliance,
+        )  # fmt: skip
+
 
 _DOUBLES = types.CPointer(types.float64)
-SIGNATURE = types.void(
-    _DOUBLES, _DOUBLES, types.float64, types.float64, types.float64, types.float64, _DOUBLES
-)
+SIGNATURE = types.void(_DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
+
+
+def address_of(step: Callable[..., Any], lanes: int) -> int:
+    """Address of the step function compiled for so many lanes; it stays valid."""
+    return int(compiled_step(step, lanes).address)
+
+
+def compiled_step(step: Callable[..., Any], lanes: int) -> Any:
+    """The step function compiled for so many lanes, kept for the life of the process.
+
+    `step` may be compiled already: then it is what it was compiled of.
+    """
+    with _COMPILING:
+        return _compiled_once(getattr(step, "py_func", step), lanes)
+
+
+_COMPILING = threading.RLock()
 
 
 @cache
-def address_of(step: Callable[..., None]) -> int:
-    """Address of the compiled step function; it stays valid for the life of the process."""
-    callback = compiled_callback(SIGNATURE, step)
-    _KEEP_ALIVE.append(callback)
-    return int(callback.address)
+def _compiled_once(step: Callable[..., Any], lanes: int) -> Any:
+    _known_to_numba(step)
+    return compiled_callback(SIGNATURE, _by_lanes(step, lanes), step.__module__)
 
 
-_KEEP_ALIVE: list[Any] = []
+@cache
+def _known_to_numba(step: Callable[..., Any]) -> None:
+    """Compiled code may call it from now on; pasted into its caller, so that lanes go together."""
+    overload(step, jit_options={"error_model": "numpy"}, inline="always", strict=False)(
+        lambda parameters, state, motion: step
+    )
+
+
+def single_step(
+    step: Callable[..., Any], parameters: Array, state: Array, motion: Motion
+) -> tuple[float, float]:
+    """One step of one interface, through the code that the engine runs: for tests of a model.
+
+    parameters (p,) and state (s,) as the step function gets them; the state is advanced in place.
+    Returns mean torque and its change (N m).
+    """
+    sizes = len(parameters), len(state)
+    fixed = np.array([
+        1.0, 1.0, 1.0, 1.0, motion.temperature, motion.normal_load, *sizes, *parameters,
+    ])  # fmt: skip
+    kept, answer = np.array([0.0, *state]), np.zeros(ANSWERS)
+    met = np.array([
+        motion.rate_start, motion.rate_end, motion.rate_mean, motion.applied, motion.compliance,
+        motion.position, 1.0, motion.step, motion.per_step,
+    ])  # fmt: skip
+    run = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(address_of(step, 1))
+    run(*(rows.ctypes.data for rows in (fixed, kept, met, answer)))
+    state[:] = kept[KEEPS:]
+    return float(answer[MEAN]), float(answer[CHANGE])
+
+
+def _by_lanes(step: Any, lanes: int) -> Callable[..., None]:
+    """The step function for so many lanes.
+
+    Arrays are rows by lanes, lane last; `rows` names the rows. The number of lanes stands in the
+    code as a number, so that the compiler knows how far apart rows are; else it could not tell that
+    they do not overlap.
+    """
+
+    def by_lanes(fixed: Any, kept: Any, met: Any, answer: Any) -> None:
+        has, keeps = carray(fixed, (MOST_ROWS, lanes)), carray(kept, (MOST_ROWS, lanes))
+        meets, line = carray(met, (MOST_ROWS, lanes)), carray(answer, (MOST_ROWS, lanes))
+        for k in range(lanes):
+            motion = _motion(k, has, keeps, meets)
+            own = has[HAS : HAS + int(has[HAS_PARAMETERS, k]), k]
+            state = keeps[KEEPS : KEEPS + int(has[HAS_STATES, k]), k]
+            mean, change = step(own, state, motion)
+            _take(k, mean, change, has, keeps, meets, line)
+
+    return by_lanes
+
+
+@inlined
+def _motion(k: int, has: Any, keeps: Any, meets: Any) -> Motion:
+    """What the interface in lane `k` meets, in its own units."""
+    rate, ripple = has[HAS_RATE, k], meets[MEETS_RIPPLE, k]
+    others, compliance = meets[MEETS_PUSH, k] + keeps[KEEPS_TORQUE, k], meets[MEETS_COMPLIANCE, k]
+    return Motion(
+        meets[MEETS_RATE_START, k] * rate,
+        meets[MEETS_RATE_END, k] * rate,
+        meets[MEETS_RATE_MEAN, k] * rate,
+        where(compliance > 0.0, others * has[HAS_PER_TORQUE, k] / ripple, 0.0),
+        meets[MEETS_POSITION, k],
+        has[HAS_TEMPERATURE, k],
+        has[HAS_NORMAL_LOAD, k],
+        meets[MEETS_STEP, k],
+        meets[MEETS_PER_STEP, k],
+        compliance * has[HAS_TORQUE, k] * ripple * rate,
+    )
+
+
+@inlined
+def _take(
+    k: int, mean: float, change: float, has: Any, keeps: Any, meets: Any, answer: Any
+) -> None:
+    """Add the line of the interface in lane `k` to the answer, at the load."""
+    torque = has[HAS_TORQUE, k] * meets[MEETS_RIPPLE, k]
+    own_mean, own_change = mean * torque, change * torque
+    # A model without a state takes what the rate leaves it, and the next one does without.
+    held = has[HAS_STATE, k] * (own_mean + 0.5 * own_change)
+    meets[MEETS_PUSH, k] -= (1.0 - has[HAS_STATE, k]) * own_mean
+    keeps[KEEPS_TORQUE, k] = held
+    answer[MEAN, k] += own_mean
+    answer[CHANGE, k] += own_change
+    answer[HELD, k] += held
 
 
 @intrinsic
-def call_step(
-    typingctx: Any,
-    address: Any,
-    parameters: Any,
-    state: Any,
-    v0: Any,
-    v1: Any,
-    h: Any,
-    compliance: Any,
-    line: Any,
-) -> Any:
-    """Call a step function by address; `parameters`, `state`, `line` are addresses of doubles."""
+def call_step(typingctx: Any, address: Any, fixed: Any, kept: Any, met: Any, answer: Any) -> Any:
+    """Call a step function by address; the rest are addresses of doubles."""
     from llvmlite import ir
 
-    signature = types.void(
-        types.uintp,
-        types.uintp,
-        types.uintp,
-        types.float64,
-        types.float64,
-        types.float64,
-        types.float64,
-        types.uintp,
-    )
+    signature = types.void(*[types.uintp] * 5)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        double = ir.DoubleType()
-        doubles = double.as_pointer()
-        function = ir.FunctionType(
-            ir.VoidType(), [doubles, doubles, double, double, double, double, doubles]
-        )
+        doubles = ir.DoubleType().as_pointer()
+        function = ir.FunctionType(ir.VoidType(), [doubles] * 4)
         pointer = builder.inttoptr(args[0], function.as_pointer())
-        arguments = [
-            builder.inttoptr(argument, doubles) if index in (1, 2, 7) else argument
-            for index, argument in enumerate(args)
-        ][1:]
-        builder.call(pointer, arguments)
+        builder.call(pointer, [builder.inttoptr(each, doubles) for each in args[1:]])
         return context.get_dummy_value()
 
     return signature, codegen

@@ -49,7 +49,7 @@ def test_a_trial_that_completes_records_what_the_engine_computed() -> None:
     assert ending == Ending(Outcome.COMPLETED)
     assert ending.safe_state is SafeState.CONFIRMED
     assert tuple(recording.channels) == tuple(info.name for info in CHANNELS)
-    _, out = run(bench(), moving)
+    _, out = run(bench(), moving, None)
     np.testing.assert_array_equal(recording["gyro_rate"], out["gyro_rate"])
     np.testing.assert_array_equal(recording["pointing_error"], out["pointing_angle"])
     np.testing.assert_allclose(recording["drive_torque"], out["motor_current"] * RATIO * KT)
@@ -164,9 +164,11 @@ def test_a_limit_after_the_stop_rate_does_not_count() -> None:
 
 
 def test_somebody_can_stop_it_between_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate_module, "BLOCK_STEPS", 400)  # 100 samples at 0.25 ms
+    swinging = task(base_acceleration=SWING)
+    per_sample = simulate_module.make_grid(bench(), swinging).every
+    monkeypatch.setattr(simulate_module, "STRETCH_STEPS", 100 * per_sample)
     asked = iter([False, False, True])
-    ending, recording = execute(bench(), task(base_acceleration=SWING), lambda: next(asked))
+    ending, recording = execute(bench(), swinging, lambda: next(asked))
     assert ending.outcome is Outcome.INTERRUPTED
     assert len(recording.time) == 300
 

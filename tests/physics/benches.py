@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from campaign.physics.bench import Bench
-from campaign.physics.engine import OUTPUTS
+from campaign.physics.rows import OUTPUTS
 from campaign.physics.simulate import simulate
 from campaign.trial import Task
 
@@ -55,9 +55,9 @@ def stribeck(static: float, coulomb: float, viscous: float = 0.0, **more: Any) -
 
 
 def run(
-    on: Bench, task: Task, step: float = 0.25e-3, seed: int = 1
+    on: Bench, task: Task, step: float | None = 0.25e-3, seed: int = 1
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Time and the engine's outputs by name."""
+    """Time and the engine's outputs by name; a step of None is the one that the trial needs."""
     blocks = list(simulate(on, task, seed, step))
     out = np.concatenate([block for _, block in blocks], axis=1)
     return np.concatenate([time for time, _ in blocks]), dict(zip(OUTPUTS, out, strict=True))

@@ -46,12 +46,9 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float]] = {
         0.0,
     ),
 }
-# Relative rms error at 0.25 ms. LuGre compensation leaves a residue 500 times smaller than the
+# Relative rms error at 0.25 ms. Compensation leaves a residue 500 times smaller than the
 # uncompensated error, and it is that residue's own size the error of the rate is compared with.
-TOLERANCE = {"lugre": 2e-3, "observer": 2e-3, "lugre, relative rate filtered": 1e-3}
-# Where the order shows. The compensated rate is the small difference of two friction torques,
-# and approaches its order only below the steps used here.
-SMOOTH = {"lugre": ("relative_angle", "motor_current"), "observer": ("relative_angle", "load_rate")}
+TOLERANCE = {"lugre": 2.5e-4, "observer": 2.5e-4, "lugre, relative rate filtered": 3e-4}
 
 
 def errors(case: str, step: float) -> dict[str, float]:
@@ -74,17 +71,10 @@ def errors(case: str, step: float) -> dict[str, float]:
 @pytest.mark.parametrize("case", CASES)
 def test_trajectories_agree_and_converge_with_second_order(case: str) -> None:
     coarse, fine = errors(case, 0.25e-3), errors(case, 0.125e-3)
-    assert max(coarse.values()) < TOLERANCE.get(case, 1e-4)
-    for name in SMOOTH.get(case, COMPARED):
+    assert max(coarse.values()) < TOLERANCE.get(case, 2e-5)
+    for name in COMPARED:
         order = np.log2(coarse[name] / fine[name])
         assert 1.8 < order < 2.3, f"{name}: order {order:.2f}"
-
-
-def test_the_compensated_rate_converges_too() -> None:
-    """It has no clean order at these steps, but it does go to scipy's value, not to another."""
-    by_step = [errors("lugre", step)["load_rate"] for step in (1e-3, 0.25e-3, 0.0625e-3)]
-    assert by_step[0] > 10 * by_step[1] > 100 * by_step[2]
-    assert by_step[2] < 1e-4
 
 
 def test_the_filtered_rate_is_what_is_recorded() -> None:

@@ -39,17 +39,13 @@ def test_what_is_no_source_changes_nothing(tmp_path: Path) -> None:
 
 
 STEP = """
-import ctypes, json, sys
+import json
+import numpy as np
 from campaign.physics.friction import friction_models
-from campaign.physics import step_function
-from campaign.physics.compiled import compiled_callback
+from campaign.physics.step_function import Motion, compiled_step, single_step
 step = friction_models()["grease"].step
-callback = compiled_callback(step_function.SIGNATURE, step)
-doubles, double = ctypes.POINTER(ctypes.c_double), ctypes.c_double
-run = ctypes.CFUNCTYPE(None, doubles, doubles, double, double, double, double, doubles)
-line = (double * 2)()
-run(callback.address)((double * 1)(3.0), (double * 1)(), 1.0, 1.0, 1e-3, 0.0, line)
-print(json.dumps([line[0], callback.cache_hits]))
+torque, change = single_step(step, np.array([3.0]), np.zeros(0), Motion.at(1.0, 1.0, step=1e-3))
+print(json.dumps([torque, compiled_step(step, 1).cache_hits]))
 """
 """The torque of grease that yields at 3 N m, sliding at 1 rad/s, and whether it was kept."""
 
@@ -116,7 +112,7 @@ def test_a_source_that_was_edited_while_the_process_ran_is_not_kept(tmp_path: Pa
     edited = f"""
 from pathlib import Path
 import grease_film.film
-Path(grease_film.film.__file__).write_text({FILM.replace("1.0", "2.0")!r})
+Path(grease_film.film.__file__).write_text({FILM.replace("1.0", "2.00")!r})
 {STEP}"""
     done = packages.python("import campaign.physics.compiled\n" + edited)
     assert done.returncode == 0, done.stderr

@@ -57,8 +57,8 @@ GREASE = FrictionModel(
     summary="made up",
     options=GreaseOptions,
     parameters=lambda options: np.array([options.yield_torque]),
-    state_size=0,
-    step=None,
+    state_size=lambda options: 0,
+    step=lambda parameters, state, motion: (0.0, 0.0),
     viscous=lambda options: options.film_damping,
     steady_state=lambda options, v: options.yield_torque * np.sign(v) + options.film_damping * v,
 )

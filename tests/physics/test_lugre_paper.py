@@ -1,7 +1,7 @@
 """The LuGre step function on the examples of Canudas de Wit et al. (1995).
 
 The published figures were recomputed with an implicit Runge-Kutta method (Radau) at tight
-tolerance; those are the numbers expected here. The plain Python step function is driven by a
+tolerance; those are the numbers expected here. The step function is driven by a
 stepper for a unit mass: exact for forces that are straight lines over a step, like the engine's.
 
 Step size: the bristle oscillates at sqrt(sigma0 / m) = 316 rad/s. With 0.5 ms (0.16 rad) halving
@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from campaign.physics.friction.lugre import FRICTION
+from campaign.physics.step_function import Motion, single_step
 
-VISCOUS = 0.4
+VISCOUS, STIFFNESS = 0.4, 1e5
 PARAMETERS = FRICTION.parameters(
     FRICTION.options.model_validate(
         {
@@ -26,13 +27,18 @@ PARAMETERS = FRICTION.parameters(
             "static_torque": 1.5,
             "stribeck_velocity": 0.001,
             "viscous_friction": VISCOUS,
-            "bristle_stiffness": 1e5,
-            "bristle_damping": float(np.sqrt(1e5)),
+            "bristle_stiffness": STIFFNESS,
+            "bristle_damping": float(np.sqrt(STIFFNESS)),
         },
         context={"si": True},
     )
 )
 STEP = 0.5e-3
+
+
+def advance(state: np.ndarray, motion: Motion) -> tuple[float, float]:
+    """Mean torque and its change over a step; the state is advanced."""
+    return single_step(FRICTION.step, PARAMETERS, state, motion)
 
 
 def slide(
@@ -44,7 +50,7 @@ def slide(
     """
     count = round(duration / step)
     friction, velocity = np.empty(count), np.empty(count)
-    state, line = np.zeros(1), np.zeros(2)
+    state = np.zeros(1)
     x = v = last = 0.0
     for k in range(count):
         pull = force((k + 0.5) * step, x + 0.5 * step * v)
@@ -54,11 +60,11 @@ def slide(
             half = 0.5 * step * VISCOUS
             return ((1 - half) * v + step * (pull - torque)) / (1 + half)
 
-        FRICTION.step(PARAMETERS, state, v, velocity_after(last), step, step, line)
-        last = line[0] + 0.5 * line[1]
-        new = velocity_after(line[0])
+        mean, change = advance(state, Motion.at(v, velocity_after(last), step, compliance=step))
+        last = mean + 0.5 * change
+        new = velocity_after(mean)
         x += 0.5 * step * (v + new)
-        friction[k] = line[0] + VISCOUS * 0.5 * (v + new)
+        friction[k] = mean + VISCOUS * 0.5 * (v + new)
         velocity[k] = 0.5 * (v + new)
         v = new
     return (np.arange(count) + 0.5) * step, friction, velocity
@@ -106,9 +112,9 @@ def test_steady_sliding_is_the_stribeck_curve() -> None:
     """dz/dt = 0: T = s(v) sgn(v), whatever sigma1 and however long the step."""
     for step in (1e-3, 0.1):
         for v in (-0.01, 3e-4, 0.002, 5.0):
-            state, line = np.zeros(1), np.zeros(2)
+            state = np.zeros(1)
             for _ in range(20_000 if step < 0.01 else 400):
-                FRICTION.step(PARAMETERS, state, v, v, step, 0.0, line)
+                line = advance(state, Motion.at(v, v, step))
             expected = np.sign(v) * (1.0 + 0.5 * np.exp(-((v / 0.001) ** 2)))
             assert line[0] == pytest.approx(expected, rel=1e-9)
             assert line[1] == pytest.approx(0.0, abs=1e-9)
@@ -116,7 +122,7 @@ def test_steady_sliding_is_the_stribeck_curve() -> None:
 
 def test_presliding_hysteresis_loses_no_bristle() -> None:
     """Slow and small: z follows x, so a displacement and back leaves almost no torque behind."""
-    state, line = np.zeros(1), np.zeros(2)
+    state = np.zeros(1)
     for v in [1e-5] * 100 + [-1e-5] * 100:  # 1e-7 m there and back; break-away is at 1.5e-5
-        FRICTION.step(PARAMETERS, state, v, v, 1e-4, 0.0, line)
-    assert abs(state[0]) < 0.01 * 1e-7
+        advance(state, Motion.at(v, v, 1e-4))
+    assert abs(state[0]) < 0.01 * 1e-7 * STIFFNESS  # the state is the bristles' torque

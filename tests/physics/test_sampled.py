@@ -161,7 +161,7 @@ def test_results_do_not_depend_on_the_blocks(
         on = sampled("10 kHz", {**noise, "gyro": {"noise": "1e-6 rad/s", "delay": "0.2 ms"}})
     moving = task(base_acceleration=SWING, compensation=compensation)
     _, whole = run(on, moving)
-    monkeypatch.setattr(simulate_module, "BLOCK_STEPS", 370)
+    monkeypatch.setattr(simulate_module, "STRETCH_STEPS", 370)
     time, parts = run(on, moving)
     assert len(time) == 1000
     for name, values in whole.items():

@@ -14,7 +14,9 @@ from campaign.cli.prepare import Request
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
-from campaign.execution.comparison import differences
+from campaign.execution import provenance
+from campaign.execution.comparison import changes, differences
+from campaign.physics import grid
 from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
 from tests.system.user import SEA, write
 
@@ -65,6 +67,55 @@ def test_another_sample_is_found_and_named(
     assert first.endswith("different")
     assert found.strip().startswith("gyro_rate [rad/s]: ")
     assert "the first at index 0, by at most 1e-12" in found
+
+
+@pytest.fixture
+def older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> Path:
+    """A run of an engine 1 whose steps were other ones, and whose samples are, too."""
+    monkeypatch.setattr(provenance, "ENGINE", 1)
+    monkeypatch.setattr(grid, "_needed", lambda bench, task: 1e-3 / 32)
+    request = Request(str(write(tmp_path, SEA)))
+    run_protocol(request, tmp_path / "results", workers=1, report=False)
+    monkeypatch.undo()
+    capsys.readouterr()
+    return next((tmp_path / "results").glob("*.nxs"))
+
+
+def test_a_trial_of_an_older_engine_is_held_against_that_engine_s_error(older: Path, capsys):
+    assert rerun_trial(older.stem, "1", older.parent) is ExitCode.DONE
+    first, *channels, _ = capsys.readouterr().out.splitlines()
+    assert "simulated by engine 1, repeated by engine 2: the same within 10 times" in first
+    assert len(channels) == 11
+    (rate,) = (line for line in channels if line.strip().startswith("load_rate: "))
+    assert 0.0 < float(rate.split("changed by ")[1].split()[0]) < 1e-3
+
+
+def test_beyond_ten_times_that_error_it_is_different(older: Path, monkeypatch, capsys):
+    monkeypatch.setattr("campaign.cli.rerun.ERRORS", {1: 1e-12})
+    assert rerun_trial(older.stem, "1", older.parent) is ExitCode.TRIALS_FAILED
+    assert ": different in gyro_rate, " in capsys.readouterr().out
+
+
+def test_an_archive_without_an_engine_is_of_the_first(older: Path, monkeypatch, capsys):
+    header = open_run(older).header
+    versions = {name: was for name, was in header.versions.items() if name != "engine"}
+    monkeypatch.setattr(
+        "campaign.cli.rerun.open_run",
+        lambda path: replace(
+            open_run(path), header=header.model_copy(update={"versions": versions})
+        ),
+    )
+    rerun_trial(older.stem, "1", older.parent)
+    assert "simulated by engine 1, " in capsys.readouterr().out
+
+
+def test_a_change_is_told_of_what_was() -> None:
+    was, now = recording(3.0, -3.0, 3.0), recording(3.0, -3.0, 6.0)
+    assert changes(was, now) == {"rate": pytest.approx(1 / np.sqrt(3))}
+    assert changes(was, was) == {"rate": 0.0}
+    assert changes(recording(0.0, 0.0), recording(0.0, 1.0)) == {"rate": np.inf}
+    assert changes(recording(1.0, 1.0), recording(1.0)) == {"rate": np.inf}
+    assert changes(recording(np.nan, 1.0), recording(np.nan, 1.0)) == {"rate": 0.0}
 
 
 @pytest.mark.parametrize("wanted", ["99", "sea", "-1"])

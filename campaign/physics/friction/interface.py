@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -82,13 +83,18 @@ class FrictionModel:
         summary: one line for `campaign kinds`.
         options: its parameters; a subclass of FrictionOptions with `model: Literal[name]`.
         parameters: the flat parameters its step function reads, from validated options.
-        state_size: how many numbers its step function keeps.
-        step: compiled step function; see `campaign.physics.step_function`.
+        state_size: how many numbers its step function keeps, from validated options.
+        step: its step function, plain Python that is compiled when a trial needs it; see
+            `campaign.physics.step_function`.
         viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
         steady_state: friction torque (N m) at constant velocity (rad/s), shape (n,), viscous
             part included.
         changeable: the options of its own that scatter and preload may change; None for every
             option of its own with a physical unit.
+        stored_energy: what its state stores (J at the interface), from validated options and the
+            state (s,) of its step function; None: not known.
+        step_for: a step function that does for these options and is faster than `step`, one of the
+            module's own (each function is compiled for itself); None: there is none.
         small_signal: its answer to small motions, from validated options; None: not declared, and
             the loop of a bench with it is known only while it slides.
     """
@@ -97,12 +103,24 @@ class FrictionModel:
     summary: str
     options: type[FrictionOptions]
     parameters: Callable[[Any], Array]
-    state_size: int
+    state_size: Callable[[Any], int]
     step: Any
     viscous: Callable[[Any], float]
     steady_state: Callable[[Any, Array], Array]
     changeable: tuple[str, ...] | None = None
     small_signal: Callable[[Any], SmallSignal] | None = None
+    stored_energy: Callable[[Any, Array], float] | None = None
+    step_for: Callable[[Any], Callable[..., Any]] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a step function of the form that it had before lanes."""
+        form = list(inspect.signature(self.step).parameters)
+        if len(form) != 3 or not callable(self.state_size):
+            raise TypeError(
+                f"the friction model {self.name!r} has a step function of "
+                f"({', '.join(form)}) or a fixed state size, as models had before engine 2: "
+                "docs/plug-ins.md says under 'A friction model of before engine 2' what to change"
+            )
 
     def may_change(self) -> tuple[str, ...]:
         """`changeable`, or what stands for it."""

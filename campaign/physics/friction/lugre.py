@@ -8,12 +8,14 @@ is not (above 3.4 rad/s with the thesis' parameters).
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from campaign.physics.compiled import inlined
+from campaign.physics.elementary import exp, expm1, power, where
 from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
@@ -25,9 +27,11 @@ from campaign.physics.friction.stribeck import (
     CURVE,
     NegativeDirection,
     curve_parameters,
+    in_direction,
     mean_viscous,
     steady_state,
 )
+from campaign.physics.step_function import Motion
 from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, Torque
 
 
@@ -55,33 +59,75 @@ class LuGreOptions(FrictionOptions):
 
 
 def _parameters(options: LuGreOptions) -> Array:
-    return np.array(
-        [*curve_parameters(options), options.bristle_stiffness, options.bristle_damping]
+    curve = curve_parameters(options)
+    curve[2], curve[6] = 1.0 / curve[2], 1.0 / curve[6]
+    stiffness = options.bristle_stiffness
+    return np.array([*curve, stiffness, options.bristle_damping / stiffness])
+
+
+def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    """See `campaign.physics.step_function`. state[0] is sigma0 z (N m)."""
+    v, speed = _mean_rates(motion)
+    exponent_forwards, exponent_backwards = parameters[3], parameters[7]
+    exponent = where(v >= 0.0, exponent_forwards, exponent_backwards)
+    return _advance(
+        parameters, state, motion, v, speed, power(_ratio(parameters, v, speed), exponent)
     )
 
 
-def _step(
-    parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
-) -> None:
-    """See `campaign.physics.step_function`. state[0] is z (rad)."""
-    v = 0.5 * (v0 + v1)
-    way = 0 if v >= 0.0 else 4
-    coulomb, static = parameters[way], parameters[way + 1]
-    stribeck_velocity, exponent = parameters[way + 2], parameters[way + 3]
-    stiffness, damping = parameters[9], parameters[10]
-    # The mean of |v| over a straight line from v0 to v1, exact also where the sign changes.
-    mean_speed = abs(v) if v0 * v1 >= 0.0 else 0.5 * (v0 * v0 + v1 * v1) / (abs(v0) + abs(v1))
-    ratio = mean_speed / stribeck_velocity
-    fall = math.exp(-ratio * ratio) if exponent == 2.0 else math.exp(-(ratio**exponent))
-    s = coulomb + (static - coulomb) * fall
-    rate = stiffness * mean_speed / s
-    x = rate * h
-    z = state[0]
-    # z relaxes towards v / rate; (1 - exp(-x)) / x is written so that x -> 0 is exact.
-    change = (v - rate * z) * h * (-math.expm1(-x) / x if x > 1e-12 else 1.0)
-    state[0] = z + change
-    line[0] = stiffness * (z + 0.5 * change) + damping * change / h + parameters[8] * mean_speed
-    line[1] = stiffness * change
+def _gaussian_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    """The same with delta = 2, which takes half the time."""
+    v, speed = _mean_rates(motion)
+    ratio = _ratio(parameters, v, speed)
+    return _advance(parameters, state, motion, v, speed, ratio * ratio)
+
+
+@inlined
+def _mean_rates(motion: Motion) -> tuple[float, float]:
+    """Means of v and of |v|; where the sign changes, the latter is that of a straight line."""
+    v0, v1, v = motion.rate_start, motion.rate_end, motion.rate_mean
+    turns = v0 * v1 < 0.0
+    turning = 0.5 * (v0 * v0 + v1 * v1) / where(turns, abs(v0) + abs(v1), 1.0)
+    return v, where(turns, turning, abs(v))
+
+
+@inlined
+def _ratio(parameters: Any, v: float, speed: float) -> Any:
+    """|v| / vs in the direction of v."""
+    forwards, backwards = parameters[2], parameters[6]
+    return speed * where(v >= 0.0, forwards, backwards)
+
+
+@inlined
+def _advance(
+    parameters: Any, state: Any, motion: Motion, v: float, speed: float, power_of_ratio: float
+) -> tuple[float, float]:
+    """Advance the bristles; mean torque and its change."""
+    tc_forwards, ts_forwards = parameters[0], parameters[1]
+    tc_backwards, ts_backwards = parameters[4], parameters[5]
+    viscous, stiffness, damping_time = parameters[8], parameters[9], parameters[10]
+    coulomb = where(v >= 0.0, tc_forwards, tc_backwards)
+    static = where(v >= 0.0, ts_forwards, ts_backwards)
+    s = coulomb + (static - coulomb) * exp(-power_of_ratio)
+    per_s = 1.0 / s
+    # z relaxes towards (v / |v|) s / stiffness, by exp(-x) over the step.
+    x = stiffness * motion.step * speed * per_s
+    direction = v / where(speed > 0.0, speed, 1.0)
+    before = state[0]
+    change = (direction * s - before) * -expm1(-x)
+    after = before + change
+    state[0] = after
+    mean = before + 0.5 * change + damping_time * motion.per_step * change + viscous * speed
+    # What dz/dt gains over the step: of the damping, too, the line has its change.
+    v0, v1 = motion.rate_start, motion.rate_end
+    gained = v1 - v0 - (abs(v1) * after - abs(v0) * before) * per_s
+    slope = stiffness * damping_time * gained + viscous * (abs(v1) - abs(v0))
+    return mean, change + slope
+
+
+def _step_for(options: LuGreOptions) -> Callable[..., Any]:
+    exponents = {in_direction(options, "stribeck_exponent", sign) for sign in (+1.0, -1.0)}
+    return _gaussian_step if exponents == {2.0} else _step
 
 
 def _small_signal(options: LuGreOptions) -> SmallSignal:
@@ -90,15 +136,22 @@ def _small_signal(options: LuGreOptions) -> SmallSignal:
     return SmallSignal(stuck=bristles, stuck_compensation=bristles)
 
 
+def _stored_energy(options: LuGreOptions, state: Array) -> float:
+    """sigma0 z^2 / 2 of the bristles; the state is sigma0 z."""
+    return float(0.5 * state[0] ** 2 / options.bristle_stiffness)
+
+
 FRICTION = FrictionModel(
     name="lugre",
     summary="dynamic: bristles with presliding, Stribeck effect and friction lag (Eq. 4.2 to 4.4)",
     options=LuGreOptions,
     parameters=_parameters,
-    state_size=1,
+    state_size=lambda options: 1,
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
     changeable=(*CURVE, "bristle_stiffness", "bristle_damping"),
     small_signal=_small_signal,
+    stored_energy=_stored_energy,
+    step_for=_step_for,
 )

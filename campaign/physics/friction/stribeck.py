@@ -7,13 +7,13 @@ that much); as a compensation, where the velocity does not answer within the ste
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
+from campaign.physics.elementary import exp, power, tanh, where
 from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
@@ -21,6 +21,7 @@ from campaign.physics.friction.interface import (
     Presliding,
     SmallSignal,
 )
+from campaign.physics.step_function import Motion
 from campaign.units import AngularRate, RotationalDamping, Torque
 
 CURVE = (
@@ -128,34 +129,37 @@ def _parameters(options: StribeckOptions) -> Array:
     return np.array([*curve_parameters(options), options.sign_smoothing])
 
 
-def _step(
-    parameters: Any, state: Any, v0: float, v1: float, h: float, compliance: float, line: Any
-) -> None:
+def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     """See `campaign.physics.step_function`. No state is kept."""
+    tc_forwards, ts_forwards, vs_forwards, exponent_forwards = (
+        parameters[0], parameters[1], parameters[2], parameters[3],
+    )  # fmt: skip
+    tc_backwards, ts_backwards, vs_backwards, exponent_backwards = (
+        parameters[4], parameters[5], parameters[6], parameters[7],
+    )  # fmt: skip
+    viscous, smoothing = parameters[8], parameters[9]
+    v0, v1, compliance = motion.rate_start, motion.rate_end, motion.compliance
+    answers = compliance > 0.0
+    v1 = v0 + compliance * motion.applied if answers else v1
     v = 0.5 * (v0 + v1)
-    if compliance > 0.0:
-        # v1 is without this friction: read the curve at the rate that its torque will leave.
-        reach = compliance * (parameters[1] if v1 >= 0.0 else parameters[5])
-        v -= 0.5 * min(max(v1, -reach), reach)
-    way = 0 if v >= 0.0 else 4
-    coulomb, static = parameters[way], parameters[way + 1]
-    stribeck_velocity, exponent = parameters[way + 2], parameters[way + 3]
-    smoothing = parameters[9]
-    speed = abs(v) / stribeck_velocity
-    size = coulomb + (static - coulomb) * math.exp(-(speed**exponent))
-    if compliance > 0.0:
-        # What would bring the velocity to zero by the end of the step; sliding if that is too much.
-        stopping = v1 / compliance
-        torque = min(max(stopping, -size), size)
-    elif smoothing > 0.0:
-        torque = size * math.tanh(v / smoothing)
-    elif v0 * v1 < 0.0:
-        # The sign changes inside the step: its mean over the step, not a whole step of either.
-        torque = size * (v0 + v1) / (abs(v0) + abs(v1))
-    else:
-        torque = math.copysign(size, v) if v != 0.0 else 0.0
-    line[0] = torque + parameters[8] * abs(v)
-    line[1] = 0.0
+    # v1 is without this friction: read the curve at the rate that its torque will leave.
+    reach = compliance * (ts_forwards if v1 >= 0.0 else ts_backwards)
+    v -= 0.5 * min(max(v1, -reach), reach)
+    coulomb = where(v >= 0.0, tc_forwards, tc_backwards)
+    static = where(v >= 0.0, ts_forwards, ts_backwards)
+    stribeck_velocity = where(v >= 0.0, vs_forwards, vs_backwards)
+    exponent = where(v >= 0.0, exponent_forwards, exponent_backwards)
+    size = coulomb + (static - coulomb) * exp(-power(abs(v) / stribeck_velocity, exponent))
+    # What would bring the velocity to zero by the end of the step; sliding if that is too much.
+    stopping = v1 / (compliance if answers else 1.0)
+    held = min(max(stopping, -size), size)
+    smooth = size * tanh(v / (smoothing if smoothing > 0.0 else 1.0))
+    # The sign may change inside the step: its mean over the step, not a whole step of either.
+    path = abs(v0) + abs(v1)
+    sign = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
+    sign = (v0 + v1) / (path if path > 0.0 else 1.0) if v0 * v1 < 0.0 else sign
+    fed_forward = smooth if smoothing > 0.0 else size * sign
+    return (held if answers else fed_forward) + viscous * abs(v), 0.0
 
 
 def _small_signal(options: StribeckOptions) -> SmallSignal:
@@ -174,7 +178,7 @@ FRICTION = FrictionModel(
     summary="static: Coulomb, Stribeck and viscous friction (Eq. 4.6)",
     options=StribeckOptions,
     parameters=_parameters,
-    state_size=0,
+    state_size=lambda options: 0,
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,

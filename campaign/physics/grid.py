@@ -1,0 +1,85 @@
+"""The time grid of a simulation: its integration step, and how it fits recording and controller."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from campaign.physics import step_choice
+from campaign.physics.bench import Bench
+from campaign.signals import MultiSine, Sine
+from campaign.trial import Task
+
+FINEST_DELAY = 4
+"""How many times finer the steps may become to meet the controller's delay."""
+STEPS_PER_CYCLE = 80
+"""of the fastest sine; at 80 a straight-line input loses 5e-4 of its amplitude."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The time grid of a simulation.
+
+    Attributes:
+        step: integration step (s).
+        every: steps per recorded sample.
+        per_control: steps per controller sample; 0 for a continuous controller.
+        samples: recorded samples in all.
+    """
+
+    step: float
+    every: int
+    per_control: int
+    samples: int
+
+
+def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Grid:
+    """Steps that divide both the recording's and the controller's sample time.
+
+    `longest_step` (s) is what the trial needs (`step_choice`) when None. Raises ValueError when the
+    recording's rate and the controller's do not divide each other, and when the trial needs steps
+    finer than there are.
+    """
+    control_rate = bench.controller.sample_rate
+    continuous = control_rate is None or task.mode in ("prescribed", "spring")
+    if longest_step is None:
+        longest_step = _needed(bench, task)
+    # A sampled controller holds its command between samples: the steps need not resolve it.
+    smooth = (task.base_acceleration, task.disturbance)
+    for signal in (*smooth, task.command) if continuous else smooth:
+        if isinstance(signal, Sine | MultiSine):
+            fastest = signal.frequency if isinstance(signal, Sine) else max(signal.frequencies)
+            longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * fastest))
+    samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
+    if control_rate is None or continuous:
+        every = max(1, math.ceil(1.0 / (task.sample_rate * longest_step) - 1e-9))
+        return Grid(1.0 / (task.sample_rate * every), every, 0, samples)
+    per_record = control_rate / task.sample_rate
+    if abs(per_record - round(per_record)) > 1e-6 or round(per_record) < 1:
+        raise ValueError(
+            f"the controller's sample rate ({control_rate:g} Hz) must be a whole multiple of the "
+            f"recording's ({task.sample_rate:g} Hz)"
+        )
+    per_control = max(1, math.ceil(1.0 / (control_rate * longest_step) - 1e-9))
+    per_control = _with_delay(per_control, bench.controller.delay * control_rate)
+    step = 1.0 / (control_rate * per_control)
+    return Grid(step, per_control * round(per_record), per_control, samples)
+
+
+def _needed(bench: Bench, task: Task) -> float:
+    choice = step_choice.longest_step(bench, task)
+    if choice.refused is not None:
+        raise ValueError(
+            f"{choice.refused}; [backend] longest_step simulates it all the same, with an error "
+            "that nobody knows"
+        )
+    return choice.step
+
+
+def _with_delay(per_control: int, delay: float) -> int:
+    """More steps per sample, a few times over, if a `delay` (samples) then is whole steps."""
+    for times in range(1, FINEST_DELAY + 1):
+        steps = delay * per_control * times
+        if abs(steps - round(steps)) < 1e-6:
+            return per_control * times
+    return per_control * FINEST_DELAY
