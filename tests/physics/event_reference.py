@@ -1,0 +1,211 @@
+"""A loop with dry friction, switched at its events: the reference that `dry.py` is held against.
+
+Nothing of `campaign.physics` is used: the thesis' equations as in `tests.physics.reference`, with
+friction that is a set at rest. Between events the right-hand side is smooth and scipy's order-8
+Runge-Kutta solves it; an event is where the regime changes, and its instant is found as a root:
+
+- sliding, until the relative rate is zero. Then it is stuck if the applied torque is within the
+  static torques, and slides the other way if it is not;
+- stuck, until the applied torque reaches a static torque. Then it slides that way.
+
+The applied torque is what friction would have to take for the relative rate to stay zero.
+Parallel dry interfaces on one rate are one: their curves add, and so do their static torques.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, LOAD, MOTOR, RATIO, L, R
+from tests.physics.reference import lugre
+
+NAMES = ("load_rate", "pointing_angle", "relative_angle", "motor_current")
+SCALE = np.array([1e-3, 1e-4, 1e-2, 1.0, 1e-2, 1e-2, 1e-3, 1e-5, 1e-3, 1e-5])
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Sliding friction in one direction, at the load: N m over the load's relative rate."""
+
+    coulomb: float
+    static: float
+    velocity: float = 0.03
+    exponent: float = 2.0
+    viscous: float = 0.0
+
+    def __call__(self, speed: float) -> float:
+        fall = math.exp(-((speed / self.velocity) ** self.exponent))
+        return self.coulomb + (self.static - self.coulomb) * fall + self.viscous * speed
+
+
+@dataclass(frozen=True)
+class Dry:
+    """One dry interface; `backward` where the other direction is different."""
+
+    forward: Curve
+    backward: Curve | None = None
+
+    def towards(self, direction: int) -> Curve:
+        return self.forward if direction > 0 or self.backward is None else self.backward
+
+
+THESIS_DRY = (
+    Dry(Curve(26.0, 32.0, viscous=4.0)),
+    Dry(Curve(0.03 * RATIO, 0.04 * RATIO, viscous=0.001 * RATIO)),
+)
+"""Equation 4.6 with the appendix' parameters: load, and motor counted at the load."""
+
+
+def still(_: float) -> float:
+    return 0.0
+
+
+def bristles(v: float, load: float, motor: float) -> tuple[float, float, float]:
+    """LuGre friction of load and motor at the load (N m), and both rates of their states."""
+    load_torque, load_change = lugre(v, load, LOAD)
+    motor_torque, motor_change = lugre(v, motor, MOTOR)
+    return load_torque + RATIO * motor_torque, load_change, motor_change
+
+
+@dataclass(frozen=True)
+class DryLoop:
+    """What is simulated. Rate mode, unless `torque` (N m at the load) or `spring` is given.
+
+    Attributes:
+        friction: dry interfaces; none with `bristles`, whose plant friction is LuGre's.
+        compensation: interfaces of a static feedforward, Equation 4.6 with sgn(0) = 0.
+        bristle_compensation: LuGre feedforward with the appendix' parameters.
+        spring: stiffness (N m/rad); the load without its motor, `command` is the far end's angle.
+    """
+
+    friction: tuple[Dry, ...] = THESIS_DRY
+    compensation: tuple[Dry, ...] = ()
+    bristles: bool = False
+    bristle_compensation: bool = False
+    command: Callable[[float], float] = still
+    torque: Callable[[float], float] | None = None
+    spring: float | None = None
+    base_rate: Callable[[float], float] = still
+    base_acceleration: Callable[[float], float] = still
+    inertia: float = INERTIA
+    proportional: float = KPV  # A s/deg
+    integral: float = KIV
+    initial: tuple[float, ...] = field(default=(0.0,) * 10)
+
+    def sliding(self, interfaces: tuple[Dry, ...], direction: int, v: float) -> float:
+        """Sum of sliding torques (N m) in `direction`, zero for direction 0."""
+        speed = max(direction * v, 0.0)
+        return direction * sum(item.towards(direction)(speed) for item in interfaces)
+
+    def driving(self, t: float, y: np.ndarray) -> float:
+        """Torque on the load (N m) besides friction."""
+        if self.spring is not None:
+            return self.spring * (self.command(t) - y[2])
+        return RATIO * KT * y[3]
+
+    def applied(self, t: float, y: np.ndarray) -> float:
+        return self.driving(t, y) - self.inertia * self.base_acceleration(t)
+
+    def friction_torque(self, t: float, y: np.ndarray, direction: int) -> float:
+        if self.bristles:
+            return bristles(y[0] - self.base_rate(t), y[6], y[7])[0]
+        if direction == 0:
+            return self.applied(t, y)
+        return self.sliding(self.friction, direction, y[0] - self.base_rate(t))
+
+    def rates(self, t: float, y: np.ndarray, direction: int) -> list[float]:
+        """State: w, its integral, relative angle, i, both PI integrals, bristles."""
+        w, _, _, i, current_sum, rate_sum, zl, zm, zlc, zmc = y
+        v = w - self.base_rate(t)
+        dw = (self.driving(t, y) - self.friction_torque(t, y, direction)) / self.inertia
+        if direction == 0 and not self.bristles:
+            v, dw = 0.0, self.base_acceleration(t)
+        added, dzl, dzm, dzlc, dzmc = self.sliding(self.compensation, direction, v), *(0.0,) * 4
+        if self.bristles:
+            _, dzl, dzm = bristles(v, zl, zm)
+        if self.bristle_compensation:
+            added, dzlc, dzmc = bristles(v, zlc, zmc)
+        if self.spring is not None:
+            return [dw, w, v, 0.0, 0.0, 0.0, dzl, dzm, 0.0, 0.0]
+        error = (self.command(t) - w) * DEG
+        wanted = self.proportional * (error + self.integral * rate_sum)
+        if self.torque is not None:
+            error, wanted = 0.0, self.torque(t) / (RATIO * KT)
+        current_error = wanted + added / (RATIO * KT) - i
+        voltage = KPC * current_error + KIC * current_sum
+        di = (voltage - R * i - KE * RATIO * v) / L
+        return [dw, w, v, di, current_error, error, dzl, dzm, dzlc, dzmc]
+
+    def regime(self, t: float, y: np.ndarray) -> int:
+        """Direction of what follows a relative rate of zero; 0 is stuck."""
+        applied = self.applied(t, y)
+        if applied > self.sliding(self.friction, 1, 0.0):
+            return 1
+        return -1 if applied < self.sliding(self.friction, -1, 0.0) else 0
+
+
+def simulate_events(
+    loop: DryLoop, times: np.ndarray, rtol: float = 1e-10, max_step: float = 5e-3
+) -> tuple[dict[str, np.ndarray], list[tuple[float, int]]]:
+    """States by name and `friction_torque` over `times`; instants and directions of the regimes."""
+    t, end = float(times[0]), float(times[-1])
+    y = np.array(loop.initial)
+    v = y[0] - loop.base_rate(t)
+    direction = int(np.sign(v)) if abs(v) > 1e-14 else (1 if loop.bristles else loop.regime(t, y))
+    history = [(t, direction)]
+    found = np.empty((len(NAMES) + 1, len(times)))
+    done = 0
+    while done < len(times):
+        ahead = times[done:]
+        part = solve_ivp(
+            loop.rates, (t, end), y, method="DOP853", dense_output=True, args=(direction,),
+            events=_events(loop, direction), rtol=rtol, atol=rtol * SCALE, max_step=max_step,
+        )  # fmt: skip
+        assert part.success, part.message
+        t = float(part.t[-1])
+        here = ahead[ahead < t] if part.status == 1 else ahead
+        if len(here):
+            values = part.sol(here)
+            columns = slice(done, done + len(here))
+            found[:-1, columns] = values[: len(NAMES)]
+            found[-1, columns] = [
+                loop.friction_torque(at, state, direction)
+                for at, state in zip(here, values.T, strict=True)
+            ]
+            done += len(here)
+        if part.status != 1:
+            break
+        y = part.y[:, -1].copy()
+        which = next(k for k, hits in enumerate(part.t_events) if len(hits))
+        if loop.bristles:
+            direction = -direction
+        elif direction == 0:
+            direction = 1 if which == 0 else -1
+        else:
+            y[0] = loop.base_rate(t)
+            direction = loop.regime(t, y)
+        history.append((t, direction))
+    return dict(zip((*NAMES, "friction_torque"), found, strict=True)), history
+
+
+def _events(loop: DryLoop, direction: int) -> list[Callable[..., float]]:
+    def rate(t: float, y: np.ndarray, _: int) -> float:
+        return y[0] - loop.base_rate(t)
+
+    def forward(t: float, y: np.ndarray, _: int) -> float:
+        return loop.applied(t, y) - loop.sliding(loop.friction, 1, 0.0)
+
+    def backward(t: float, y: np.ndarray, _: int) -> float:
+        return loop.applied(t, y) - loop.sliding(loop.friction, -1, 0.0)
+
+    ways = [(forward, 1), (backward, -1)]
+    if direction or loop.bristles:
+        ways = [(rate, -direction)]
+    for event, way in ways:
+        event.terminal, event.direction = True, way  # type: ignore[attr-defined]
+    return [event for event, _ in ways]
