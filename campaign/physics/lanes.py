@@ -89,6 +89,10 @@ class Interface:
             ripple=(ripple.amplitude, ripple.periods, ripple.phase),
         )
 
+    def address(self, lanes: int) -> int:
+        """Of its step function, compiled for so many lanes."""
+        return address_of(self.step, lanes, len(self.parameters), self.state_size)
+
     @property
     def structure(self) -> Hashable:
         sizes = len(self.parameters), self.state_size
@@ -323,13 +327,11 @@ def _elements(
                 each.state_size > 0 or not in_plant,
                 ROOM_TEMPERATURE,
                 1.0,
-                len(each.parameters),
-                each.state_size,
             )
             fixed[e, HAS : HAS + len(each.parameters), k] = each.parameters
     ripples = [np.reshape([each.ripple for each in own], (count, 3)) for own in interfaces]
     return Elements(
-        address=np.array([address_of(each.step, width) for each in first], dtype=np.uintp),
+        address=np.array([each.address(width) for each in first], dtype=np.uintp),
         fixed=fixed,
         fixed_at=_addresses(fixed),
         kept=kept,

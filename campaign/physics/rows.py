@@ -62,10 +62,8 @@ MEETS = 9
     HAS_STATE,
     HAS_TEMPERATURE,
     HAS_NORMAL_LOAD,
-    HAS_PARAMETERS,
-    HAS_STATES,
-) = range(8)
-HAS = 8
+) = range(6)
+HAS = 6
 
 # What an interface keeps, before the state of its model.
 KEEPS_TORQUE = 0

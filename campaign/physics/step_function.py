@@ -37,11 +37,9 @@ from campaign.physics.rows import (
     CHANGE,
     HAS,
     HAS_NORMAL_LOAD,
-    HAS_PARAMETERS,
     HAS_PER_TORQUE,
     HAS_RATE,
     HAS_STATE,
-    HAS_STATES,
     HAS_TEMPERATURE,
     HAS_TORQUE,
     HELD,
@@ -123,27 +121,28 @@ _DOUBLES = types.CPointer(types.float64)
 SIGNATURE = types.void(_DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 
 
-def address_of(step: Callable[..., Any], lanes: int) -> int:
-    """Address of the step function compiled for so many lanes; it stays valid."""
-    return int(compiled_step(step, lanes).address)
+def address_of(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> int:
+    """Address of the step function as `compiled_step` compiles it; it stays valid."""
+    return int(compiled_step(step, lanes, parameters, states).address)
 
 
-def compiled_step(step: Callable[..., Any], lanes: int) -> Any:
-    """The step function compiled for so many lanes, kept for the life of the process.
+def compiled_step(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> Any:
+    """The step function compiled for so many lanes, parameters and states, kept for the process.
 
     `step` may be compiled already: then it is what it was compiled of.
     """
     with _COMPILING:
-        return _compiled_once(getattr(step, "py_func", step), lanes)
+        return _compiled_once(getattr(step, "py_func", step), lanes, parameters, states)
 
 
 _COMPILING = threading.RLock()
 
 
 @cache
-def _compiled_once(step: Callable[..., Any], lanes: int) -> Any:
+def _compiled_once(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> Any:
     _known_to_numba(step)
-    return compiled_callback(SIGNATURE, _by_lanes(step, lanes), step.__module__)
+    by_lanes = _by_lanes(step, lanes, parameters, states)
+    return compiled_callback(SIGNATURE, by_lanes, step.__module__)
 
 
 @cache
@@ -162,37 +161,35 @@ def single_step(
     parameters (p,) and state (s,) as the step function gets them; the state is advanced in place.
     Returns mean torque and its change (N m).
     """
-    sizes = len(parameters), len(state)
-    fixed = np.array([
-        1.0, 1.0, 1.0, 1.0, motion.temperature, motion.normal_load, *sizes, *parameters,
-    ])  # fmt: skip
+    fixed = np.array([1.0, 1.0, 1.0, 1.0, motion.temperature, motion.normal_load, *parameters])
     kept, answer = np.array([0.0, *state]), np.zeros(ANSWERS)
     met = np.array([
         motion.rate_start, motion.rate_end, motion.rate_mean, motion.applied, motion.compliance,
         motion.position, 1.0, motion.step, motion.per_step,
     ])  # fmt: skip
-    run = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(address_of(step, 1))
+    run = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(
+        address_of(step, 1, len(parameters), len(state))
+    )
     run(*(rows.ctypes.data for rows in (fixed, kept, met, answer)))
     state[:] = kept[KEEPS:]
     return float(answer[MEAN]), float(answer[CHANGE])
 
 
-def _by_lanes(step: Any, lanes: int) -> Callable[..., None]:
-    """The step function for so many lanes.
+def _by_lanes(step: Any, lanes: int, parameters: int, states: int) -> Callable[..., None]:
+    """The step function for so many lanes, of a model with so many parameters and states.
 
     Arrays are rows by lanes, lane last; `rows` names the rows. The number of lanes stands in the
     code as a number, so that the compiler knows how far apart rows are; else it could not tell that
     they do not overlap.
     """
+    own_end, state_end = HAS + parameters, KEEPS + states
 
     def by_lanes(fixed: Any, kept: Any, met: Any, answer: Any) -> None:
         has, keeps = carray(fixed, (MOST_ROWS, lanes)), carray(kept, (MOST_ROWS, lanes))
         meets, line = carray(met, (MOST_ROWS, lanes)), carray(answer, (MOST_ROWS, lanes))
         for k in range(lanes):
             motion = _motion(k, has, keeps, meets)
-            own = has[HAS : HAS + int(has[HAS_PARAMETERS, k]), k]
-            state = keeps[KEEPS : KEEPS + int(has[HAS_STATES, k]), k]
-            mean, change = step(own, state, motion)
+            mean, change = step(has[HAS:own_end, k], keeps[KEEPS:state_end, k], motion)
             _take(k, mean, change, has, keeps, meets, line)
 
     return by_lanes

@@ -209,3 +209,23 @@ def test_a_model_of_the_former_kind_is_refused_by_name() -> None:
         FrictionModel(**{**fields, "step": former})
     with pytest.raises(TypeError, match=r"'maxwell'.*fixed state size"):
         FrictionModel(**{**fields, "state_size": 10})
+
+
+def _sizes(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    return float(len(parameters)), float(len(state))
+
+
+@pytest.mark.parametrize(("parameters", "states"), [(1, 0), (3, 1), (12, 10)])
+def test_a_step_function_sees_its_own_numbers_and_no_others(parameters: int, states: int) -> None:
+    line = single_step(_sizes, np.zeros(parameters), np.zeros(states), Motion.at(0.1, 0.1, 1e-3))
+    assert line == (parameters, states)
+
+
+def test_nothing_is_applied_where_there_is_no_compliance() -> None:
+    def applied(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+        return motion.applied, 0.0
+
+    free = Motion.at(0.1, 0.1, 1e-3, applied=7.0)
+    assert single_step(applied, np.zeros(1), np.zeros(0), free)[0] == 0.0
+    bound = Motion.at(0.1, 0.1, 1e-3, applied=7.0, compliance=1e-4)
+    assert single_step(applied, np.zeros(1), np.zeros(0), bound)[0] == 7.0
