@@ -12,7 +12,7 @@ from campaign.physics.rows import OUT_POINTING
 from campaign.physics.simulate import simulate
 from campaign.signals import Sine
 from tests.physics.bench_reference import reference
-from tests.physics.benches import Tree, bench, task
+from tests.physics.benches import LOAD, MOTOR, RATIO, Tree, bench, run, task
 
 FREQUENCY, ACCELERATION = 0.24, math.radians(18.0)
 SETTLE, CYCLES = 1, 4
@@ -57,3 +57,14 @@ def test_the_stabilization_error_is_that_of_scipy(case: str) -> None:
     expected = np.std(reference(on, swinging)["pointing_angle"][MEASURED])
     out = np.hstack([block for _, block in simulate(on, swinging, 1, step)])
     assert np.std(out[OUT_POINTING][MEASURED]) == pytest.approx(expected, rel=bound)
+
+
+def test_the_first_torque_is_that_of_bristles_that_nothing_has_bent_yet() -> None:
+    """The hull is under way and the load at rest: T = (sigma1 + sigma2) v of both interfaces."""
+    swinging = Sine(amplitude=ACCELERATION, frequency=FREQUENCY)
+    _, found = run(bench(), task(base_acceleration=swinging, duration=0.01), 1e-3)
+    rate = ACCELERATION / (2.0 * math.pi * FREQUENCY)
+    damping = sum(
+        share * (model["s1"] + model["s2"]) for share, model in ((1.0, LOAD), (RATIO, MOTOR))
+    )
+    assert found["friction_torque"][0] == pytest.approx(damping * rate, rel=1e-5)
