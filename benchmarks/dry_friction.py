@@ -1,9 +1,9 @@
 """How the error of dry friction falls with the step.
 
-Run with `python -m benchmarks.dry_friction`. What `tests.physics.dry_step` gives in a loop,
-beside the event-switched reference of the tests: the thesis' loop, then ten benches drawn at
-random. Columns are steps; rows the relative error of the stabilization error, and of outputs over
-time, rms over rms (of the friction torque the median).
+Run with `python -m benchmarks.dry_friction`. The engine beside the event-switched reference of
+the tests: the thesis' loop, then ten benches drawn at random. Columns are steps; rows the relative
+error of the stabilization error, and of outputs over time, rms over rms (of the friction torque
+the median).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ CASES = [
     thesis(),
     thesis("static"),
     thesis("lugre"),
+    thesis("lugre", low_pass=1e-3),
+    thesis("observer"),
     thesis("static", bristles=True),
     thesis("lugre", bristles=True),
     steep_rise(),

@@ -1,29 +1,33 @@
 """What a step of the engine costs, alone and in a block of trials side by side.
 
-    python benchmarks/lanes.py
+    python -m benchmarks.lanes [--write]
 
 Each trial has a plant of its own; all outputs are recorded every millisecond, at a step of 1 ms.
 Minima of short stretches, in turn: what counts are the ratios, since a busy machine disturbs all.
+`--write` puts the table into docs/performance.md.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 
 import numpy as np
 
+from benchmarks.document import machine, table, write_section
 from campaign.physics.bench import Bench
+from campaign.physics.blocks import zeros
 from campaign.physics.engine import advance_block, advance_one
 from campaign.physics.lanes import Lane, Lanes, together
 from campaign.physics.rows import OUTPUTS
-from campaign.physics.step_function import LANES
+from campaign.physics.vector import LANES
 from campaign.signals import Sine
 from campaign.trial import Task
 
@@ -44,8 +48,8 @@ CASES = {
 def bench(number: int, changes: dict[str, dict[str, object]]) -> Bench:
     """The shipped bench with an inertia of its own."""
     tree = tomllib.loads(SIMULINK.read_text(encoding="utf-8"))
-    for table, entries in changes.items():
-        tree.setdefault(table, {}).update(entries)
+    for each, entries in changes.items():
+        tree.setdefault(each, {}).update(entries)
     tree["axis"]["inertia"] = f"{35 + number} kg m^2"
     return Bench.model_validate(tree)
 
@@ -68,7 +72,7 @@ def lanes(compensation: str, changes: dict[str, dict[str, object]], count: int) 
 def stretch(these: Lanes) -> Callable[[], None]:
     """Advances over one stretch, noise included."""
     at = np.arange(STEPS + 1) * STEP
-    signals, out = these.signals(at), np.empty((len(OUTPUTS), STEPS, these.width))
+    signals, out = these.signals(at), zeros(len(OUTPUTS), STEPS, these.width)
     advance = advance_one if these.width == 1 else advance_block
 
     def run() -> None:
@@ -80,9 +84,8 @@ def stretch(these: Lanes) -> Callable[[], None]:
     return run
 
 
-def main() -> None:
-    """Print nanoseconds of one core per trial and step."""
-    print(f"{'ns per trial and ms':<28}{'alone':>10}{f'in {LANES} lanes':>14}{'ratio':>8}")
+def rows() -> Iterator[list[str]]:
+    """Nanoseconds of one core per trial and step: case, alone, in lanes, ratio."""
     for name, (compensation, changes) in CASES.items():
         runs = [stretch(lanes(compensation, changes, count)) for count in (1, LANES)]
         best = [math.inf, math.inf]
@@ -92,7 +95,16 @@ def main() -> None:
                 run()
                 best[which] = min(best[which], time.perf_counter() - began)
         alone, block = best[0] / STEPS * 1e9, best[1] / STEPS / LANES * 1e9
-        print(f"{name:<28}{alone:>10.0f}{block:>14.1f}{alone / block:>8.1f}")
+        yield [name, f"{alone:.0f}", f"{block:.1f}", f"{alone / block:.1f}"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--write", action="store_true", help="into docs/performance.md")
+    found = table(["ns per trial and step", "alone", f"in {LANES} lanes", "ratio"], list(rows()))
+    print(found)
+    if parser.parse_args().write:
+        write_section("lanes", f"{machine()}.\n\n{found}")
 
 
 if __name__ == "__main__":

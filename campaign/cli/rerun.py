@@ -26,7 +26,15 @@ from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.comparison import changes, differences
 from campaign.physics.bench import Bench
-from campaign.physics.engine_version import ENGINE, ERRORS, FIRST, TORQUE_ERRORS
+from campaign.physics.engine_version import (
+    DRY_ERRORS,
+    DRY_TORQUE_ERRORS,
+    ENGINE,
+    ERRORS,
+    FIRST,
+    TORQUE_ERRORS,
+)
+from campaign.physics.friction import is_dry
 from campaign.policy import Policy
 from campaign.trial import Recording, Trial, trial_number
 
@@ -63,7 +71,7 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
         )
     (again,) = open_run(outcome.archive).trials
     engine = int(run.header.versions.get("engine", FIRST)) if simulated else ENGINE
-    say = _say if engine == ENGINE else partial(_say_change, engine, _is_noisy(trial))
+    say = _say if engine == ENGINE else partial(_say_change, engine, trial)
     same = say(f"{archived.trial.name} of {run.name}", before, again.recording())
     print_line(str(outcome.archive))
     return worst_exit_code([same, ExitCode.ARCHIVE if run.damaged else ExitCode.DONE])
@@ -98,15 +106,17 @@ def _say(what: str, before: Recording, again: Recording) -> ExitCode:
 
 
 def _say_change(
-    engine: int, noisy: bool, what: str, before: Recording, again: Recording
+    engine: int, trial: Trial, what: str, before: Recording, again: Recording
 ) -> ExitCode:
     """Another engine has other samples: how much they changed, beside the older one's error."""
     older, found = min(engine, ENGINE), changes(before, again)
-    bounds = {name: TIMES * _error(older, name) for name in found}
+    bench = Bench.model_validate(trial.bench, context={"si": True})
+    dry = any(is_dry(each) for each in bench.friction.values())
+    bounds = {name: TIMES * _error(older, name, dry=dry) for name in found}
     beyond = [name for name, change in found.items() if not change <= bounds[name]]
     if before.ending.outcome is not again.ending.outcome:
         verdict = f"different: {before.ending.outcome} → {again.ending.outcome}"
-    elif noisy:
+    elif _is_noisy(bench):
         verdict = "not to be judged, as engines draw the noise of its sensors differently"
     elif beyond:
         verdict = f"different in {', '.join(beyond)}"
@@ -118,13 +128,14 @@ def _say_change(
     return ExitCode.DONE if verdict.startswith("the same") else ExitCode.TRIALS_FAILED
 
 
-def _error(engine: int, channel: str) -> float:
+def _error(engine: int, channel: str, *, dry: bool) -> float:
     torque = channel in (FRICTION_TORQUE, COMPENSATION_TORQUE)
-    return (TORQUE_ERRORS if torque else ERRORS).get(engine, 0.0)
+    error = (TORQUE_ERRORS if torque else ERRORS).get(engine, 0.0)
+    of_dry = (DRY_TORQUE_ERRORS if torque else DRY_ERRORS).get(engine, 0.0)
+    return max(error, of_dry) if dry else error
 
 
-def _is_noisy(trial: Trial) -> bool:
-    bench = Bench.model_validate(trial.bench, context={"si": True})
+def _is_noisy(bench: Bench) -> bool:
     sensors = bench.sensors
     each = (sensors.gyro, sensors.encoder, sensors.resolver, sensors.current)
     return bench.controller.sample_rate is not None and any(sensor.noise > 0 for sensor in each)

@@ -1,12 +1,14 @@
 """The arrays of one trial, or of a block of trials side by side, as the engine takes them.
 
-The last axis has the lanes; w is their number. The functions here give the compiler, inside the
-engine, the same arrays with a number of lanes that it knows, and which own nothing: else each row
-that is taken of them in a loop would cost a counting of references.
+The last axis has the lanes; w is their number. Inside the engine, the functions here give the same
+without that axis, as arrays of its numbers (`campaign.physics.vector`): each number has all lanes.
+They own nothing: else each row that is taken in a loop would cost a counting of references.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,15 +16,16 @@ from numba import carray
 from numpy.typing import NDArray
 
 from campaign.physics.compiled import inlined
-from campaign.physics.stack import DOUBLES, data_of
-from campaign.physics.step_function import LANES
+from campaign.physics.vector import (
+    CACHE_LINE,
+    by_lanes,
+    by_rows,
+    data_of,
+    each_lane,
+    number_by_lanes,
+)
 
 Array = NDArray[np.float64]
-
-MOST_COLUMNS = DOUBLES // LANES
-"""States and inputs that a loop may have."""
-UNROLLED = 4
-"""Columns of `System.known` that are summed at a time; their number is a multiple of it."""
 
 
 class System(NamedTuple):
@@ -30,12 +33,15 @@ class System(NamedTuple):
 
     `known` has a column for each state and then for each input that acts, at the start and at the
     end of the step; what friction and compensation add is `by_friction` and `by_compensation`.
+    There is a row for each state; in a single trial some more, of zeros (`vector.by_rows`).
     """
 
-    known: Array  # (columns, states, w), transposed: a column's rows lie side by side
+    known: Array  # (columns / COLUMNS, COLUMNS, rows, w): a column's rows lie side by side
     plant_inputs: int  # rows of the signals that act on the plant, the first ones
-    by_friction: Array  # (2, states, w) per N m of the mean, and of the change over the step
-    by_compensation: Array  # (2, states, w)
+    by_friction: Array  # (2, rows, w) per N m of the mean, and of the change over the step
+    by_compensation: Array  # (2, rows, w)
+    friction_rows: Array  # the same two, as loops over all rows take them
+    compensation_rows: Array
     acts: NDArray[np.int64]  # (4,) for each input its row of the signals; -1: it is zero
     seen: int  # the state that continuous compensation sees as the relative rate ...
     low_pass: Array  # (w,) ... and the time constant (s) of its filter, 0 for none
@@ -44,22 +50,46 @@ class System(NamedTuple):
     step: Array  # (w,) s
 
 
-class Elements(NamedTuple):
-    """Friction models by lanes, as plant or as compensation; k of them."""
+class Dry(NamedTuple):
+    """Friction models that are sets at rest, by lanes, as plant or as compensation; d of them."""
 
-    address: NDArray[np.uintp]  # (k,) compiled step functions, for this many lanes
-    fixed: Array  # (k, HAS + parameters, w)
-    fixed_at: NDArray[np.uintp]  # (k,) where each one's rows begin
-    kept: Array  # (k, KEEPS + state, w) advanced in place
-    kept_at: NDArray[np.uintp]  # (k,)
+    address: NDArray[np.uintp]  # (d,) compiled sliding torques, for this many lanes
+    fixed: Array  # (d, HAS + parameters, w)
+    fixed_at: NDArray[np.uintp]  # (d,)
+    limits: Array  # (d, LIMITS, w) torques of rest and of the slowest sliding (N m at the load)
+    rippled: NDArray[np.int64]  # (d,)
+    ripple: Array  # (d, 3, w) as of `Elements`
+    wave: Array  # (d, 1, w) what the ripple makes of every torque in this step
+    wave_at: NDArray[np.uintp]  # (d,)
+    asked: Array  # (ASKED, w) where on their curves
+    asked_at: int
+    answer: Array  # (1, w) the sum of their sliding torques, unsigned
+    answer_at: int
+    state: Array  # (DRY, w) of all together, as they share one rate
+    numbers: Array  # the same, as the engine's numbers: each has all lanes
+
+
+class Elements(NamedTuple):
+    """Friction models by lanes, as plant or as compensation: k interfaces besides the dry ones.
+
+    Those that are alike are asked together, as one of g groups (`campaign.physics.alike`).
+    """
+
+    address: NDArray[np.uintp]  # (g,) compiled step functions, for this many lanes and interfaces
+    fixed: Array  # (k, HAS + parameters, w), but of a group (rows, its interfaces, w)
+    fixed_at: NDArray[np.uintp]  # (g,) where each one's rows begin
+    kept: Array  # (k, KEEPS + state, w) likewise, advanced in place
+    kept_at: NDArray[np.uintp]  # (g,)
     met: Array  # (2, MEETS, w) what they meet on the load's and on the motor's side
     met_at: NDArray[np.uintp]  # (2,)
     answer: Array  # (ANSWERS, w) the sum of their torque lines
     answer_at: int
-    viscous: Array  # (k, w) the linear part (N m s/rad at the load), gain included
-    motor_side: NDArray[np.int64]  # (k,) reads the resolver rather than the encoder
-    rippled: NDArray[np.int64]  # (k,)
-    ripple: Array  # (k, 3, w) amplitude, periods, phase: torque over the angle of the load
+    viscous: Array  # (k + d, w) the linear part (N m s/rad at the load), gain included
+    motor_side: NDArray[np.int64]  # (g,) reads the resolver rather than the encoder
+    side: NDArray[np.int64]  # (k + d,) the same of each interface
+    rippled: NDArray[np.int64]  # (g,)
+    ripple: Array  # (g, 3, w) amplitude, periods, phase: torque over the angle of the load
+    dry: Dry
 
 
 class Controller(NamedTuple):
@@ -78,6 +108,7 @@ class Controller(NamedTuple):
     ratio: Array  # (w,) N
     filter_pole: Array  # (w,) of the relative-rate low-pass, 0 for none
     pointing_pole: Array  # (w,) of the pointing error's high-pass, 1 for none
+    counts: NDArray[np.int64]  # (4,) whether a lane's sensor has a resolution
     resolution: Array  # (4, w) of the sensors, 0 for none
     a: Array  # (m, m, w) linear compensation, discrete
     b: Array  # (m, 3, w)
@@ -98,38 +129,44 @@ class Memory(NamedTuple):
     counters: NDArray[np.int64]  # steps done, samples done
 
 
-@inlined
-def rows_of(array: Array, lanes: int) -> Any:
-    """An array (rows, lanes) of which the compiler knows how far apart the rows are."""
-    return carray(data_of(array), (array.shape[0], lanes))
+def zeros(*shape: int) -> Array:
+    """Zeros, from the beginning of a cache line on: no row of a block's lanes lies in two lines."""
+    size = math.prod(shape)
+    room = np.zeros(size + CACHE_LINE // 8)
+    first = -room.ctypes.data % CACHE_LINE // 8
+    return room[first : first + size].reshape(shape)
+
+
+def by_lane(rows: Sequence[Any]) -> Array:
+    """One array of each lane, with the lanes as the last axis."""
+    array = zeros(*np.shape(rows[0]), len(rows))
+    for lane, row in enumerate(rows):
+        array[..., lane] = row
+    return array
 
 
 @inlined
 def row_of(array: Any) -> Any:
-    """The same of an array of one axis, of any type."""
+    """An array of one axis that owns nothing, for a loop."""
     return carray(data_of(array), (array.shape[0],))
-
-
-@inlined
-def tables_of(array: Array, lanes: int) -> Any:
-    """The same of an array (tables, rows, lanes)."""
-    return carray(data_of(array), (array.shape[0], array.shape[1], lanes))
 
 
 @inlined
 def system_of(lanes: int, its: System) -> System:
     """A system, for the inside of the engine."""
     return System(
-        tables_of(its.known, lanes),
+        by_rows(its.known, lanes),
         its.plant_inputs,
-        tables_of(its.by_friction, lanes),
-        tables_of(its.by_compensation, lanes),
+        by_lanes(its.by_friction, lanes),
+        by_lanes(its.by_compensation, lanes),
+        by_rows(its.by_friction, lanes),
+        by_rows(its.by_compensation, lanes),
         row_of(its.acts),
         its.seen,
-        row_of(its.low_pass),
-        rows_of(its.linear_x, lanes),
-        row_of(its.linear_base),
-        row_of(its.step),
+        number_by_lanes(its.low_pass, lanes),
+        by_lanes(its.linear_x, lanes),
+        number_by_lanes(its.linear_base, lanes),
+        number_by_lanes(its.step, lanes),
     )
 
 
@@ -138,18 +175,41 @@ def elements_of(lanes: int, its: Elements) -> Elements:
     """Friction models, for the inside of the engine."""
     return Elements(
         row_of(its.address),
-        tables_of(its.fixed, lanes),
+        by_lanes(its.fixed, lanes),
         row_of(its.fixed_at),
-        tables_of(its.kept, lanes),
+        by_lanes(its.kept, lanes),
         row_of(its.kept_at),
-        tables_of(its.met, lanes),
+        by_lanes(its.met, lanes),
         row_of(its.met_at),
-        rows_of(its.answer, lanes),
+        by_lanes(its.answer, lanes),
         its.answer_at,
-        rows_of(its.viscous, lanes),
+        by_lanes(its.viscous, lanes),
         row_of(its.motor_side),
+        row_of(its.side),
         row_of(its.rippled),
-        tables_of(its.ripple, lanes),
+        by_lanes(its.ripple, lanes),
+        dry_of(lanes, its.dry),
+    )
+
+
+@inlined
+def dry_of(lanes: int, its: Dry) -> Dry:
+    """Dry friction, for the inside of the engine: each lane decides for itself what it does."""
+    return Dry(
+        row_of(its.address),
+        by_lanes(its.fixed, lanes),
+        row_of(its.fixed_at),
+        each_lane(by_lanes(its.limits, lanes)),
+        row_of(its.rippled),
+        each_lane(by_lanes(its.ripple, lanes)),
+        each_lane(by_lanes(its.wave, lanes)),
+        row_of(its.wave_at),
+        each_lane(by_lanes(its.asked, lanes)),
+        its.asked_at,
+        each_lane(by_lanes(its.answer, lanes)),
+        its.answer_at,
+        each_lane(by_lanes(its.state, lanes)),
+        by_lanes(its.numbers, lanes),
     )
 
 
@@ -163,18 +223,19 @@ def controller_of(lanes: int, its: Controller) -> Controller:
         its.output_offset,
         row_of(its.delay),
         row_of(its.noisy),
-        row_of(its.period),
-        row_of(its.proportional),
-        row_of(its.integral),
-        row_of(its.torque_per_current),
-        row_of(its.ratio),
-        row_of(its.filter_pole),
-        row_of(its.pointing_pole),
-        rows_of(its.resolution, lanes),
-        tables_of(its.a, lanes),
-        tables_of(its.b, lanes),
-        rows_of(its.c, lanes),
-        rows_of(its.d, lanes),
+        number_by_lanes(its.period, lanes),
+        number_by_lanes(its.proportional, lanes),
+        number_by_lanes(its.integral, lanes),
+        number_by_lanes(its.torque_per_current, lanes),
+        number_by_lanes(its.ratio, lanes),
+        number_by_lanes(its.filter_pole, lanes),
+        number_by_lanes(its.pointing_pole, lanes),
+        row_of(its.counts),
+        by_lanes(its.resolution, lanes),
+        by_lanes(its.a, lanes),
+        by_lanes(its.b, lanes),
+        by_lanes(its.c, lanes),
+        by_lanes(its.d, lanes),
     )
 
 
@@ -182,12 +243,12 @@ def controller_of(lanes: int, its: Controller) -> Controller:
 def memory_of(lanes: int, its: Memory) -> Memory:
     """A memory, for the inside of the engine."""
     return Memory(
-        rows_of(its.x, lanes),
-        rows_of(its.kept, lanes),
-        rows_of(its.linear, lanes),
-        tables_of(its.readings, lanes),
-        rows_of(its.outputs, lanes),
-        rows_of(its.held, lanes),
-        rows_of(its.ended, lanes),
+        by_lanes(its.x, lanes),
+        by_lanes(its.kept, lanes),
+        by_lanes(its.linear, lanes),
+        by_lanes(its.readings, lanes),
+        by_lanes(its.outputs, lanes),
+        by_lanes(its.held, lanes),
+        by_lanes(its.ended, lanes),
         row_of(its.counters),
     )

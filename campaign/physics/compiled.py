@@ -61,6 +61,11 @@ def cache_folder(module: str) -> Path | None:
     return folder
 
 
+def is_kept_for_good(folder: Path) -> bool:
+    """Whether a cache folder is the user's, and not a temporary one of this process."""
+    return folder.parent == _user_cache()
+
+
 def _user_cache() -> Path:
     import platformdirs
 

@@ -8,9 +8,10 @@ quotient, fma) and of bit patterns, in an order that is written down. LLVM keeps
 as no fastmath flag is on; **none may be in a function that calls these**, since `reassoc` rounds
 vectors and scalars differently, and `contract` may.
 
-No function branches: each lane computes every case and selects its own, so loops over them become
-SIMD loops (in a loop of one's own, Python's `/` prevents that: see `divide`). A NaN stays a NaN;
-its sign and payload, which IEEE 754 leaves open, are left open.
+No function branches: each lane computes every case and selects its own, so that they work on
+vectors of lanes (`campaign.physics.vector`), and loops over them become SIMD loops (in a loop of
+one's own, Python's `/` prevents that: see `divide`). A NaN stays a NaN; its sign and payload, which
+IEEE 754 leaves open, are left open.
 
 Largest errors found in millions of arguments, in units in the last place (ulp):
 
@@ -33,6 +34,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from campaign.physics.compiled import inlined
+from campaign.physics.vector import Vector, call_llvm, splat, vector_among
 
 _TO_INTEGER = 1.5 * 2.0**52
 """Added to |x| < 2^51 it rounds x to an integer, which then stands in the sum's lowest bits."""
@@ -114,56 +116,87 @@ _LARGEST_ANGLE = 1e15
 @intrinsic
 def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     """Give a b + c, rounded once."""
+    number = vector_among((a, b, c)) or types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.fma(*args)
+        return call_llvm(builder, "fma", *args)
 
-    return types.float64(types.float64, types.float64, types.float64), codegen
+    return number(number, number, number), codegen
 
 
 @intrinsic
 def divide(typingctx: Any, a: Any, b: Any) -> Any:
     """Give a / b as IEEE 754 has it; Python's `/` looks for zero and raises, which is a branch."""
+    number = vector_among((a, b)) or types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fdiv(*args)
 
-    return types.float64(types.float64, types.float64), codegen
+    return number(number, number), codegen
+
+
+@intrinsic
+def nearest(typingctx: Any, x: Any) -> Any:
+    """Give the nearest whole number, the even one of two."""
+    number = vector_among((x,)) or types.float64
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return call_llvm(builder, "rint", *args)
+
+    return number(number), codegen
 
 
 @intrinsic
 def where(typingctx: Any, condition: Any, yes: Any, no: Any) -> Any:
     """`yes if condition else no` of two numbers that are there already.
 
-    The expression would do, but LLVM may then fetch only the one that is taken, from an address
-    that differs from lane to lane.
+    Of vectors, lane by lane.
     """
-    signature = types.float64(types.boolean, types.float64, types.float64)
+    number = vector_among((yes, no)) or types.float64
+    if isinstance(condition, Vector) and number == types.float64:
+        number = Vector(types.float64, condition.lanes)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.select(*args)
 
-    return signature, codegen
+    return number(condition, number, number), codegen
+
+
+@intrinsic
+def any_of(typingctx: Any, condition: Any) -> Any:
+    """Whether a condition holds in any lane: what none of them needs may be left out."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        if not isinstance(condition, Vector):
+            return args[0]
+        bits = ir.IntType(condition.lanes)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), bits(0))
+
+    return types.boolean(condition), codegen
 
 
 @intrinsic
 def bits_of(typingctx: Any, x: Any) -> Any:
     """Give the 64 bits of a double as an integer."""
+    bits = Vector(types.int64, x.lanes) if isinstance(x, Vector) else types.int64
+    number = x if isinstance(x, Vector) else types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.IntType(64))
+        return builder.bitcast(args[0], context.get_value_type(bits))
 
-    return types.int64(types.float64), codegen
+    return bits(number), codegen
 
 
 @intrinsic
 def double_of(typingctx: Any, bits: Any) -> Any:
     """Give the double that has these 64 bits."""
+    number = Vector(types.float64, bits.lanes) if isinstance(bits, Vector) else types.float64
+    bits = bits if isinstance(bits, Vector) else types.int64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.DoubleType())
+        return builder.bitcast(args[0], context.get_value_type(number))
 
-    return types.float64(types.int64), codegen
+    return number(bits), codegen
 
 
 @intrinsic
@@ -178,14 +211,18 @@ def polynomial(typingctx: Any, x: Any, coefficients: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         power = args[0]
         terms = [builder.extract_value(args[1], index) for index in range(len(coefficients))]
+        if isinstance(x, Vector):
+            terms = [splat(builder, term, x.lanes) for term in terms]
         while len(terms) > 1:
             unpaired = terms[len(terms) // 2 * 2 :]
             pairs = zip(terms[::2], terms[1::2], strict=False)
-            terms = [builder.fma(odd, power, even) for even, odd in pairs] + unpaired
+            joined = [call_llvm(builder, "fma", odd, power, even) for even, odd in pairs]
+            terms = joined + unpaired
             power = builder.fmul(power, power)
         return terms[0]
 
-    return types.float64(types.float64, coefficients), codegen
+    number = x if isinstance(x, Vector) else types.float64
+    return number(number, coefficients), codegen
 
 
 @inlined
@@ -197,19 +234,22 @@ def exp(x: float) -> float:
 @inlined
 def expm1(x: float) -> float:
     """e^x - 1, with a small relative error where x is nearly 0 too."""
-    within = _EXPM1_IS_MINUS_ONE if x < _EXPM1_IS_MINUS_ONE else x
-    half_scale, r, curve = _reduced_exp(within, 0.0)
+    half_scale, r, curve = _reduced_exp(x, 0.0)
     half = fma(half_scale, curve, fma(half_scale, r, half_scale - 0.5))
-    return x if abs(x) < _EXPM1_IS_X else 2.0 * half
+    result = where(abs(x) < _EXPM1_IS_X, x, 2.0 * half)
+    result = where(x < _EXPM1_IS_MINUS_ONE, -1.0, result)
+    last: float = where(x > _EXP_OVERFLOWS, math.inf, result)
+    return last
 
 
 @inlined
 def log(x: float) -> float:
     """Natural logarithm; -inf for x = 0, NaN for x < 0."""
     high, _ = _log_in_two(x)
-    result = high if x < math.inf else x
-    result = result if x != 0.0 else -math.inf
-    return math.nan if x < 0.0 else result
+    result = where(x < math.inf, high, x)
+    result = where(x != 0.0, result, -math.inf)
+    last: float = where(x < 0.0, math.nan, result)
+    return last
 
 
 @inlined
@@ -220,15 +260,16 @@ def power(x: float, y: float) -> float:
     other y, x < 0 gives NaN. y <= 0 is right only for 0 < x < inf.
     """
     high, low = _log_in_two(x)
-    exponent = 1e300 if y > 1e300 else y  # x^1e300 is 0, 1 or inf; a product of inf would be NaN
+    exponent = where(y > 1e300, 1e300, y)  # x^1e300 is 0, 1 or inf; a product of inf would be NaN
     product = exponent * high
     rest = fma(exponent, low, fma(exponent, high, -product))
     limit = x * exponent  # 0 at 0, inf at inf, and NaN with any NaN
-    result = _exp_of_sum(product, rest) if x < math.inf else limit
-    result = result if x != 0.0 else limit
-    result = math.nan if x < 0.0 else result
-    result = x if y == 1.0 else result
-    return x * x if y == 2.0 else result
+    result = where(x < math.inf, _exp_of_sum(product, rest), limit)
+    result = where(x != 0.0, result, limit)
+    result = where(x < 0.0, math.nan, result)
+    result = where(y == 1.0, x, result)
+    last: float = where(y == 2.0, x * x, result)
+    return last
 
 
 @inlined
@@ -237,7 +278,8 @@ def sin(x: float) -> float:
 
     The error grows to 5e-16 at 1e15. Beyond, NaN: neighbouring doubles are 0.1 rad and more apart.
     """
-    return _sine_from_quarter(x, 0) if x != 0.0 else x
+    result: float = where(x != 0.0, _sine_from_quarter(x, 0), x)
+    return result
 
 
 @inlined
@@ -249,7 +291,7 @@ def cos(x: float) -> float:
 @inlined
 def tanh(x: float) -> float:
     """Hyperbolic tangent; exactly odd; exactly 1 or -1 beyond 20."""
-    within = _TANH_IS_ONE if abs(x) > _TANH_IS_ONE else abs(x)
+    within = where(abs(x) > _TANH_IS_ONE, _TANH_IS_ONE, abs(x))
     growth = expm1(2.0 * within)
     size = divide(growth, growth + 2.0)
     result: float = double_of(bits_of(size) | (bits_of(x) & _SIGN_BIT))
@@ -260,20 +302,21 @@ def tanh(x: float) -> float:
 def _exp_of_sum(x: float, low: float) -> float:
     """e^(x + low), |low| being no more than some ulp of x."""
     half_scale, r, curve = _reduced_exp(x, low)
-    return 0.0 if x < _EXP_VANISHES else 2.0 * fma(half_scale, r + curve, half_scale)
+    result = where(x < _EXP_VANISHES, 0.0, 2.0 * fma(half_scale, r + curve, half_scale))
+    last: float = where(x > _EXP_OVERFLOWS, math.inf, result)
+    return last
 
 
 @inlined
 def _reduced_exp(x: float, low: float) -> tuple[float, float, float]:
-    """2^(k-1), r and e^r - 1 - r, where x + low = k ln 2 + r, |r| <= ln(2)/2 and x >= -707.
+    """2^(k-1), r and e^r - 1 - r, where x + low = k ln 2 + r, |r| <= ln(2)/2 and -707 <= x <= 710.
 
     Half of 2^k, since 2^1024 is no double and the largest results need it.
     """
-    within = _EXP_OVERFLOWS if x > _EXP_OVERFLOWS else x
-    shifted = fma(within, _LOG2_E, _TO_INTEGER)
+    shifted = fma(x, _LOG2_E, _TO_INTEGER)
     k = shifted - _TO_INTEGER
     half_scale = double_of((bits_of(shifted) + (_BIAS - 1)) << _MANTISSA_BITS)
-    main = fma(k, -_LN2[0], within)  # exact: a multiple of 2^-53 below 1 (or x itself, k being 0)
+    main = fma(k, -_LN2[0], x)  # exact: a multiple of 2^-53 below 1 (or x itself, k being 0)
     rest = fma(k, -_LN2[1], low)
     r = main + rest
     lost = rest - (r - main)
@@ -287,10 +330,10 @@ def _log_in_two(x: float) -> tuple[float, float]:
     With x = 2^k m, sqrt(1/2) <= m < sqrt(2), and s = (m - 1) / (m + 1): ln m = 2 artanh(s).
     """
     subnormal = x < _SMALLEST_NORMAL
-    bits = bits_of(x * 2.0**54 if subnormal else x)
+    bits = bits_of(where(subnormal, x * 2.0**54, x))
     biased = ((bits + _FROM_SQRT_HALF_TO_ONE) >> _MANTISSA_BITS) & _EXPONENT_MASK
     m = double_of(bits - ((biased - _BIAS) << _MANTISSA_BITS))
-    k = double_of(biased | _BITS_OF_2_TO_52) - (2.0**52 + _BIAS) - (54.0 if subnormal else 0.0)
+    k = double_of(biased | _BITS_OF_2_TO_52) - (2.0**52 + _BIAS) - where(subnormal, 54.0, 0.0)
     # s + s_low: the quotient, and what its own rounding and that of m + 1 took from it.
     divisor = m + 1.0
     divisor_low = m - (divisor - 1.0)
@@ -320,6 +363,7 @@ def _sine_from_quarter(x: float, quarter: int) -> float:
     z = r * r
     sine = r + fma(r * z, polynomial(z, _SIN), k * -_HALF_PI[2])
     cosine = fma(z, fma(z, polynomial(z, _COS), -0.5), 1.0)
-    size = sine if (quarters & 1) == 0 else cosine
+    size = where((quarters & 1) == 0, sine, cosine)
     result = double_of(bits_of(size) ^ ((quarters & 2) << 62))
-    return result if abs(x) <= _LARGEST_ANGLE else math.nan
+    last: float = where(abs(x) <= _LARGEST_ANGLE, result, math.nan)
+    return last

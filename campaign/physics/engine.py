@@ -10,18 +10,15 @@ for the plant's friction and for the models of it that compensate, so that what 
 cancels.
 
 The engine knows no friction model, compensation or controller form by name. It advances one trial,
-or a block of LANES trials of one structure: the same lines of code, compiled for either. Nothing
-that a lane computes depends on its neighbours, and no rounding depends on how many there are: sums
-have one order, and products are fused only where `fma` says so.
+or a block of LANES trials of one structure: the same lines of code, in which a number is a double
+or a vector with a lane for each trial (`campaign.physics.vector`). Nothing that a lane computes
+depends on its neighbours, and no rounding depends on how many there are: sums have one order, and
+products are fused only where `fma` says so.
 """
 
 from __future__ import annotations
 
-from numba import carray
-
 from campaign.physics.blocks import (
-    MOST_COLUMNS,
-    UNROLLED,
     Array,
     Controller,
     Elements,
@@ -31,11 +28,19 @@ from campaign.physics.blocks import (
     elements_of,
     memory_of,
     system_of,
-    tables_of,
 )
 from campaign.physics.compiled import compiled, inlined
+from campaign.physics.dry_friction import (
+    add_line,
+    dry_torque_as_it_begins,
+    expect_dry,
+    expect_filtered,
+    feed_forward,
+    hold_again,
+    rest,
+)
 from campaign.physics.elementary import fma
-from campaign.physics.friction_lines import ask, halfway, keep_ends, record_torque
+from campaign.physics.friction_lines import ask, end_of_line, halfway, torque_as_it_begins
 from campaign.physics.rows import (
     ANGLE,
     BASE_RATE,
@@ -68,10 +73,13 @@ from campaign.physics.rows import (
     RELATIVE_ANGLE,
 )
 from campaign.physics.sampled import sample
-from campaign.physics.stack import stack_doubles
-from campaign.physics.step_function import LANES
-
-AT_START, AT_END = 0, 1
+from campaign.physics.vector import (
+    LANES,
+    by_lanes,
+    in_columns,
+    in_rows,
+    rows_on_the_stack,
+)
 
 
 @compiled
@@ -89,16 +97,15 @@ def advance_one(
     """`_advance` of one trial."""
     _advance(
         1,
-        1,
         system_of(1, system),
         elements_of(1, friction),
         elements_of(1, compensation),
         controller_of(1, controller),
         memory_of(1, memory),
-        tables_of(signals, 1),
-        tables_of(noise, 1),
+        by_lanes(signals, 1),
+        by_lanes(noise, 1),
         every,
-        tables_of(out, 1),
+        by_lanes(out, 1),
     )
 
 
@@ -114,29 +121,23 @@ def advance_block(
     every: int,
     out: Array,
 ) -> None:
-    """`_advance` of LANES trials at once.
-
-    That loops run over so many lanes is not said: of a short loop the compiler would make single
-    instructions, one lane after the other, before it thinks of doing several at once.
-    """
+    """`_advance` of LANES trials at once."""
     _advance(
         LANES,
-        system.step.shape[0],
         system_of(LANES, system),
         elements_of(LANES, friction),
         elements_of(LANES, compensation),
         controller_of(LANES, controller),
         memory_of(LANES, memory),
-        tables_of(signals, LANES),
-        tables_of(noise, LANES),
+        by_lanes(signals, LANES),
+        by_lanes(noise, LANES),
         every,
-        tables_of(out, LANES),
+        by_lanes(out, LANES),
     )
 
 
 @inlined
 def _advance(
-    apart: int,
     lanes: int,
     system: System,
     friction: Elements,
@@ -150,112 +151,108 @@ def _advance(
 ) -> None:
     """Advance over one stretch and record every `every`-th step.
 
-    apart: lanes that lie side by side in memory.   lanes: those that are advanced: all of them.
-    signals: (inputs, steps + 1, lanes) at the step grid, those that act on the plant first.
-    noise: (samples, noisy sensors, lanes), in sensor units.
-    out: (8, steps / every, lanes), rows as OUTPUTS; the sample at the start of each `every` steps.
+    signals: (inputs, steps + 1) at the step grid, those that act on the plant first.
+    noise: (samples, noisy sensors), in sensor units.
+    out: (8, steps / every), rows as OUTPUTS; the sample at the start of each `every` steps.
     """
     sampled = controller.every > 0
     compensates = not sampled and compensation.viscous.shape[0] > 0
+    dry = friction.dry.address.shape[0] > 0
     # What is known when a step begins, the states first; and what follows of it alone.
-    known = carray(stack_doubles(), (MOST_COLUMNS, apart))
-    new = carray(stack_doubles(), (MOST_COLUMNS, apart))
-    base = carray(stack_doubles(), (MOST_COLUMNS, apart))
-    _begin(lanes, system, friction, memory, known, base)
-    samples = 0
+    known, new = rows_on_the_stack(lanes), rows_on_the_stack(lanes)
+    known_rows, known_columns, new_rows = in_rows(known), in_columns(known), in_rows(new)
+    _begin(system, friction, memory, known)
+    since_sample = memory.counters[0] % controller.every if sampled else 0
+    samples, since_record, place = 0, 0, 0
     for now in range(signals.shape[1] - 1):
         if sampled:
-            place = memory.counters[0] % controller.every
-            if place == 0:
-                sample(
-                    lanes, controller, compensation, memory, known, signals, system.acts[DRIVE],
-                    now, noise, samples,
-                )  # fmt: skip
+            if since_sample == 0:
+                command = signals[system.acts[DRIVE], now]
+                sample(lanes, controller, compensation, memory, known, command, noise, samples)
                 samples += 1
-            _hold(lanes, system, memory, place == controller.output_offset, known)
-        _read_inputs(lanes, system, signals, now, known, base)
-        _times(lanes, system.known, known, new)
-        _expect(lanes, system, friction, compensation, compensates, known, new, base)
+            _hold(system, memory, since_sample == controller.output_offset, known)
+            since_sample = since_sample + 1 if since_sample + 1 < controller.every else 0
+        _read_inputs(system, memory, signals, now, known)
+        base_start, base_end = _base_rates(system, signals, now)
+        _times(system.known, known_columns, new_rows)
+        _expect(
+            lanes, system, friction, compensation, compensates, known, new, base_start, base_end
+        )
         if compensates:
-            _expect_seen(lanes, system, friction, compensation, known, new)
-            halfway(lanes, known[RELATIVE_ANGLE], compensation.met[0])
-            ask(lanes, compensation)
-        halfway(lanes, known[RELATIVE_ANGLE], friction.met[0])
-        ask(lanes, friction)
-        if now % every == 0:
-            first, place = memory.counters[0] == 0, now // every
-            record_torque(lanes, friction, memory.ended[0], first, out[OUT_FRICTION], place)
+            _compensate(lanes, system, friction, compensation, known, new)
+        ask(friction)
+        if dry:
+            hold_again(system, friction, compensation, known, new, base_end)
+        if since_record == 0:
+            first = memory.counters[0] == 0
+            out[OUT_LOAD_RATE, place] = known[RATE]
+            out[OUT_FRICTION, place] = _torque_as_it_begins(friction, memory.ended[0], first)
             if sampled:
-                _record_readings(lanes, memory.kept, out, place)
+                _record_readings(memory.kept, out, place)
             else:
-                added = out[OUT_COMPENSATION]
-                record_torque(lanes, compensation, memory.ended[1], first, added, place)
-                _record_states(lanes, system, known, base, out, place)
-            for k in range(lanes):
-                out[OUT_LOAD_RATE, place, k] = known[RATE, k]
-        keep_ends(lanes, friction, memory.ended[0])
-        _take(lanes, system.by_friction, friction, new, known)
+                torque = _torque_as_it_begins(compensation, memory.ended[1], first)
+                _record_states(system, known, base_start, torque, out, place)
+            place += 1
+        since_record = since_record + 1 if since_record + 1 < every else 0
+        memory.ended[0] = _ended_line(friction)
         if compensates:
-            keep_ends(lanes, compensation, memory.ended[1])
-            _take(lanes, system.by_compensation, compensation, known, known)
+            memory.ended[1] = _ended_line(compensation)
+        _take(system, friction, compensation, compensates, new_rows, known_rows)
+        if dry:
+            rest(friction.dry.numbers, base_end, known)
         memory.counters[0] += 1
     for row in range(memory.x.shape[0]):
-        for k in range(lanes):
-            memory.x[row, k] = known[row, k]
+        memory.x[row] = known[row]
 
 
 @inlined
-def _begin(
-    lanes: int, system: System, friction: Elements, memory: Memory, known: Array, base: Array
-) -> None:
-    for row in range(MOST_COLUMNS):
-        for k in range(lanes):
-            known[row, k], base[row, k] = 0.0, 0.0
+def _begin(system: System, friction: Elements, memory: Memory, known: Array) -> None:
+    for row in range(known.shape[0]):
+        known[row] = 0.0
     for row in range(memory.x.shape[0]):
-        for k in range(lanes):
-            known[row, k] = memory.x[row, k]
-    for k in range(lanes):
-        friction.met[0, MEETS_COMPLIANCE, k] = -system.by_friction[MEAN, RATE, k]
+        known[row] = memory.x[row]
+    friction.met[0, MEETS_COMPLIANCE] = -system.by_friction[MEAN, RATE]
 
 
 @inlined
-def _hold(lanes: int, system: System, memory: Memory, changes: bool, known: Array) -> None:
+def _hold(system: System, memory: Memory, changes: bool, known: Array) -> None:
     """What a sampled controller puts out: it is held until the next one is due."""
-    row = memory.x.shape[0] + 2 * system.plant_inputs
-    for k in range(lanes):
-        if changes:
-            memory.held[1, k] = memory.held[0, k]
-        known[row, k] = memory.held[1, k]
+    if changes:
+        memory.held[1] = memory.held[0]
+    known[memory.x.shape[0] + 2 * system.plant_inputs] = memory.held[1]
 
 
 @inlined
-def _read_inputs(
-    lanes: int, system: System, signals: Array, now: int, known: Array, base: Array
-) -> None:
-    inputs, states, row = system.plant_inputs, system.known.shape[1], system.acts[BASE_RATE]
+def _read_inputs(system: System, memory: Memory, signals: Array, now: int, known: Array) -> None:
+    """The inputs that act on the plant, at the start of the step and at its end."""
+    inputs, states = system.plant_inputs, memory.x.shape[0]
     for which in range(inputs):
-        for k in range(lanes):
-            known[states + which, k] = signals[which, now, k]
-            known[states + inputs + which, k] = signals[which, now + 1, k]
-    if row >= 0:
-        for k in range(lanes):
-            base[AT_START, k], base[AT_END, k] = signals[row, now, k], signals[row, now + 1, k]
+        known[states + which] = signals[which, now]
+        known[states + inputs + which] = signals[which, now + 1]
 
 
 @inlined
-def _times(lanes: int, matrix: Array, known: Array, new: Array) -> None:
-    """What follows of what is known: new = matrix known, by lanes."""
-    columns, rows = matrix.shape[0], matrix.shape[1]
+def _base_rates(system: System, signals: Array, now: int) -> tuple[float, float]:
+    """Rates of the hull when the step begins and when it ends (rad/s)."""
+    start, end, row = 0.0, 0.0, system.acts[BASE_RATE]
+    if row >= 0:
+        start, end = signals[row, now], signals[row, now + 1]
+    return start, end
+
+
+@inlined
+def _times(matrix: Array, known: Array, new: Array) -> None:
+    """What follows of what is known: new = matrix known, some columns at a time."""
+    rows = matrix.shape[2]
     for row in range(rows):
-        for k in range(lanes):
-            new[row, k] = 0.0
-    for c in range(0, columns, UNROLLED):
+        new[row] = 0.0
+    for some in range(matrix.shape[0]):
+        k0, k1, k2, k3 = known[some, 0], known[some, 1], known[some, 2], known[some, 3]
         for row in range(rows):
-            for k in range(lanes):
-                total = fma(matrix[c, row, k], known[c, k], new[row, k])
-                total = fma(matrix[c + 1, row, k], known[c + 1, k], total)
-                total = fma(matrix[c + 2, row, k], known[c + 2, k], total)
-                new[row, k] = fma(matrix[c + 3, row, k], known[c + 3, k], total)
+            total = fma(matrix[some, 0, row], k0, new[row])
+            total = fma(matrix[some, 1, row], k1, total)
+            total = fma(matrix[some, 2, row], k2, total)
+            new[row] = fma(matrix[some, 3, row], k3, total)
 
 
 @inlined
@@ -267,91 +264,124 @@ def _expect(
     compensates: bool,
     x: Array,
     new: Array,
-    base: Array,
+    base_start: float,
+    base_end: float,
 ) -> None:
-    """The relative rate at the end of the step, should all torques stay as they are."""
-    met = friction.met[0]
-    for k in range(lanes):
-        end = fma(system.by_friction[MEAN, RATE, k], friction.answer[HELD, k], new[RATE, k])
-        if compensates:
-            added = compensation.answer[HELD, k]
-            end = fma(system.by_compensation[MEAN, RATE, k], added, end)
-        met[MEETS_RATE_START, k] = x[RATE, k] - base[AT_START, k]
-        met[MEETS_RATE_END, k] = end - base[AT_END, k]
-    row = RELATIVE_ANGLE
-    for k in range(lanes):
-        angle = fma(system.by_friction[MEAN, row, k], friction.answer[HELD, k], new[row, k])
-        if compensates:
-            angle = fma(system.by_compensation[MEAN, row, k], compensation.answer[HELD, k], angle)
-        met[MEETS_RATE_MEAN, k] = (angle - x[row, k]) * met[MEETS_PER_STEP, k]
-    for k in range(lanes):
-        gained = met[MEETS_RATE_END, k] - met[MEETS_RATE_START, k]
-        met[MEETS_PUSH, k] = gained / met[MEETS_COMPLIANCE, k]
+    """What friction meets over the step, should all torques stay as they are."""
+    met, held = friction.met[0], friction.answer[HELD]
+    end = fma(system.by_friction[MEAN, RATE], held, new[RATE])
+    angle = fma(system.by_friction[MEAN, RELATIVE_ANGLE], held, new[RELATIVE_ANGLE])
+    if compensates:
+        added = compensation.answer[HELD]
+        end = fma(system.by_compensation[MEAN, RATE], added, end)
+        angle = fma(system.by_compensation[MEAN, RELATIVE_ANGLE], added, angle)
+    start, end = x[RATE] - base_start, end - base_end
+    met[MEETS_RATE_START], met[MEETS_RATE_END] = start, end
+    met[MEETS_RATE_MEAN] = (angle - x[RELATIVE_ANGLE]) * met[MEETS_PER_STEP]
+    met[MEETS_PUSH] = (end - start) / met[MEETS_COMPLIANCE]
+    halfway(x[RELATIVE_ANGLE], met)
+    if friction.dry.address.shape[0] > 0:
+        expect_dry(lanes, friction, system.by_friction)
+        halfway(x[RELATIVE_ANGLE], met)
+
+
+@inlined
+def _compensate(
+    lanes: int, system: System, friction: Elements, compensation: Elements, x: Array, new: Array
+) -> None:
+    """What continuous compensation answers."""
+    dry = friction.dry.address.shape[0] > 0
+    _expect_seen(system, friction, compensation, x, new)
+    if dry and system.seen != RATE:
+        expect_filtered(system, friction.dry.numbers, compensation.met[0])
+    halfway(x[RELATIVE_ANGLE], compensation.met[0])
+    ask(compensation)
+    if compensation.dry.address.shape[0] > 0:
+        feed_forward(lanes, dry and system.seen == RATE, friction.dry, compensation)
 
 
 @inlined
 def _expect_seen(
-    lanes: int, system: System, friction: Elements, compensation: Elements, x: Array, new: Array
+    system: System, friction: Elements, compensation: Elements, x: Array, new: Array
 ) -> None:
     """The same of the rate that continuous compensation sees, which may be filtered."""
-    met, row = compensation.met[0], system.seen
+    met, plant, row = compensation.met[0], friction.met[0], system.seen
     if row == RATE:
-        for k in range(lanes):
-            met[MEETS_RATE_START, k] = friction.met[0, MEETS_RATE_START, k]
-            met[MEETS_RATE_END, k] = friction.met[0, MEETS_RATE_END, k]
-            met[MEETS_RATE_MEAN, k] = friction.met[0, MEETS_RATE_MEAN, k]
+        met[MEETS_RATE_START], met[MEETS_RATE_END] = plant[MEETS_RATE_START], plant[MEETS_RATE_END]
+        met[MEETS_RATE_MEAN] = plant[MEETS_RATE_MEAN]
     else:
-        for k in range(lanes):
-            end = fma(system.by_friction[MEAN, row, k], friction.answer[HELD, k], new[row, k])
-            added = compensation.answer[HELD, k]
-            end = fma(system.by_compensation[MEAN, row, k], added, end)
-            met[MEETS_RATE_START, k], met[MEETS_RATE_END, k] = x[row, k], end
-            # What the low-pass has let through: the way, less what it still holds back.
-            held_back = system.low_pass[k] * (end - x[row, k]) * met[MEETS_PER_STEP, k]
-            met[MEETS_RATE_MEAN, k] = friction.met[0, MEETS_RATE_MEAN, k] - held_back
+        end = fma(system.by_friction[MEAN, row], friction.answer[HELD], new[row])
+        end = fma(system.by_compensation[MEAN, row], compensation.answer[HELD], end)
+        met[MEETS_RATE_START], met[MEETS_RATE_END] = x[row], end
+        # What the low-pass has let through: the way, less what it still holds back.
+        held_back = system.low_pass * (end - x[row]) * met[MEETS_PER_STEP]
+        met[MEETS_RATE_MEAN] = plant[MEETS_RATE_MEAN] - held_back
 
 
 @inlined
-def _take(lanes: int, by: Array, elements: Elements, new: Array, x: Array) -> None:
-    """Add to the new states what follows of a torque line."""
-    answer = elements.answer
+def _take(
+    system: System,
+    friction: Elements,
+    compensation: Elements,
+    compensates: bool,
+    new: Array,
+    x: Array,
+) -> None:
+    """Add to the new states what follows of the torque lines."""
+    by, mean, change = system.friction_rows, friction.answer[MEAN], friction.answer[CHANGE]
+    also, added, rising = (
+        system.compensation_rows, compensation.answer[MEAN], compensation.answer[CHANGE],
+    )  # fmt: skip
     for row in range(by.shape[1]):
-        for k in range(lanes):
-            total = fma(by[MEAN, row, k], answer[MEAN, k], new[row, k])
-            x[row, k] = fma(by[CHANGE, row, k], answer[CHANGE, k], total)
+        total = fma(by[CHANGE, row], change, fma(by[MEAN, row], mean, new[row]))
+        if compensates:
+            total = fma(also[CHANGE, row], rising, fma(also[MEAN, row], added, total))
+        x[row] = total
+
+
+@inlined
+def _ended_line(elements: Elements) -> float:
+    """Where the line ends of all models but the dry ones, whose line is added to the answer."""
+    ended = end_of_line(elements)
+    if elements.dry.address.shape[0] > 0:
+        add_line(elements)
+    return ended
+
+
+@inlined
+def _torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float:
+    """The torque of all models as a step begins (N m), dry ones included."""
+    torque = torque_as_it_begins(elements, ended, first)
+    if elements.dry.address.shape[0] > 0:
+        torque = torque + dry_torque_as_it_begins(elements.dry.numbers, first)
+    return torque
 
 
 @inlined
 def _record_states(
-    lanes: int, system: System, x: Array, base: Array, out: Array, place: int
+    system: System, x: Array, base_rate: float, torque: float, out: Array, place: int
 ) -> None:
     """A sample of a loop with a continuous controller, which reads the states themselves.
 
-    The torque of the compensation's friction models is there already; its linear part is added.
+    torque: of the compensation's friction models; its linear part is added here.
     """
-    hull = AT_START if system.seen == RATE else MOST_COLUMNS - 1  # the filter has taken it away
-    for k in range(lanes):
-        out[OUT_GYRO, place, k] = x[RATE, k]
-        out[OUT_RELATIVE_RATE, place, k] = x[system.seen, k] - base[hull, k]
-        out[OUT_ANGLE, place, k] = x[RELATIVE_ANGLE, k]
-        out[OUT_CURRENT, place, k] = x[CURRENT, k]
-        out[OUT_POINTING, place, k] = x[ANGLE, k]
+    out[OUT_GYRO, place] = x[RATE]
+    # A filter has taken the base's rate away already.
+    out[OUT_RELATIVE_RATE, place] = x[system.seen] - (base_rate if system.seen == RATE else 0.0)
+    out[OUT_ANGLE, place] = x[RELATIVE_ANGLE]
+    out[OUT_CURRENT, place] = x[CURRENT]
+    out[OUT_POINTING, place] = x[ANGLE]
     for row in range(system.linear_x.shape[0]):
-        for k in range(lanes):
-            added = out[OUT_COMPENSATION, place, k]
-            out[OUT_COMPENSATION, place, k] = fma(system.linear_x[row, k], x[row, k], added)
-    for k in range(lanes):
-        added = out[OUT_COMPENSATION, place, k]
-        out[OUT_COMPENSATION, place, k] = fma(system.linear_base[k], base[AT_START, k], added)
+        torque = fma(system.linear_x[row], x[row], torque)
+    out[OUT_COMPENSATION, place] = fma(system.linear_base, base_rate, torque)
 
 
 @inlined
-def _record_readings(lanes: int, kept: Array, out: Array, place: int) -> None:
+def _record_readings(kept: Array, out: Array, place: int) -> None:
     """A sample of a loop with a sampled controller: what the controller knows."""
-    for k in range(lanes):
-        out[OUT_GYRO, place, k] = kept[KEPT_GYRO, k]
-        out[OUT_RELATIVE_RATE, place, k] = kept[KEPT_LOAD_RATE, k]
-        out[OUT_ANGLE, place, k] = kept[KEPT_ENCODER, k]
-        out[OUT_CURRENT, place, k] = kept[KEPT_CURRENT, k]
-        out[OUT_POINTING, place, k] = kept[KEPT_POINTING, k]
-        out[OUT_COMPENSATION, place, k] = kept[KEPT_TORQUE, k]
+    out[OUT_GYRO, place] = kept[KEPT_GYRO]
+    out[OUT_RELATIVE_RATE, place] = kept[KEPT_LOAD_RATE]
+    out[OUT_ANGLE, place] = kept[KEPT_ENCODER]
+    out[OUT_CURRENT, place] = kept[KEPT_CURRENT]
+    out[OUT_POINTING, place] = kept[KEPT_POINTING]
+    out[OUT_COMPENSATION, place] = kept[KEPT_TORQUE]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from campaign.physics.blocks import Array, Elements
 from campaign.physics.compiled import inlined
-from campaign.physics.elementary import fma, sin
+from campaign.physics.elementary import fma, sin, where
 from campaign.physics.rows import (
     CHANGE,
     HELD,
@@ -22,19 +22,16 @@ AMPLITUDE, PERIODS, PHASE = range(3)
 
 
 @inlined
-def ask(lanes: int, elements: Elements) -> None:
+def ask(elements: Elements) -> None:
     """The sum of all lines, in `elements.answer`; what they meet stands in `elements.met`."""
     answer = elements.answer
-    for k in range(lanes):
-        answer[MEAN, k], answer[CHANGE, k], answer[HELD, k] = 0.0, 0.0, 0.0
-    for e in range(elements.viscous.shape[0]):
+    answer[MEAN], answer[CHANGE], answer[HELD] = 0.0, 0.0, 0.0
+    for e in range(elements.address.shape[0]):
         side = elements.motor_side[e]
-        met = elements.met[side]
+        met, ripple = elements.met[side], elements.ripple[e]
         if elements.rippled[e] > 0:
-            for k in range(lanes):
-                turned = elements.ripple[e, PERIODS, k] * met[MEETS_POSITION, k]
-                wave = sin(turned + elements.ripple[e, PHASE, k])
-                met[MEETS_RIPPLE, k] = 1.0 + elements.ripple[e, AMPLITUDE, k] * wave
+            wave = sin(ripple[PERIODS] * met[MEETS_POSITION] + ripple[PHASE])
+            met[MEETS_RIPPLE] = 1.0 + ripple[AMPLITUDE] * wave
         call_step(
             elements.address[e],
             elements.fixed_at[e],
@@ -43,49 +40,40 @@ def ask(lanes: int, elements: Elements) -> None:
             elements.answer_at,
         )
         if elements.rippled[e] > 0:
-            for k in range(lanes):
-                met[MEETS_RIPPLE, k] = 1.0
+            met[MEETS_RIPPLE] = 1.0
 
 
 @inlined
-def on_a_line(lanes: int, met: Array) -> None:
+def on_a_line(met: Array) -> None:
     """The mean of a rate that is a straight line over the step."""
-    for k in range(lanes):
-        met[MEETS_RATE_MEAN, k] = 0.5 * (met[MEETS_RATE_START, k] + met[MEETS_RATE_END, k])
+    met[MEETS_RATE_MEAN] = 0.5 * (met[MEETS_RATE_START] + met[MEETS_RATE_END])
 
 
 @inlined
-def halfway(lanes: int, angle: Array, met: Array) -> None:
-    """Put the angle (lanes,) in the middle of the step, from the one when it begins (rad)."""
-    for k in range(lanes):
-        way = 3.0 * met[MEETS_RATE_START, k] + met[MEETS_RATE_END, k]
-        met[MEETS_POSITION, k] = angle[k] + 0.125 * met[MEETS_STEP, k] * way
+def halfway(angle: float, met: Array) -> None:
+    """Put the angle in the middle of the step, from the one when it begins (rad)."""
+    way = 3.0 * met[MEETS_RATE_START] + met[MEETS_RATE_END]
+    met[MEETS_POSITION] = angle + 0.125 * met[MEETS_STEP] * way
 
 
 @inlined
-def record_torque(
-    lanes: int, elements: Elements, ended: Array, first: bool, out: Array, sample: int
-) -> None:
-    """The torque of all models, its linear part included, as a step begins: into out[sample].
+def torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float:
+    """The torque of all models, its linear part included, as a step begins (N m).
 
-    ended: (lanes,) where the line before ended; in the first step, what the torque is when it
-    begins, or NaN where nobody knows. The lines that end and begin here need not meet: their mean
-    lags by nothing.
+    ended: where the line before ended; in the first step, what the torque is when it begins, or NaN
+    where nobody knows. The lines that end and begin here need not meet: their mean lags by nothing.
     """
     answer, met = elements.answer, elements.met[0]
-    for k in range(lanes):
-        start = answer[MEAN, k] - 0.5 * answer[CHANGE, k]
-        known = ended[k] == ended[k]
-        between = ended[k] if first else 0.5 * (ended[k] + start)
-        out[sample, k] = between if known else start
+    start = answer[MEAN] - 0.5 * answer[CHANGE]
+    between = where(first, ended, 0.5 * (ended + start))
+    torque: float = where(ended == ended, between, start)
     for e in range(elements.viscous.shape[0]):
-        for k in range(lanes):
-            out[sample, k] = fma(elements.viscous[e, k], met[MEETS_RATE_START, k], out[sample, k])
+        torque = fma(elements.viscous[e], met[MEETS_RATE_START], torque)
+    return torque
 
 
 @inlined
-def keep_ends(lanes: int, elements: Elements, ended: Array) -> None:
-    """Where the lines end, for the next record."""
-    answer = elements.answer
-    for k in range(lanes):
-        ended[k] = answer[MEAN, k] + 0.5 * answer[CHANGE, k]
+def end_of_line(elements: Elements) -> float:
+    """Where the line ends, for the next record (N m)."""
+    end: float = elements.answer[MEAN] + 0.5 * elements.answer[CHANGE]
+    return end

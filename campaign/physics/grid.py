@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from campaign.physics import step_choice
 from campaign.physics.bench import Bench
+from campaign.physics.step_choice import StepChoice
 from campaign.signals import MultiSine, Sine
 from campaign.trial import Task
 
@@ -25,12 +26,14 @@ class Grid:
         every: steps per recorded sample.
         per_control: steps per controller sample; 0 for a continuous controller.
         samples: recorded samples in all.
+        because: what the trial needs so short a step for; empty when it has the longest there is.
     """
 
     step: float
     every: int
     per_control: int
     samples: int
+    because: str = ""
 
 
 def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Grid:
@@ -42,18 +45,24 @@ def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Gr
     """
     control_rate = bench.controller.sample_rate
     continuous = control_rate is None or task.mode in ("prescribed", "spring")
+    because = "asked for" if longest_step is not None else ""
     if longest_step is None:
-        longest_step = _needed(bench, task)
+        choice = _choice(bench, task)
+        longest_step = choice.step
+        because = choice.because if choice.step < step_choice.LONGEST else ""
     # A sampled controller holds its command between samples: the steps need not resolve it.
     smooth = (task.base_acceleration, task.disturbance)
     for signal in (*smooth, task.command) if continuous else smooth:
         if isinstance(signal, Sine | MultiSine):
             fastest = signal.frequency if isinstance(signal, Sine) else max(signal.frequencies)
-            longest_step = min(longest_step, 1.0 / (STEPS_PER_CYCLE * fastest))
+            if 1.0 / (STEPS_PER_CYCLE * fastest) < longest_step:
+                longest_step, because = 1.0 / (STEPS_PER_CYCLE * fastest), f"{fastest:g} Hz"
     samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
     if control_rate is None or continuous:
         every = max(1, math.ceil(1.0 / (task.sample_rate * longest_step) - 1e-9))
-        return Grid(1.0 / (task.sample_rate * every), every, 0, samples)
+        if every == 1 and task.sample_rate * step_choice.LONGEST > 1.0:
+            because = f"recorded at {task.sample_rate:g} Hz"
+        return Grid(1.0 / (task.sample_rate * every), every, 0, samples, because)
     per_record = control_rate / task.sample_rate
     if abs(per_record - round(per_record)) > 1e-6 or round(per_record) < 1:
         raise ValueError(
@@ -63,17 +72,19 @@ def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Gr
     per_control = max(1, math.ceil(1.0 / (control_rate * longest_step) - 1e-9))
     per_control = _with_delay(per_control, bench.controller.delay * control_rate)
     step = 1.0 / (control_rate * per_control)
-    return Grid(step, per_control * round(per_record), per_control, samples)
+    if per_control == 1 and control_rate * step_choice.LONGEST > 1.0:
+        because = f"controlled at {control_rate:g} Hz"
+    return Grid(step, per_control * round(per_record), per_control, samples, because)
 
 
-def _needed(bench: Bench, task: Task) -> float:
+def _choice(bench: Bench, task: Task) -> StepChoice:
     choice = step_choice.longest_step(bench, task)
     if choice.refused is not None:
         raise ValueError(
             f"{choice.refused}; [backend] longest_step simulates it all the same, with an error "
             "that nobody knows"
         )
-    return choice.step
+    return choice
 
 
 def _with_delay(per_control: int, delay: float) -> int:

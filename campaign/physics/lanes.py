@@ -8,95 +8,51 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import AngleSensor, Bench, CurrentSensor, RateSensor
 from campaign.physics.blocks import (
-    MOST_COLUMNS,
-    UNROLLED,
     Controller,
     Elements,
     Memory,
     System,
+    by_lane,
+    zeros,
 )
 from campaign.physics.compensation.interface import Compensator
-from campaign.physics.friction import friction_models
-from campaign.physics.friction.interface import FrictionOptions
+from campaign.physics.friction import jumps
+from campaign.physics.friction_elements import (
+    Interface,
+    compensation_elements,
+    plant_elements,
+    torque_at,
+)
 from campaign.physics.grid import Grid, make_grid
 from campaign.physics.loop import (
     Array,
     Loop,
-    at_load,
     discretise,
     make_compensator,
     make_loop,
     make_plant,
     make_spring,
-    viscous_at_load,
 )
 from campaign.physics.rows import (
-    ANSWERS,
     BASE_RATE,
     COMPENSATION,
     DRIVE,
     FRICTION,
-    HAS,
-    KEEPS,
     KEPT,
-    MEETS,
-    MEETS_PER_STEP,
-    MEETS_RIPPLE,
-    MEETS_STEP,
     RATE,
     RELATIVE_ANGLE,
 )
-from campaign.physics.step_function import ROOM_TEMPERATURE, Motion, address_of, single_step
 from campaign.physics.variation import as_it_is
-from campaign.signals import Zero
+from campaign.physics.vector import COLUMNS, MOST_COLUMNS, ROWS
+from campaign.signals import Signal, Zero
 from campaign.trial import Task
 
-AN_INSTANT = 1e-9
-"""s; over it nothing moves, and differences are still numbers."""
-
-
-@dataclass(frozen=True)
-class Interface:
-    """One friction model of one trial, as plant or as compensation."""
-
-    step: Callable[..., Any]
-    parameters: Array
-    state_size: int
-    torque: float
-    rate: float
-    viscous: float
-    motor_side: bool
-    ripple: tuple[float, float, float]
-
-    @classmethod
-    def of(cls, options: FrictionOptions, gain: float, bench: Bench) -> Interface:
-        model = friction_models()[options.model]  # type: ignore[attr-defined]
-        torque, rate = at_load(options, bench)
-        ripple = options.ripple
-        return cls(
-            step=model.step if model.step_for is None else model.step_for(options),
-            parameters=np.asarray(model.parameters(options), dtype=float),
-            state_size=model.state_size(options),
-            torque=torque * gain,
-            rate=rate,
-            viscous=gain * viscous_at_load(options, bench),
-            motor_side=options.side == "motor",
-            ripple=(ripple.amplitude, ripple.periods, ripple.phase),
-        )
-
-    def address(self, lanes: int) -> int:
-        """Of its step function, compiled for so many lanes."""
-        return address_of(self.step, lanes, len(self.parameters), self.state_size)
-
-    @property
-    def structure(self) -> Hashable:
-        sizes = len(self.parameters), self.state_size
-        return self.step, *sizes, self.motor_side, self.ripple[0] != 0.0
+AT_REST = 1e-12
+"""rad/s; what rounding leaves of a hull that stands still is no sliding."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +85,7 @@ class Lane:
         compensator = make_compensator(bench, task.compensation)
         loop = _loop(bench, task, compensator, grid)
         f, g, h = discretise(loop.a, loop.b, grid.step)
+        moves = task.mode != "prescribed"
         return cls(
             bench=bench,
             task=task,
@@ -140,8 +97,13 @@ class Lane:
             g=g,
             h=h,
             inputs=_inputs(task, grid),
-            friction=tuple(Interface.of(each, 1.0, bench) for each in bench.friction.values()),
-            compensation=tuple(Interface.of(*each, bench) for each in compensator.friction),
+            friction=tuple(
+                Interface.of(each, 1.0, bench, moves) for each in bench.friction.values()
+            ),
+            compensation=tuple(
+                Interface.of(each, gain, bench, moves and not grid.per_control and jumps(each))
+                for each, gain in compensator.friction
+            ),
         )
 
     @property
@@ -192,11 +154,13 @@ class Lanes:
     def signals(self, at: Array) -> Array:
         """The inputs over the step grid `at` (steps + 1,), shape (inputs, steps + 1, width)."""
         inputs = self.trials[0].inputs
-        signals = np.zeros((len(inputs), len(at), self.width))
-        for k, trial in enumerate(self.trials):
-            for row, which in enumerate(inputs):
-                signals[row, :, k] = _signal(trial.task, which, at)
-        signals[:, :, len(self.trials) :] = signals[:, :, :1]
+        signals = zeros(len(inputs), len(at), self.width)
+        for row, which in enumerate(inputs):
+            own = _sampled([trial.task for trial in self.trials], which, at)
+            signals[row] = own[0][:, None]
+            for k, samples in enumerate(own):
+                if samples is not own[0]:
+                    signals[row, :, k] = samples
         return signals
 
     def noise(self, steps: int) -> Array:
@@ -204,7 +168,7 @@ class Lanes:
         every = self.controller.every
         samples = steps // every if every else 0
         sigmas = [_sigmas(trial) for trial in self.trials]
-        noise = np.zeros((samples, len(sigmas[0]), self.width))
+        noise = zeros(samples, len(sigmas[0]), self.width)
         if noise.size:
             for k, (random, sigma) in enumerate(zip(self.random, sigmas, strict=True)):
                 noise[:, :, k] = random.standard_normal((samples, len(sigma))) * sigma
@@ -219,21 +183,21 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
     if any(trial.structure != trials[0].structure for trial in trials):
         raise ValueError("only trials of one structure can be simulated together")
     controller = _controller(lanes)
+    steps, rates = [lane.grid.step for lane in lanes], [_rate_at_start(lane) for lane in lanes]
     return Lanes(
         width=width,
         trials=tuple(trials),
         system=_system(lanes),
-        friction=_elements([lane.friction for lane in lanes], lanes, in_plant=True),
-        compensation=_elements([lane.compensation for lane in lanes], lanes, in_plant=False),
+        friction=plant_elements([lane.friction for lane in lanes], steps, rates),
+        compensation=compensation_elements(
+            [lane.compensation for lane in lanes],
+            [_period(lane) for lane in lanes] if controller.every else steps,
+            reads_sensors=controller.every > 0,
+        ),
         controller=controller,
         memory=_memory(lanes, controller),
         random=tuple(np.random.Generator(np.random.PCG64(trial.seed)) for trial in trials),
     )
-
-
-def _by_lane(rows: Sequence[Any]) -> Array:
-    """One array of each lane, with the lanes as the last axis."""
-    return np.ascontiguousarray(np.stack([np.asarray(row, dtype=float) for row in rows], axis=-1))
 
 
 def _loop(bench: Bench, task: Task, compensator: Compensator, grid: Grid) -> Loop:
@@ -249,11 +213,31 @@ def _inputs(task: Task, grid: Grid) -> tuple[int, ...]:
     """The inputs that act; a sampled controller reads the command, and it comes last."""
     if task.mode == "prescribed":
         return (DRIVE,)
-    signals = {DRIVE: task.command, BASE_RATE: task.base_acceleration, FRICTION: task.disturbance}
-    acting = tuple(which for which, signal in signals.items() if not isinstance(signal, Zero))
+    order = (DRIVE, BASE_RATE, FRICTION)
+    acting = tuple(which for which in order if not isinstance(_acting(task, which), Zero))
     if not grid.per_control:
         return acting
     return (*(which for which in acting if which != DRIVE), DRIVE)
+
+
+def _acting(task: Task, which: int) -> Signal:
+    return {DRIVE: task.command, BASE_RATE: task.base_acceleration, FRICTION: task.disturbance}[
+        which
+    ]
+
+
+def _sampled(tasks: Sequence[Task], which: int, at: Array) -> list[Array]:
+    """An input of each task; tasks mostly have one in common, which is sampled once."""
+    known: list[tuple[Signal, Array]] = []
+    found = []
+    for task in tasks:
+        signal = _acting(task, which)
+        samples = next((values for each, values in known if each == signal), None)
+        if samples is None:
+            samples = _signal(task, which, at)
+            known.append((signal, samples))
+        found.append(samples)
+    return found
 
 
 def _signal(task: Task, which: int, at: Array) -> Array:
@@ -266,7 +250,7 @@ def _system(lanes: Sequence[Lane]) -> System:
     first = lanes[0]
     plant = [which for which in first.inputs if not (which == DRIVE and first.grid.per_control)]
     columns = len(first.f) + 2 * len(plant) + (1 if first.grid.per_control else 0)
-    padded = -(-columns // UNROLLED) * UNROLLED
+    padded = -(-columns // COLUMNS) * COLUMNS
     block = first.compensator.linear
     columns = max(columns, 0 if block is None else len(block.c))
     if max(padded, columns) > MOST_COLUMNS:
@@ -274,84 +258,47 @@ def _system(lanes: Sequence[Lane]) -> System:
     acts = np.full(4, -1, dtype=np.int64)
     for row, which in enumerate(first.inputs):
         acts[which] = row
+    rows = len(first.f) if len(lanes) > 1 else -(-len(first.f) // ROWS) * ROWS
+    by_friction = by_lane([_torque_columns(lane, FRICTION, rows) for lane in lanes])
+    by_compensation = by_lane([_torque_columns(lane, COMPENSATION, rows) for lane in lanes])
     return System(
-        known=_by_lane([_known(lane, plant, padded) for lane in lanes]),
+        known=by_lane([_known(lane, plant, padded, rows) for lane in lanes]),
         plant_inputs=len(plant),
-        by_friction=_by_lane([_torque_columns(lane, FRICTION) for lane in lanes]),
-        by_compensation=_by_lane([_torque_columns(lane, COMPENSATION) for lane in lanes]),
+        by_friction=by_friction,
+        by_compensation=by_compensation,
+        friction_rows=by_friction,
+        compensation_rows=by_compensation,
         acts=acts,
         seen=first.loop.seen,
-        low_pass=_by_lane([lane.bench.controller.relative_rate_filter for lane in lanes]),
-        linear_x=_by_lane([lane.loop.linear_compensation[0] for lane in lanes]),
-        linear_base=_by_lane([lane.loop.linear_compensation[1][BASE_RATE] for lane in lanes]),
-        step=_by_lane([lane.grid.step for lane in lanes]),
+        low_pass=by_lane([lane.bench.controller.relative_rate_filter for lane in lanes]),
+        linear_x=by_lane([lane.loop.linear_compensation[0] for lane in lanes]),
+        linear_base=by_lane([lane.loop.linear_compensation[1][BASE_RATE] for lane in lanes]),
+        step=by_lane([lane.grid.step for lane in lanes]),
     )
 
 
-def _known(lane: Lane, plant: Sequence[int], columns: int) -> Array:
-    """What follows in a step of the states, and of each input at its start and at its end."""
+def _known(lane: Lane, plant: Sequence[int], columns: int, rows: int) -> Array:
+    """What follows in a step of the states, and of each input at its start and at its end.
+
+    Transposed, and filled up with zeros: shape (columns / COLUMNS, COLUMNS, rows).
+    """
     # A disturbance drives the load forwards, friction holds it back: the same input, negative.
     signs = np.array([-1.0 if which == FRICTION else 1.0 for which in plant])
     at_start, at_end = (lane.g - lane.h)[:, list(plant)] * signs, lane.h[:, list(plant)] * signs
     held = lane.g[:, [DRIVE]] if lane.grid.per_control else np.zeros((len(lane.f), 0))
     known = np.hstack([lane.f, at_start, at_end, held])
-    padding = np.zeros((len(lane.f), columns - known.shape[1]))
-    return np.hstack([known, padding]).T
+    return _filled_up(known.T, (columns, rows)).reshape(-1, COLUMNS, rows)
 
 
-def _torque_columns(lane: Lane, which: int) -> Array:
+def _torque_columns(lane: Lane, which: int, rows: int) -> Array:
     """What follows of a torque line: per N m of its mean, and of its change over the step."""
-    return np.stack([lane.g[:, which], lane.h[:, which] - 0.5 * lane.g[:, which]])
+    columns = np.stack([lane.g[:, which], lane.h[:, which] - 0.5 * lane.g[:, which]])
+    return _filled_up(columns, (2, rows))
 
 
-def _elements(
-    interfaces: Sequence[Sequence[Interface]], lanes: Sequence[Lane], *, in_plant: bool
-) -> Elements:
-    """`interfaces`: of each lane, in one order."""
-    first, width = interfaces[0], len(lanes)
-    count, sampled = len(first), lanes[0].grid.per_control > 0
-    most = max((len(each.parameters) for each in first), default=0)
-    fixed = np.zeros((count, HAS + most, width))
-    states = max((each.state_size for each in first), default=0)
-    kept, met = np.zeros((count, KEEPS + states, width)), np.zeros((2, MEETS, width))
-    answer = np.zeros((ANSWERS, width))
-    for k, (lane, own) in enumerate(zip(lanes, interfaces, strict=True)):
-        step = _period(lane) if sampled and not in_plant else lane.grid.step
-        met[:, MEETS_STEP, k], met[:, MEETS_PER_STEP, k] = step, 1.0 / step
-        met[:, MEETS_RIPPLE, k] = 1.0
-        for e, each in enumerate(own):
-            fixed[e, :HAS, k] = (
-                each.rate,
-                each.torque,
-                1.0 / each.torque if each.torque else 0.0,
-                each.state_size > 0 or not in_plant,
-                ROOM_TEMPERATURE,
-                1.0,
-            )
-            fixed[e, HAS : HAS + len(each.parameters), k] = each.parameters
-    ripples = [np.reshape([each.ripple for each in own], (count, 3)) for own in interfaces]
-    return Elements(
-        address=np.array([each.address(width) for each in first], dtype=np.uintp),
-        fixed=fixed,
-        fixed_at=_addresses(fixed),
-        kept=kept,
-        kept_at=_addresses(kept),
-        met=met,
-        met_at=_addresses(met),
-        answer=answer,
-        answer_at=answer.ctypes.data,
-        viscous=_by_lane([[each.viscous for each in own] for own in interfaces]),
-        motor_side=np.array(
-            [each.motor_side and sampled and not in_plant for each in first], dtype=np.int64
-        ),
-        rippled=np.array([each.ripple[0] != 0.0 for each in first], dtype=np.int64),
-        ripple=_by_lane(ripples),
-    )
-
-
-def _addresses(rows: Array) -> NDArray[np.uintp]:
-    """Where each element's rows begin in memory, shape (elements,)."""
-    return rows.ctypes.data + np.arange(len(rows), dtype=np.uintp) * np.uintp(rows.strides[0])
+def _filled_up(array: Array, shape: tuple[int, int]) -> Array:
+    """With zeros behind what there is."""
+    return np.pad(array, [(0, most - have) for most, have in zip(shape, array.shape, strict=True)])
 
 
 def _sensors(bench: Bench) -> tuple[RateSensor, AngleSensor, AngleSensor, CurrentSensor]:
@@ -375,8 +322,9 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
     blocks = [_discrete_block(lane) for lane in lanes]
 
     def each(value: Callable[[Lane], Any]) -> Array:
-        return _by_lane([value(lane) for lane in lanes])
+        return by_lane([value(lane) for lane in lanes])
 
+    resolution = each(lambda lane: [sensor.resolution for sensor in _sensors(lane.bench)])
     return Controller(
         every=per_control,
         closes_rate_loop=first.task.mode == "rate",
@@ -395,11 +343,12 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
                 -2.0 * math.pi * lane.bench.controller.pointing_high_pass * _period(lane)
             )
         ),
-        resolution=each(lambda lane: [sensor.resolution for sensor in _sensors(lane.bench)]),
-        a=_by_lane([block[0] for block in blocks]),
-        b=_by_lane([block[1] for block in blocks]),
-        c=_by_lane([block[2] for block in blocks]),
-        d=_by_lane([block[3] for block in blocks]),
+        counts=np.any(resolution > 0.0, axis=-1).astype(np.int64),
+        resolution=resolution,
+        a=by_lane([block[0] for block in blocks]),
+        b=by_lane([block[1] for block in blocks]),
+        c=by_lane([block[2] for block in blocks]),
+        d=by_lane([block[3] for block in blocks]),
     )
 
 
@@ -424,18 +373,18 @@ def _discrete_block(lane: Lane) -> tuple[Array, Array, Array, Array]:
 
 def _memory(lanes: Sequence[Lane], controller: Controller) -> Memory:
     width, states = len(lanes), len(lanes[0].f)
-    x = np.zeros((states, width))
+    x = zeros(states, width)
     x[RATE if lanes[0].prescribed else RELATIVE_ANGLE] = [lane.task.start_angle for lane in lanes]
-    ended = np.zeros((2, width))
+    ended = zeros(2, width)
     for k, lane in enumerate(lanes):
         ended[:, k] = _torques_at_start(lane)
     return Memory(
         x=x,
-        kept=np.zeros((KEPT, width)),
-        linear=np.zeros((len(controller.c), width)),
-        readings=np.zeros((4, int(controller.delay.max()) + 1, width)),
-        outputs=np.zeros((controller.output_delay + 1, width)),
-        held=np.zeros((2, width)),
+        kept=zeros(KEPT, width),
+        linear=zeros(len(controller.c), width),
+        readings=zeros(4, int(controller.delay.max()) + 1, width),
+        outputs=zeros(controller.output_delay + 1, width),
+        held=zeros(2, width),
         ended=ended,
         counters=np.zeros(2, dtype=np.int64),
     )
@@ -446,26 +395,21 @@ def _torques_at_start(lane: Lane) -> tuple[float, float]:
 
     The load is at rest in space, with undeflected bristles, and the hull may be under way: what the
     models say of so short a time that nothing moves. NaN where a model of the plant has no state:
-    what it takes follows from what is applied.
+    what it takes follows from what is applied. Dry ones are recorded apart.
     """
-    hull = float(_signal(lane.task, BASE_RATE, np.zeros(1))[0])
-    rate = float(_signal(lane.task, DRIVE, np.zeros(1))[0]) if lane.prescribed else -hull
-    filtered = lane.loop.seen != RATE and not lane.prescribed
-    yields = not lane.prescribed and any(each.state_size == 0 for each in lane.friction)
+    rate, angle = _rate_at_start(lane), lane.task.start_angle
+    seen = 0.0 if lane.loop.seen != RATE and not lane.prescribed else rate
+    plant = [each for each in lane.friction if each.dry is None]
+    added = [each for each in lane.compensation if each.dry is None]
+    yields = not lane.prescribed and any(each.state_size == 0 for each in plant)
     return (
-        math.nan
-        if yields
-        else sum(_torque_at(each, rate, lane.task.start_angle) for each in lane.friction),
-        sum(
-            _torque_at(each, 0.0 if filtered else rate, lane.task.start_angle)
-            for each in lane.compensation
-        ),
+        math.nan if yields else sum(torque_at(each, rate, angle) for each in plant),
+        sum(torque_at(each, seen, angle) for each in added),
     )
 
 
-def _torque_at(interface: Interface, rate: float, angle: float) -> float:
-    amplitude, periods, phase = interface.ripple
-    motion = Motion.at(rate * interface.rate, rate * interface.rate, AN_INSTANT, position=angle)
-    state = np.zeros(interface.state_size)
-    mean, _ = single_step(interface.step, interface.parameters, state, motion)
-    return mean * interface.torque * (1.0 + amplitude * math.sin(periods * angle + phase))
+def _rate_at_start(lane: Lane) -> float:
+    """The relative rate (rad/s); what rounding leaves of a hull at rest is none."""
+    which, sign = (DRIVE, 1.0) if lane.prescribed else (BASE_RATE, -1.0)
+    rate = sign * float(_signal(lane.task, which, np.zeros(1))[0])
+    return rate if abs(rate) > AT_REST else 0.0

@@ -8,12 +8,15 @@ from campaign.physics.blocks import (
     Memory,
     elements_of,
     memory_of,
-    row_of,
-    rows_of,
-    tables_of,
 )
 from campaign.physics.compiled import compiled, inlined
-from campaign.physics.friction_lines import ask, halfway, keep_ends, on_a_line, record_torque
+from campaign.physics.friction_lines import (
+    ask,
+    end_of_line,
+    halfway,
+    on_a_line,
+    torque_as_it_begins,
+)
 from campaign.physics.rows import (
     MEETS_RATE_END,
     MEETS_RATE_START,
@@ -27,7 +30,7 @@ from campaign.physics.rows import (
     OUT_RELATIVE_RATE,
     RATE,
 )
-from campaign.physics.step_function import LANES
+from campaign.physics.vector import LANES, by_lanes, number_by_lanes
 
 
 @compiled
@@ -37,14 +40,13 @@ def drive_one(
 ) -> None:  # fmt: skip
     """`_drive` of one trial."""
     _drive(
-        1,
         elements_of(1, friction),
         elements_of(1, compensation),
         memory_of(1, memory),
-        rows_of(rate, 1),
-        row_of(step),
+        by_lanes(rate, 1),
+        number_by_lanes(step, 1),
         every,
-        tables_of(out, 1),
+        by_lanes(out, 1),
     )
 
 
@@ -55,61 +57,50 @@ def drive_block(
 ) -> None:  # fmt: skip
     """`_drive` of LANES trials at once."""
     _drive(
-        rate.shape[1],  # not LANES: see `engine.advance_block`
         elements_of(LANES, friction),
         elements_of(LANES, compensation),
         memory_of(LANES, memory),
-        rows_of(rate, LANES),
-        row_of(step),
+        by_lanes(rate, LANES),
+        number_by_lanes(step, LANES),
         every,
-        tables_of(out, LANES),
+        by_lanes(out, LANES),
     )
 
 
 @inlined
 def _drive(
-    lanes: int,
     friction: Elements,
     compensation: Elements,
     memory: Memory,
     rate: Array,
-    step: Array,
+    step: float,
     every: int,
     out: Array,
 ) -> None:
     """Move friction and compensation at a prescribed relative rate, without plant or motor.
 
-    rate: (steps + 1, lanes) rad/s at the step grid.   out: (8, steps / every, lanes), rows as
+    rate: (steps + 1,) rad/s at the step grid.   step: s.   out: (8, steps / every), rows as
     OUTPUTS; both rates are the prescribed one and there is no current.
     """
     angle = memory.x[RATE]  # there is no plant, and the angle has the first row for itself
-    met, added_to = friction.met[0], compensation.met[0]
     for now in range(rate.shape[0] - 1):
-        for k in range(lanes):
-            met[MEETS_RATE_START, k], met[MEETS_RATE_END, k] = rate[now, k], rate[now + 1, k]
-            added_to[MEETS_RATE_START, k] = rate[now, k]
-            added_to[MEETS_RATE_END, k] = rate[now + 1, k]
-        for meets in (met, added_to):
-            on_a_line(lanes, meets)
-            halfway(lanes, angle, meets)
-        ask(lanes, friction)
-        ask(lanes, compensation)
-        first = memory.counters[0] == 0
+        for met in (friction.met[0], compensation.met[0]):
+            met[MEETS_RATE_START], met[MEETS_RATE_END] = rate[now], rate[now + 1]
+            on_a_line(met)
+            halfway(angle, met)
+        ask(friction)
+        ask(compensation)
         if now % every == 0:
-            sample = now // every
-            for k in range(lanes):
-                out[OUT_GYRO, sample, k] = rate[now, k]
-                out[OUT_RELATIVE_RATE, sample, k] = rate[now, k]
-                out[OUT_LOAD_RATE, sample, k] = rate[now, k]
-                out[OUT_ANGLE, sample, k] = angle[k]
-                out[OUT_POINTING, sample, k] = angle[k]
-                out[OUT_CURRENT, sample, k] = 0.0
-            record_torque(lanes, friction, memory.ended[0], first, out[OUT_FRICTION], sample)
-            record_torque(
-                lanes, compensation, memory.ended[1], first, out[OUT_COMPENSATION], sample
-            )
+            first, place = memory.counters[0] == 0, now // every
+            out[OUT_GYRO, place] = rate[now]
+            out[OUT_RELATIVE_RATE, place] = rate[now]
+            out[OUT_LOAD_RATE, place] = rate[now]
+            out[OUT_ANGLE, place] = angle
+            out[OUT_POINTING, place] = angle
+            out[OUT_CURRENT, place] = 0.0
+            out[OUT_FRICTION, place] = torque_as_it_begins(friction, memory.ended[0], first)
+            out[OUT_COMPENSATION, place] = torque_as_it_begins(compensation, memory.ended[1], first)
         memory.counters[0] += 1
-        keep_ends(lanes, friction, memory.ended[0])
-        keep_ends(lanes, compensation, memory.ended[1])
-        for k in range(lanes):
-            angle[k] += 0.5 * step[k] * (rate[now, k] + rate[now + 1, k])
+        memory.ended[0], memory.ended[1] = end_of_line(friction), end_of_line(compensation)
+        angle = angle + 0.5 * step * (rate[now] + rate[now + 1])
+    memory.x[RATE] = angle

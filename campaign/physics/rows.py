@@ -87,3 +87,29 @@ ANSWERS = 3
     KEPT_TORQUE,
 ) = range(9)
 KEPT = 9
+
+# What dry friction keeps from step to step, and then what it does over one: see `dry_friction`.
+(
+    DRY_DIRECTION,
+    DRY_ENDED,
+    DRY_MEAN,
+    DRY_CHANGE,
+    DRY_START,
+    DRY_END,
+    DRY_BEFORE,
+    DRY_LEAVES,
+    DRY_BEGINS,
+    DRY_MOTION,
+    DRY_HOLDS_FORWARDS,
+    DRY_HOLDS_BACKWARDS,
+    DRY_STARTS_FORWARDS,
+    DRY_STARTS_BACKWARDS,
+    DRY_GAIN,
+) = range(15)
+DRY = 15
+LIMITS = 4
+"""Of one dry interface: its rows DRY_HOLDS_FORWARDS to DRY_STARTS_BACKWARDS."""
+
+# What a sliding torque is asked at.
+ASKED_DIRECTION, ASKED_SPEED = range(2)
+ASKED = 2

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import carray
+from typing import Any
 
-from campaign.physics.blocks import MOST_COLUMNS, Array, Controller, Elements, Memory
-from campaign.physics.compiled import called, inlined
+from campaign.physics.blocks import Array, Controller, Elements, Memory
+from campaign.physics.compiled import inlined
+from campaign.physics.elementary import nearest, where
 from campaign.physics.friction_lines import ask, on_a_line
 from campaign.physics.rows import (
     CHANGE,
@@ -31,130 +31,106 @@ from campaign.physics.rows import (
     RELATIVE_ANGLE,
     RESOLVER,
 )
-from campaign.physics.stack import stack_doubles
+from campaign.physics.vector import rows_on_the_stack
 
 
-@called
+@inlined
 def sample(
     lanes: int,
     controller: Controller,
     compensation: Elements,
     memory: Memory,
     x: Array,
-    signals: Array,
-    drive_row: int,
-    now: int,
+    command: float,
     noise: Array,
     reading: int,
 ) -> None:
     """One sample of the controller: read the sensors, put the current command that is next.
 
-    x: states of the plant.   drive_row, now: where the command stands in `signals`.
+    x: states of the plant.   command: rad/s, or N m where there is no rate loop.
     reading: of `noise`, counted from where it begins.
     """
     number = memory.counters[1]
     memory.counters[1] += 1
-    work = carray(stack_doubles(), (MOST_COLUMNS, lanes))
-    gyro, encoder, resolver, motor_torque, torque = work[0], work[1], work[2], work[3], work[4]
-    _read_sensors(lanes, controller, memory.readings, number, x, noise, reading)
-    _delayed(lanes, controller, memory, number, gyro, encoder, resolver, motor_torque)
-    _rates(lanes, controller, memory.kept, number, gyro, encoder, resolver, compensation)
-    _compensate(lanes, controller, compensation, memory, gyro, motor_torque, torque)
-    _command(lanes, controller, memory, number, signals, drive_row, now, gyro, torque)
+    ring = memory.readings.shape[1]
+    place = number % ring
+    _read_sensors(controller, memory.readings, place, x, noise, reading)
+    if number == 0:
+        _stand_still(memory.readings)
+    gyro = _reading(controller, memory.readings, GYRO, place)
+    encoder = _reading(controller, memory.readings, ENCODER, place)
+    resolver = _reading(controller, memory.readings, RESOLVER, place) / controller.ratio
+    current = _reading(controller, memory.readings, CURRENT_SENSOR, place)
+    memory.kept[KEPT_CURRENT] = current
+    _rates(controller, memory.kept, number == 0, gyro, encoder, resolver, compensation)
+    motor_torque = controller.torque_per_current * current
+    torque = _compensate(lanes, controller, compensation, memory, gyro, motor_torque)
+    memory.kept[KEPT_TORQUE] = torque
+    _command(controller, memory, number, command, gyro, torque)
 
 
 @inlined
 def _read_sensors(
-    lanes: int,
-    controller: Controller,
-    readings: Array,
-    number: int,
-    x: Array,
-    noise: Array,
-    reading: int,
+    controller: Controller, readings: Array, place: int, x: Array, noise: Array, reading: int
 ) -> None:
     """What the sensors read now: the truth, with noise, in whole counts; into their ring."""
-    place = number % readings.shape[1]
-    for k in range(lanes):
-        readings[GYRO, place, k] = x[RATE, k]
-        readings[ENCODER, place, k] = x[RELATIVE_ANGLE, k]
-        readings[RESOLVER, place, k] = x[RELATIVE_ANGLE, k] * controller.ratio[k]
-        readings[CURRENT_SENSOR, place, k] = x[CURRENT, k]
+    readings[GYRO, place] = x[RATE]
+    readings[ENCODER, place] = x[RELATIVE_ANGLE]
+    readings[RESOLVER, place] = x[RELATIVE_ANGLE] * controller.ratio
+    readings[CURRENT_SENSOR, place] = x[CURRENT]
     for s in range(4):
+        value, count = readings[s, place], controller.resolution[s]
         if controller.noisy[s] >= 0:
-            for k in range(lanes):
-                readings[s, place, k] += noise[reading, controller.noisy[s], k]
-        for k in range(lanes):
-            count, value = controller.resolution[s, k], readings[s, place, k]
-            counted = np.rint(value / (count if count > 0.0 else 1.0)) * count
-            readings[s, place, k] = counted if count > 0.0 else value
-        if number == 0:  # before the first sample everything stood still
-            for before in range(readings.shape[1]):
-                for k in range(lanes):
-                    readings[s, before, k] = readings[s, 0, k]
+            value = value + noise[reading, controller.noisy[s]]
+        if controller.counts[s] > 0:
+            counted = nearest(value / where(count > 0.0, count, 1.0)) * count
+            value = where(count > 0.0, counted, value)
+        readings[s, place] = value
 
 
 @inlined
-def _delayed(
-    lanes: int,
-    controller: Controller,
-    memory: Memory,
-    number: int,
-    gyro: Array,
-    encoder: Array,
-    resolver: Array,
-    motor_torque: Array,
-) -> None:
-    """What the controller has of it by now; the resolver's angle at the load."""
-    readings, ring = memory.readings, memory.readings.shape[1]
-    for k in range(lanes):
-        gyro[k] = readings[GYRO, (number - controller.delay[GYRO]) % ring, k]
-        encoder[k] = readings[ENCODER, (number - controller.delay[ENCODER]) % ring, k]
-        angle = readings[RESOLVER, (number - controller.delay[RESOLVER]) % ring, k]
-        resolver[k] = angle / controller.ratio[k]
-        current = readings[CURRENT_SENSOR, (number - controller.delay[CURRENT_SENSOR]) % ring, k]
-        memory.kept[KEPT_CURRENT, k] = current
-        motor_torque[k] = controller.torque_per_current[k] * current
+def _stand_still(readings: Array) -> None:
+    """Before the first sample everything stood as it does then."""
+    for s in range(4):
+        for before in range(1, readings.shape[1]):
+            readings[s, before] = readings[s, 0]
+
+
+@inlined
+def _reading(controller: Controller, readings: Array, sensor: int, place: int) -> Any:
+    """What the controller has of a sensor by now."""
+    delayed = place - controller.delay[sensor]
+    return readings[sensor, delayed if delayed >= 0 else delayed + readings.shape[1]]
 
 
 @inlined
 def _rates(
-    lanes: int,
     controller: Controller,
     kept: Array,
-    number: int,
-    gyro: Array,
-    encoder: Array,
-    resolver: Array,
+    first: bool,
+    gyro: float,
+    encoder: float,
+    resolver: float,
     compensation: Elements,
 ) -> None:
     """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates."""
     load, motor = compensation.met[0], compensation.met[1]
-    for k in range(lanes):
-        load[MEETS_RATE_START, k] = kept[KEPT_LOAD_RATE, k]
-        motor[MEETS_RATE_START, k] = kept[KEPT_MOTOR_RATE, k]
-    if number == 0:
-        for k in range(lanes):
-            kept[KEPT_ENCODER, k], kept[KEPT_RESOLVER, k] = encoder[k], resolver[k]
+    load[MEETS_RATE_START], motor[MEETS_RATE_START] = kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE]
+    if first:
+        kept[KEPT_ENCODER], kept[KEPT_RESOLVER] = encoder, resolver
     else:
-        for k in range(lanes):
-            pointing = kept[KEPT_POINTING, k] * controller.pointing_pole[k]
-            turned = 0.5 * controller.period[k] * (kept[KEPT_GYRO, k] + gyro[k])
-            kept[KEPT_POINTING, k] = pointing + turned
-    for k in range(lanes):
-        pole = controller.filter_pole[k]
-        share = (1.0 - pole) / controller.period[k]
-        turned = encoder[k] - kept[KEPT_ENCODER, k]
-        kept[KEPT_LOAD_RATE, k] = pole * kept[KEPT_LOAD_RATE, k] + share * turned
-        turned = resolver[k] - kept[KEPT_RESOLVER, k]
-        kept[KEPT_MOTOR_RATE, k] = pole * kept[KEPT_MOTOR_RATE, k] + share * turned
-        kept[KEPT_ENCODER, k], kept[KEPT_RESOLVER, k] = encoder[k], resolver[k]
-        kept[KEPT_GYRO, k] = gyro[k]
-        load[MEETS_RATE_END, k] = kept[KEPT_LOAD_RATE, k]
-        motor[MEETS_RATE_END, k] = kept[KEPT_MOTOR_RATE, k]
-        load[MEETS_POSITION, k], motor[MEETS_POSITION, k] = encoder[k], encoder[k]
-    on_a_line(lanes, load)
-    on_a_line(lanes, motor)
+        turned = 0.5 * controller.period * (kept[KEPT_GYRO] + gyro)
+        kept[KEPT_POINTING] = kept[KEPT_POINTING] * controller.pointing_pole + turned
+    pole = controller.filter_pole
+    share = (1.0 - pole) / controller.period
+    load_rate = pole * kept[KEPT_LOAD_RATE] + share * (encoder - kept[KEPT_ENCODER])
+    motor_rate = pole * kept[KEPT_MOTOR_RATE] + share * (resolver - kept[KEPT_RESOLVER])
+    kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE] = load_rate, motor_rate
+    kept[KEPT_ENCODER], kept[KEPT_RESOLVER], kept[KEPT_GYRO] = encoder, resolver, gyro
+    load[MEETS_RATE_END], motor[MEETS_RATE_END] = load_rate, motor_rate
+    load[MEETS_POSITION], motor[MEETS_POSITION] = encoder, encoder
+    on_a_line(load)
+    on_a_line(motor)
 
 
 @inlined
@@ -163,56 +139,43 @@ def _compensate(
     controller: Controller,
     compensation: Elements,
     memory: Memory,
-    gyro: Array,
-    motor_torque: Array,
-    torque: Array,
-) -> None:
+    gyro: float,
+    motor_torque: float,
+) -> float:
     """The torque of the compensation: its linear block, and its friction models now."""
-    kept, answer = memory.kept, compensation.answer
-    for k in range(lanes):
-        torque[k] = (
-            controller.d[0, k] * gyro[k]
-            + controller.d[1, k] * motor_torque[k]
-            + controller.d[2, k] * kept[KEPT_LOAD_RATE, k]
-        )
-    _linear(lanes, controller, memory.linear, gyro, motor_torque, kept[KEPT_LOAD_RATE], torque)
+    relative, d = memory.kept[KEPT_LOAD_RATE], controller.d
+    torque: float = d[0] * gyro + d[1] * motor_torque + d[2] * relative
+    torque = _linear(lanes, controller, memory.linear, gyro, motor_torque, relative, torque)
     if compensation.viscous.shape[0] > 0:
-        ask(lanes, compensation)
-        for k in range(lanes):
-            torque[k] += answer[MEAN, k] + 0.5 * answer[CHANGE, k]
+        ask(compensation)
+        torque = torque + (compensation.answer[MEAN] + 0.5 * compensation.answer[CHANGE])
         for e in range(compensation.viscous.shape[0]):
-            met = compensation.met[compensation.motor_side[e]]
-            for k in range(lanes):
-                torque[k] += compensation.viscous[e, k] * met[MEETS_RATE_END, k]
-    for k in range(lanes):
-        kept[KEPT_TORQUE, k] = torque[k]
+            rate = compensation.met[compensation.side[e], MEETS_RATE_END]
+            torque = torque + compensation.viscous[e] * rate
+    return torque
 
 
 @inlined
 def _command(
-    lanes: int,
     controller: Controller,
     memory: Memory,
     number: int,
-    signals: Array,
-    drive_row: int,
-    now: int,
-    gyro: Array,
-    torque: Array,
+    command: float,
+    gyro: float,
+    torque: float,
 ) -> None:
     """The current command of this sample, into its ring; the one that is next comes out of it."""
     kept, outputs = memory.kept, memory.outputs
-    delayed = outputs.shape[0]
-    for k in range(lanes):
-        command = signals[drive_row, now, k]
-        if controller.closes_rate_loop:
-            error = command - gyro[k]
-            kept[KEPT_INTEGRAL, k] += controller.integral[k] * controller.period[k] * error
-            current = controller.proportional[k] * error + kept[KEPT_INTEGRAL, k]
-        else:
-            current = command / controller.torque_per_current[k]
-        outputs[number % delayed, k] = current + torque[k] / controller.torque_per_current[k]
-        memory.held[0, k] = outputs[(number + 1) % delayed, k]
+    place = number % outputs.shape[0]
+    if controller.closes_rate_loop:
+        error = command - gyro
+        integral = kept[KEPT_INTEGRAL] + controller.integral * controller.period * error
+        kept[KEPT_INTEGRAL] = integral
+        current = controller.proportional * error + integral
+    else:
+        current = command / controller.torque_per_current
+    outputs[place] = current + torque / controller.torque_per_current
+    memory.held[0] = outputs[place + 1 if place + 1 < outputs.shape[0] else 0]
 
 
 @inlined
@@ -220,25 +183,19 @@ def _linear(
     lanes: int,
     controller: Controller,
     state: Array,
-    gyro: Array,
-    motor_torque: Array,
-    relative: Array,
-    torque: Array,
-) -> None:
-    """Advance the linear compensation over a sample and add its torque."""
-    order = state.shape[0]
-    new = carray(stack_doubles(), (MOST_COLUMNS, lanes))
+    gyro: float,
+    motor_torque: float,
+    relative: float,
+    torque: float,
+) -> float:
+    """Advance the linear compensation over a sample; `torque` and its torque together."""
+    order, b, new = state.shape[0], controller.b, rows_on_the_stack(lanes)
     for row in range(order):
-        for k in range(lanes):
-            torque[k] += controller.c[row, k] * state[row, k]
-            new[row, k] = (
-                controller.b[row, 0, k] * gyro[k]
-                + controller.b[row, 1, k] * motor_torque[k]
-                + controller.b[row, 2, k] * relative[k]
-            )
+        torque = torque + controller.c[row] * state[row]
+        total = b[row, 0] * gyro + b[row, 1] * motor_torque + b[row, 2] * relative
         for column in range(order):
-            for k in range(lanes):
-                new[row, k] += controller.a[row, column, k] * state[column, k]
+            total = total + controller.a[row, column] * state[column]
+        new[row] = total
     for row in range(order):
-        for k in range(lanes):
-            state[row, k] = new[row, k]
+        state[row] = new[row]
+    return torque

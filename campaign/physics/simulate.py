@@ -11,19 +11,22 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from campaign.physics.bench import Bench
+from campaign.physics.blocks import zeros
 from campaign.physics.engine import advance_block, advance_one
-from campaign.physics.grid import make_grid
+from campaign.physics.grid import Grid, make_grid
 from campaign.physics.lanes import Lane, Lanes, together
 from campaign.physics.loop import Array
 from campaign.physics.prescribed import drive_block, drive_one
 from campaign.physics.rows import OUTPUTS
-from campaign.physics.step_function import LANES
+from campaign.physics.vector import LANES
 from campaign.trial import Task
 
 __all__ = ["make_grid", "simulate", "simulate_together"]
 
 STRETCH_STEPS = 20_000
-"""Steps between two looks at limits and stops; of a block fewer, as it has many lanes."""
+"""Steps of a trial between two looks at limits and stops."""
+BLOCK_STEPS, BLOCK_SAMPLES = 16_000, 2_000
+"""The same of a block: of its samples no more than make the looks cheap."""
 
 
 def simulate(
@@ -34,25 +37,37 @@ def simulate(
         yield time, out
 
 
-def simulate_together(trials: Sequence[Lane]) -> Iterator[tuple[Array, tuple[Array, ...]]]:
+def simulate_together(
+    trials: Sequence[Lane], stretch: int | None = None
+) -> Iterator[tuple[Array, tuple[Array, ...]]]:
     """As `simulate`, of up to LANES trials of one structure: outputs of each, in their order.
 
-    It goes on until the longest ends; one that has ended has outputs of shape (8, 0).
+    It goes on until the longest ends; one that has ended has outputs of shape (8, 0). `stretch` is
+    how many samples come at a time, where the steps are not to decide that.
     """
     alone = len(trials) == 1
     lanes = together(trials, 1 if alone else LANES)
     grid = trials[0].grid
     longest = max(trial.grid.samples for trial in trials)
-    stretch = max(1, STRETCH_STEPS // (grid.every * (1 if alone else 4)))
+    if stretch is None:
+        stretch = samples_at_a_time(grid, alone=alone)
     for first in range(0, longest, stretch):
         count = min(stretch, longest - first)
         at: Array = (first * grid.every + np.arange(count * grid.every + 1.0)) * grid.step
-        out = np.empty((len(OUTPUTS), count, lanes.width))
+        out = zeros(len(OUTPUTS), count, lanes.width)
         _advance(lanes, trials[0].prescribed, alone, at, grid.every, out)
         # n / rate, not n steps: whoever knows the rate has the same times to the bit.
         time = (first + np.arange(count)) / trials[0].task.sample_rate
         left = (max(0, min(count, trial.grid.samples - first)) for trial in trials)
-        yield time, tuple(out[:, :n, k] for k, n in enumerate(left))
+        by_trial = np.ascontiguousarray(out.transpose(2, 0, 1))
+        yield time, tuple(by_trial[k, :, :n] for k, n in enumerate(left))
+
+
+def samples_at_a_time(grid: Grid, *, alone: bool) -> int:
+    """Samples between two looks, so that memory and the time between two of them are bounded."""
+    if alone:
+        return max(1, STRETCH_STEPS // grid.every)
+    return max(1, min(BLOCK_SAMPLES, BLOCK_STEPS // grid.every))
 
 
 def _advance(

@@ -10,23 +10,26 @@ It returns the mean torque over the step and its change over the step (N m): the
 plant as that straight line. The viscous part is not in it. It must not raise: native code cannot
 pass an exception on, and what is not a number ends the trial as diverged.
 
-The same function serves one trial and many. numba compiles it twice to native code with a fixed
-signature: for one lane, and for a block of LANES lanes, where the processor does several at once
-if the function has no branches but `a if condition else b` between numbers that are there already,
-and calls nothing but `campaign.physics.elementary`. Any other function works and is slower. The
-engine gets addresses, so one compiled engine serves every model, of this package or of another.
+The same function serves one trial and many. numba compiles it to native code with a fixed
+signature, in which its numbers are vectors (`campaign.physics.vector`): of a block's lanes, or, in
+a single trial, of the interfaces that have this model. For that a function has no branches but
+`elementary.where`, and calls nothing but `campaign.physics.elementary`. Any other function works
+and is slower. The engine gets addresses, so one compiled engine serves every model, of this package
+or of another.
 """
 
 from __future__ import annotations
 
 import ctypes
+import re
 import threading
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, types
+from numba import types
+from numba.core.errors import NumbaError
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
@@ -56,16 +59,12 @@ from campaign.physics.rows import (
     MEETS_RIPPLE,
     MEETS_STEP,
 )
+from campaign.physics.vector import add_up, rows_at
 
 Array = NDArray[np.float64]
 
-LANES = 16
-"""Trials of a block: fewer leave the processor's vectors empty, more its first-level cache."""
-
 ROOM_TEMPERATURE = 293.15
 """K; no bench tells another one yet."""
-MOST_ROWS = 1 << 16
-"""What the compiler may assume an array to have at most; nothing is as long."""
 
 
 class Motion(NamedTuple):
@@ -121,28 +120,44 @@ _DOUBLES = types.CPointer(types.float64)
 SIGNATURE = types.void(_DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 
 
-def address_of(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> int:
+def address_of(
+    step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
+) -> int:
     """Address of the step function as `compiled_step` compiles it; it stays valid."""
-    return int(compiled_step(step, lanes, parameters, states).address)
+    return int(compiled_step(step, lanes, members, parameters, states).address)
 
 
-def compiled_step(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> Any:
-    """The step function compiled for so many lanes, parameters and states, kept for the process.
+def compiled_step(
+    step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
+) -> Any:
+    """The step function compiled for so many lanes, interfaces, parameters and states.
 
-    `step` may be compiled already: then it is what it was compiled of.
+    It is kept for the process. `step` may be compiled already: then it is what it was compiled of.
     """
     with _COMPILING:
-        return _compiled_once(getattr(step, "py_func", step), lanes, parameters, states)
+        sizes = lanes, members, parameters, states
+        return _compiled_once(getattr(step, "py_func", step), *sizes)
 
 
 _COMPILING = threading.RLock()
 
 
 @cache
-def _compiled_once(step: Callable[..., Any], lanes: int, parameters: int, states: int) -> Any:
+def _compiled_once(
+    step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
+) -> Any:
     _known_to_numba(step)
-    by_lanes = _by_lanes(step, lanes, parameters, states)
-    return compiled_callback(SIGNATURE, by_lanes, step.__module__)
+    # What goes into a vector: the lanes of a block, or the interfaces of a single trial.
+    width = lanes if lanes > 1 else members
+    try:
+        by_vectors = _by_vectors(step, lanes, members, width, parameters, states)
+        return compiled_callback(SIGNATURE, by_vectors, step.__module__)
+    except NumbaError:
+        if width == 1:
+            raise
+    # There is something in it that a vector cannot do.
+    by_numbers = _by_vectors(step, lanes, members, 1, parameters, states)
+    return compiled_callback(SIGNATURE, by_numbers, step.__module__)
 
 
 @cache
@@ -168,66 +183,85 @@ def single_step(
         motion.position, 1.0, motion.step, motion.per_step,
     ])  # fmt: skip
     run = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(
-        address_of(step, 1, len(parameters), len(state))
+        address_of(step, 1, 1, len(parameters), len(state))
     )
     run(*(rows.ctypes.data for rows in (fixed, kept, met, answer)))
     state[:] = kept[KEEPS:]
     return float(answer[MEAN]), float(answer[CHANGE])
 
 
-def _by_lanes(step: Any, lanes: int, parameters: int, states: int) -> Callable[..., None]:
-    """The step function for so many lanes, of a model with so many parameters and states.
+def _by_vectors(
+    step: Any, lanes: int, members: int, width: int, parameters: int, states: int
+) -> Callable[..., None]:
+    """The step function for so many lanes of so many alike interfaces, in vectors of `width`.
 
-    Arrays are rows by lanes, lane last; `rows` names the rows. The number of lanes stands in the
-    code as a number, so that the compiler knows how far apart rows are; else it could not tell that
-    they do not overlap.
+    What belongs to an interface stands in arrays (rows, members, lanes), what they meet and answer
+    together in arrays (rows, lanes); `rows` names the rows.
     """
     own_end, state_end = HAS + parameters, KEEPS + states
+    vectors = members * lanes // width
+    shared_width = min(width, lanes)  # for a single trial, a number that all members meet
+    shared = lanes // shared_width
 
-    def by_lanes(fixed: Any, kept: Any, met: Any, answer: Any) -> None:
-        has, keeps = carray(fixed, (MOST_ROWS, lanes)), carray(kept, (MOST_ROWS, lanes))
-        meets, line = carray(met, (MOST_ROWS, lanes)), carray(answer, (MOST_ROWS, lanes))
-        for k in range(lanes):
-            motion = _motion(k, has, keeps, meets)
+    def by_vectors(fixed: Any, kept: Any, met: Any, answer: Any) -> None:
+        has, keeps = rows_at(fixed, width, vectors), rows_at(kept, width, vectors)
+        meets, line = rows_at(met, shared_width, shared), rows_at(answer, shared_width, shared)
+        for k in range(vectors):
+            motion = _motion(k, k % shared, has, keeps, meets)
             mean, change = step(has[HAS:own_end, k], keeps[KEEPS:state_end, k], motion)
-            _take(k, mean, change, has, keeps, meets, line)
+            _take(k, k % shared, mean, change, has, keeps, meets, line)
 
-    return by_lanes
+    by_vectors.__qualname__ = own_name(step, lanes, members, width, parameters, states)
+    return by_vectors
+
+
+def own_name(function: Any, *sizes: int) -> str:
+    """A name for what is compiled of a model's function: it has a file of its own by it.
+
+    Processes that add to one file of numba's cache at a time can exchange what is in it.
+    """
+    name = ".".join((function.__module__, function.__qualname__, *map(str, sizes)))
+    return re.sub(r"\W", "_", name)
 
 
 @inlined
-def _motion(k: int, has: Any, keeps: Any, meets: Any) -> Motion:
-    """What the interface in lane `k` meets, in its own units."""
-    rate, ripple = has[HAS_RATE, k], meets[MEETS_RIPPLE, k]
-    others, compliance = meets[MEETS_PUSH, k] + keeps[KEEPS_TORQUE, k], meets[MEETS_COMPLIANCE, k]
+def _motion(own: int, common: int, has: Any, keeps: Any, meets: Any) -> Motion:
+    """What interfaces meet, in their own units.
+
+    own: their place in the arrays of interfaces.   common: in the arrays that all share.
+    """
+    rate, ripple = has[HAS_RATE, own], meets[MEETS_RIPPLE, common]
+    compliance = meets[MEETS_COMPLIANCE, common]
+    others = meets[MEETS_PUSH, common] + keeps[KEEPS_TORQUE, own]
     return Motion(
-        meets[MEETS_RATE_START, k] * rate,
-        meets[MEETS_RATE_END, k] * rate,
-        meets[MEETS_RATE_MEAN, k] * rate,
-        where(compliance > 0.0, others * has[HAS_PER_TORQUE, k] / ripple, 0.0),
-        meets[MEETS_POSITION, k],
-        has[HAS_TEMPERATURE, k],
-        has[HAS_NORMAL_LOAD, k],
-        meets[MEETS_STEP, k],
-        meets[MEETS_PER_STEP, k],
-        compliance * has[HAS_TORQUE, k] * ripple * rate,
+        meets[MEETS_RATE_START, common] * rate,
+        meets[MEETS_RATE_END, common] * rate,
+        meets[MEETS_RATE_MEAN, common] * rate,
+        where(compliance > 0.0, others * has[HAS_PER_TORQUE, own] / ripple, 0.0),
+        meets[MEETS_POSITION, common],
+        has[HAS_TEMPERATURE, own],
+        has[HAS_NORMAL_LOAD, own],
+        meets[MEETS_STEP, common],
+        meets[MEETS_PER_STEP, common],
+        compliance * has[HAS_TORQUE, own] * ripple * rate,
     )
 
 
 @inlined
 def _take(
-    k: int, mean: float, change: float, has: Any, keeps: Any, meets: Any, answer: Any
+    own: int, common: int, mean: Any, change: Any, has: Any, keeps: Any, meets: Any, answer: Any
 ) -> None:
-    """Add the line of the interface in lane `k` to the answer, at the load."""
-    torque = has[HAS_TORQUE, k] * meets[MEETS_RIPPLE, k]
+    """Add the lines of interfaces to the answer, at the load."""
+    torque = has[HAS_TORQUE, own] * meets[MEETS_RIPPLE, common]
     own_mean, own_change = mean * torque, change * torque
     # A model without a state takes what the rate leaves it, and the next one does without.
-    held = has[HAS_STATE, k] * (own_mean + 0.5 * own_change)
-    meets[MEETS_PUSH, k] -= (1.0 - has[HAS_STATE, k]) * own_mean
-    keeps[KEEPS_TORQUE, k] = held
-    answer[MEAN, k] += own_mean
-    answer[CHANGE, k] += own_change
-    answer[HELD, k] += held
+    held = has[HAS_STATE, own] * (own_mean + 0.5 * own_change)
+    taken = (1.0 - has[HAS_STATE, own]) * own_mean
+    meets[MEETS_PUSH, common] = add_up(meets[MEETS_PUSH, common], -taken)
+    keeps[KEEPS_TORQUE, own] = held
+    answer[MEAN, common] = add_up(answer[MEAN, common], own_mean)
+    answer[CHANGE, common] = add_up(answer[CHANGE, common], own_change)
+    answer[HELD, common] = add_up(answer[HELD, common], held)
 
 
 @intrinsic

@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from campaign.physics.bench import Bench
-from tests.physics import dry_loop
-from tests.physics.benches import INERTIA, KPV, RATIO, Tree, bench, stribeck
+from campaign.signals import Signal, Sine, Zero
+from tests.physics.benches import INERTIA, KPV, RATIO, Tree, bench, run, stribeck, task
 from tests.physics.event_reference import (
     THESIS_DRY,
     Curve,
     Dry,
     DryLoop,
+    Function,
     simulate_events,
     still,
 )
 
-Function = Callable[[float], float]
+STILL = Zero()
 COMPARED = ("load_rate", "pointing_angle", "relative_angle", "motor_current", "friction_torque")
 
 
 @dataclass(frozen=True)
 class Case:
-    """One loop, twice. `drive` is the command of the mode; `mode` and `compensation` as a task's.
+    """One loop, twice. `command` is that of the mode; `mode` and `compensation` as a task's.
 
     Outputs are compared after `settle` (s): what the thesis evaluates is the steady oscillation.
     """
@@ -36,8 +36,9 @@ class Case:
     bench: Bench
     reference: DryLoop
     duration: float
-    mode: str = "rate"
-    drive: Function = still
+    base: Sine
+    mode: Any = "rate"
+    command: Signal = STILL
     compensation: str = "none"
     settle: float = 0.0
 
@@ -46,27 +47,31 @@ class Case:
         times = np.arange(round(self.duration * 1000)) * 1e-3
         return simulate_events(self.reference, times, max_step=2e-3)[0]
 
-    def found(self, step: float) -> dict[str, np.ndarray]:
-        """By the scheme, each millisecond, or each step where that is longer."""
-        return dry_loop.simulate(
-            self.bench,
-            self.duration,
-            step,
-            np.vectorize(self.reference.base_rate, otypes=[float]),
-            np.vectorize(self.drive, otypes=[float]),
-            self.mode,
-            self.compensation,
-            self.reference.spring or 0.0,
-        )[1]
+    def found(self, step: float | None) -> dict[str, np.ndarray]:
+        """By the engine, each millisecond, or each step where that is longer.
+
+        A step of None is the one that the engine chooses.
+        """
+        on = task(
+            mode=self.mode,
+            compensation=self.compensation,
+            duration=self.duration + 2e-3,
+            sample_rate=1.0 / max(step or 0.0, 1e-3),
+            command=self.command,
+            base_acceleration=self.base,
+            spring_stiffness=self.reference.spring or 0.0,
+        )
+        count = math.ceil(round(self.duration * 1000) * on.sample_rate / 1000 - 1e-9)
+        return {name: values[:count] for name, values in run(self.bench, on, step)[1].items()}
 
 
-def errors(case: Case, expected: dict[str, np.ndarray], step: float) -> dict[str, float]:
+def errors(case: Case, expected: dict[str, np.ndarray], step: float | None) -> dict[str, float]:
     """Error of each output, rms over rms; of the friction torque the median, as it jumps.
 
     `stabilization` is the relative error of the pointing angle's standard deviation.
     """
     found = case.found(step)
-    every = max(1, round(step * 1000))
+    every = max(1, round((step or 0.0) * 1000))
     first = round(case.settle * 1000) // every
     spread = float(np.std(expected["pointing_angle"][::every][first:]))
     result = {"stabilization": float(np.std(found["pointing_angle"][first:])) / spread - 1.0}
@@ -79,16 +84,23 @@ def errors(case: Case, expected: dict[str, np.ndarray], step: float) -> dict[str
     return result
 
 
-def swing(amplitude: float, frequency: float, phase: float = 0.0) -> dict[str, Function]:
-    """A base in steady sinusoidal motion."""
-    omega = 2 * math.pi * frequency
+def swing(sine: Sine) -> dict[str, Function]:
+    """A base in steady sinusoidal motion: its rate and acceleration."""
+    omega = 2 * math.pi * sine.frequency
     return {
-        "base_rate": lambda t: -amplitude / omega * math.cos(omega * t + phase),
-        "base_acceleration": lambda t: amplitude * math.sin(omega * t + phase),
+        "base_rate": lambda t: -sine.amplitude / omega * math.cos(omega * t + sine.phase),
+        "base_acceleration": function(sine),
     }
 
 
-def thesis(compensation: str = "none", bristles: bool = False, periods: float = 3.0) -> Case:
+def function(sine: Sine) -> Function:
+    """A sine over time."""
+    return lambda t: sine.amplitude * math.sin(2 * math.pi * sine.frequency * t + sine.phase)
+
+
+def thesis(
+    compensation: str = "none", bristles: bool = False, periods: float = 3.0, low_pass: float = 0.0
+) -> Case:
     """The appendix' loop on a base at 0.24 Hz and 18 deg/s^2, with Equation 4.6 as friction.
 
     With `bristles` the plant has the appendix' LuGre friction and only the compensation is dry.
@@ -100,17 +112,23 @@ def thesis(compensation: str = "none", bristles: bool = False, periods: float = 
                 "load": stribeck(32.0, 26.0, 4.0),
                 "motor": stribeck(0.04, 0.03, 0.001, side="motor"),
             }
+        tree["controller"]["relative_rate_filter"] = f"{low_pass!r} s"
 
+    base = Sine(amplitude=math.radians(18.0), frequency=0.24)
     reference = DryLoop(
         compensation=THESIS_DRY if compensation == "static" else (),
         bristle_compensation=compensation == "lugre",
+        observer=2000.0 * RATIO if compensation == "observer" else 0.0,
+        low_pass=low_pass,
         bristles=bristles,
-        **swing(math.radians(18.0), 0.24),  # type: ignore[arg-type]
+        **swing(base),  # type: ignore[arg-type]
     )
     name = f"{'LuGre' if bristles else 'dry'} plant, compensation {compensation}"
+    name += f" behind {low_pass * 1e3:g} ms" if low_pass else ""
     return Case(
-        name, bench(dry), reference, periods / 0.24, compensation=compensation, settle=1.0 / 0.24
-    )
+        name, bench(dry), reference, periods / 0.24, base,
+        compensation=compensation, settle=1.0 / 0.24,
+    )  # fmt: skip
 
 
 def drawn(seed: int, duration: float = 4.0) -> Case:
@@ -124,12 +142,11 @@ def drawn(seed: int, duration: float = 4.0) -> Case:
     friction = tuple(
         Dry(*(_curve(random, total / interfaces) for _ in range(2))) for _ in range(interfaces)
     )
-    base = swing(uniform(0.1, 0.6), uniform(0.2, 1.0), uniform(0.0, 6.0))
-    omega, phase = 2 * math.pi * uniform(0.2, 1.0), uniform(0.0, 6.0)
+    base = Sine(amplitude=uniform(0.1, 0.6), frequency=uniform(0.2, 1.0), phase=uniform(0.0, 6.0))
+    frequency, phase = uniform(0.2, 1.0), uniform(0.0, 6.0)
     amplitude = {"rate": 0.05, "torque": 1.8 * total, "spring": 0.3}[mode]
-
-    def drive(t: float) -> float:
-        return amplitude * math.sin(omega * t + phase)
+    command = Sine(amplitude=amplitude, frequency=frequency, phase=phase)
+    drive = function(command)
 
     def edit(tree: Tree) -> None:
         tree["friction"] = {
@@ -148,10 +165,10 @@ def drawn(seed: int, duration: float = 4.0) -> Case:
         inertia=inertia,
         proportional=proportional,
         integral=integral,
-        **base,  # type: ignore[arg-type]
+        **swing(base),  # type: ignore[arg-type]
     )
     name = f"drawn {seed}, {mode}, {interfaces} interface(s)"
-    return Case(name, bench(edit), reference, duration, mode, drive)
+    return Case(name, bench(edit), reference, duration, base, mode, command)
 
 
 def steep_rise() -> Case:
@@ -160,8 +177,8 @@ def steep_rise() -> Case:
     curve = Curve(coulomb=20.0, static=10.0, velocity=0.002)
     friction = (Dry(curve, curve),)
 
-    def drive(t: float) -> float:
-        return 0.01 * math.sin(3.0 * t)
+    base = Sine(amplitude=0.3, frequency=0.5)
+    command = Sine(amplitude=0.01, frequency=3.0 / (2 * math.pi))
 
     def edit(tree: Tree) -> None:
         tree["friction"] = {"interface": _interface(friction[0], on_motor=False)}
@@ -170,12 +187,12 @@ def steep_rise() -> Case:
 
     reference = DryLoop(
         friction=friction,
-        command=drive,
+        command=function(command),
         inertia=inertia,
         proportional=proportional,
-        **swing(0.3, 0.5),  # type: ignore[arg-type]
+        **swing(base),  # type: ignore[arg-type]
     )
-    return Case("steep rise", bench(edit), reference, 3.0, drive=drive)
+    return Case("steep rise", bench(edit), reference, 3.0, base, command=command)
 
 
 def _curve(random: np.random.Generator, torque: float) -> Curve:

@@ -1,4 +1,4 @@
-"""A loop with dry friction, switched at its events: the reference that `dry.py` is held against.
+"""A loop with dry friction, switched at its events: the reference that the engine is held against.
 
 Nothing of `campaign.physics` is used: the thesis' equations as in `tests.physics.reference`, with
 friction that is a set at rest. Between events the right-hand side is smooth and scipy's order-8
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -25,7 +25,9 @@ from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, LOAD
 from tests.physics.reference import lugre
 
 NAMES = ("load_rate", "pointing_angle", "relative_angle", "motor_current")
-SCALE = np.array([1e-3, 1e-4, 1e-2, 1.0, 1e-2, 1e-2, 1e-3, 1e-5, 1e-3, 1e-5])
+SCALE = np.array([1e-3, 1e-4, 1e-2, 1.0, 1e-2, 1e-2, 1e-3, 1e-5, 1e-3, 1e-5, 1e-3, 1e-3])
+STATES = len(SCALE)
+Function = Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ class DryLoop:
         friction: dry interfaces; none with `bristles`, whose plant friction is LuGre's.
         compensation: interfaces of a static feedforward, Equation 4.6 with sgn(0) = 0.
         bristle_compensation: LuGre feedforward with the appendix' parameters.
+        observer: N K0 (N m s/rad) of a disturbance observer that knows J.
+        low_pass: s, of the rate that LuGre compensation sees.
         spring: stiffness (N m/rad); the load without its motor, `command` is the far end's angle.
     """
 
@@ -87,15 +91,17 @@ class DryLoop:
     compensation: tuple[Dry, ...] = ()
     bristles: bool = False
     bristle_compensation: bool = False
-    command: Callable[[float], float] = still
-    torque: Callable[[float], float] | None = None
+    command: Function = still
+    torque: Function | None = None
+    observer: float = 0.0
+    low_pass: float = 0.0
     spring: float | None = None
-    base_rate: Callable[[float], float] = still
-    base_acceleration: Callable[[float], float] = still
+    base_rate: Function = still
+    base_acceleration: Function = still
     inertia: float = INERTIA
     proportional: float = KPV  # A s/deg
     integral: float = KIV
-    initial: tuple[float, ...] = field(default=(0.0,) * 10)
+    initial: tuple[float, ...] = field(default=(0.0,) * STATES)
 
     def sliding(self, interfaces: tuple[Dry, ...], direction: int, v: float) -> float:
         """Sum of sliding torques (N m) in `direction`, zero for direction 0."""
@@ -119,8 +125,9 @@ class DryLoop:
         return self.sliding(self.friction, direction, y[0] - self.base_rate(t))
 
     def rates(self, t: float, y: np.ndarray, direction: int) -> list[float]:
-        """State: w, its integral, relative angle, i, both PI integrals, bristles."""
-        w, _, _, i, current_sum, rate_sum, zl, zm, zlc, zmc = y
+        """State: w, its integral, relative angle, i, both PI integrals, bristles of plant and
+        compensation, w', filtered rate."""
+        w, _, _, i, current_sum, rate_sum, zl, zm, zlc, zmc, observed, filtered = y
         v = w - self.base_rate(t)
         dw = (self.driving(t, y) - self.friction_torque(t, y, direction)) / self.inertia
         if direction == 0 and not self.bristles:
@@ -128,10 +135,15 @@ class DryLoop:
         added, dzl, dzm, dzlc, dzmc = self.sliding(self.compensation, direction, v), *(0.0,) * 4
         if self.bristles:
             _, dzl, dzm = bristles(v, zl, zm)
+        seen = filtered if self.low_pass else v
+        df = (v - filtered) / self.low_pass if self.low_pass else 0.0
         if self.bristle_compensation:
-            added, dzlc, dzmc = bristles(v, zlc, zmc)
+            added, dzlc, dzmc = bristles(seen, zlc, zmc)
         if self.spring is not None:
-            return [dw, w, v, 0.0, 0.0, 0.0, dzl, dzm, 0.0, 0.0]
+            return [dw, w, v, 0.0, 0.0, 0.0, dzl, dzm, 0.0, 0.0, 0.0, 0.0]
+        pulled = self.observer * (w - observed)
+        added -= pulled
+        dob = (RATIO * KT * i + pulled) / self.inertia
         error = (self.command(t) - w) * DEG
         wanted = self.proportional * (error + self.integral * rate_sum)
         if self.torque is not None:
@@ -139,7 +151,7 @@ class DryLoop:
         current_error = wanted + added / (RATIO * KT) - i
         voltage = KPC * current_error + KIC * current_sum
         di = (voltage - R * i - KE * RATIO * v) / L
-        return [dw, w, v, di, current_error, error, dzl, dzm, dzlc, dzmc]
+        return [dw, w, v, di, current_error, error, dzl, dzm, dzlc, dzmc, dob, df]
 
     def regime(self, t: float, y: np.ndarray) -> int:
         """Direction of what follows a relative rate of zero; 0 is stuck."""
@@ -153,10 +165,44 @@ def simulate_events(
     loop: DryLoop, times: np.ndarray, rtol: float = 1e-10, max_step: float = 5e-3
 ) -> tuple[dict[str, np.ndarray], list[tuple[float, int]]]:
     """States by name and `friction_torque` over `times`; instants and directions of the regimes."""
-    t, end = float(times[0]), float(times[-1])
+    found, history, _ = _simulate(loop, times, *at_start(loop, float(times[0])), rtol, max_step)
+    return found, history
+
+
+def simulate_sampled(loop: DryLoop, samples: int, period: float = 1e-3) -> dict[str, np.ndarray]:
+    """As `simulate_events`, of a rate controller that reads ideal sensors and holds its output.
+
+    Each period (s) is solved for itself; the integral is summed backwards. Values at the samples.
+    """
+    y, direction = at_start(loop, 0.0)
+    gain, integral = loop.proportional * DEG, 0.0
+    found = []
+    for n in range(samples):
+        t = n * period
+        error = loop.command(t) - y[0]
+        integral += gain * loop.integral * period * error
+        torque = RATIO * KT * (gain * error + integral)
+        held = replace(loop, torque=lambda _, torque=torque: torque)
+        times = np.array([t, t + period])
+        # Stuck, the new command is what decides.
+        direction = direction or held.regime(t, y)
+        out, history, y = _simulate(held, times, y, direction, 1e-10, period)
+        direction = history[-1][1]
+        found.append([values[0] for values in out.values()])
+    return dict(zip((*NAMES, "friction_torque"), np.transpose(found), strict=True))
+
+
+def at_start(loop: DryLoop, t: float) -> tuple[np.ndarray, int]:
+    """State and direction of sliding."""
     y = np.array(loop.initial)
     v = y[0] - loop.base_rate(t)
-    direction = int(np.sign(v)) if abs(v) > 1e-14 else (1 if loop.bristles else loop.regime(t, y))
+    return y, int(np.sign(v)) if abs(v) > 1e-14 else (1 if loop.bristles else loop.regime(t, y))
+
+
+def _simulate(
+    loop: DryLoop, times: np.ndarray, y: np.ndarray, direction: int, rtol: float, max_step: float
+) -> tuple[dict[str, np.ndarray], list[tuple[float, int]], np.ndarray]:
+    t, end = float(times[0]), float(times[-1])
     history = [(t, direction)]
     found = np.empty((len(NAMES) + 1, len(times)))
     done = 0
@@ -179,6 +225,7 @@ def simulate_events(
             ]
             done += len(here)
         if part.status != 1:
+            y = part.y[:, -1]
             break
         y = part.y[:, -1].copy()
         which = next(k for k, hits in enumerate(part.t_events) if len(hits))
@@ -190,7 +237,7 @@ def simulate_events(
             y[0] = loop.base_rate(t)
             direction = loop.regime(t, y)
         history.append((t, direction))
-    return dict(zip((*NAMES, "friction_torque"), found, strict=True)), history
+    return dict(zip((*NAMES, "friction_torque"), found, strict=True)), history, y
 
 
 def _events(loop: DryLoop, direction: int) -> list[Callable[..., float]]:

@@ -45,7 +45,7 @@ from campaign.physics.friction import friction_models
 from campaign.physics.step_function import Motion, compiled_step, single_step
 step = friction_models()["grease"].step
 torque, change = single_step(step, np.array([3.0]), np.zeros(0), Motion.at(1.0, 1.0, step=1e-3))
-print(json.dumps([torque, compiled_step(step, 1, 1, 0).cache_hits]))
+print(json.dumps([torque, compiled_step(step, 1, 1, 1, 0).cache_hits]))
 """
 """The torque of grease that yields at 3 N m, sliding at 1 rad/s, and whether it was kept."""
 

@@ -34,8 +34,9 @@ def test_sticks_below_and_breaks_away_at_the_static_torque() -> None:
     # Sticking: the friction is the drive torque itself, and nothing creeps.
     stuck = slice(0, moving)
     assert np.max(np.abs(out["load_rate"][stuck])) < 1e-15
-    assert np.max(np.abs(out["relative_angle"][stuck] - START)) < 1e-8
-    np.testing.assert_allclose(out["friction_torque"][stuck], drive[stuck], atol=5e-3)
+    assert np.max(np.abs(out["relative_angle"][stuck] - START)) < 1e-15
+    later = slice(5, moving)  # when the current has settled: in a step, torque is a line
+    np.testing.assert_allclose(out["friction_torque"][later], drive[later], atol=2e-6)
 
 
 def test_slides_with_equation_4_6() -> None:
@@ -48,10 +49,8 @@ def test_slides_with_equation_4_6() -> None:
     balance = out["motor_current"] * RATIO * KT - INERTIA * acceleration - curve
     assert sliding.sum() > 500
     assert np.max(np.abs(balance[2:-2][sliding])) < 0.02
-    # The model reads the curve at the rate that its step would reach without it: half of
-    # T h / J = 1.3e-4 rad/s off, which on the steepest part of the curve are 0.022 N m.
     recorded = out["friction_torque"][2:-2][sliding] - curve[2:-2][sliding]
-    assert np.max(np.abs(recorded)) < 0.025
+    assert np.max(np.abs(recorded)) < 1e-6
 
 
 def test_two_interfaces_in_parallel_are_their_sum() -> None:
@@ -63,7 +62,7 @@ def test_two_interfaces_in_parallel_are_their_sum() -> None:
         stribeck(0.1, 0.075, 2.0 / RATIO, side="motor"),
     )
     for name in ("load_rate", "friction_torque"):
-        np.testing.assert_allclose(two[name], one[name], atol=1e-3 * np.max(np.abs(one[name])))
+        np.testing.assert_allclose(two[name], one[name], atol=1e-9 * np.max(np.abs(one[name])))
 
 
 @pytest.mark.parametrize("step", [1e-3, 0.25e-3])

@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from campaign.signals import Polyline, Sine
-from tests.physics.benches import INERTIA, KT, LOAD, RATIO, Tree, bench, run, task
+from tests.physics.benches import INERTIA, KT, LOAD, RATIO, Tree, bench, run, stribeck, task
 
 DURATION = 2.0
 RAMPS = Polyline(times=(0.0, 1.0, 2.0), values=(0.0, 60.0, -60.0))
@@ -56,6 +56,52 @@ def test_the_load_gains_what_motor_and_friction_do(trial: str) -> None:
 def test_what_the_load_gains_is_of_second_order(trial: str) -> None:
     coarse, fine = left_over(TRIALS[trial], 0.25e-3), left_over(TRIALS[trial], 0.125e-3)
     assert order(coarse, fine) == pytest.approx(2.0, abs=0.1)
+
+
+def _dry(tree: Tree) -> None:
+    tree["friction"] = {
+        "load": stribeck(32.0, 26.0, 4.0),
+        "motor": stribeck(0.04, 0.03, 0.001, side="motor"),
+    }
+
+
+DRY_TRIALS: dict[str, dict[str, Any]] = {
+    "hull from rest": TRIALS["hull from rest"],
+    "torque through breakaway": TRIALS["torque through breakaway"],
+    "stick-slip": {
+        "mode": "spring",
+        "command": Polyline(times=(0.0, 2.0), values=(0.0, 0.2)),
+        "spring_stiffness": 900.0,
+    },
+}
+
+
+def left_over_by_dry_friction(fields: dict[str, Any], step: float) -> float:
+    """Largest gap between the load's energy and the work on it, of what friction takes.
+
+    All as the hull sees it: J v^2 / 2 grows by the work of what drives the load, of the inertial
+    torque and of friction. Friction jumps only where the rate is zero, so its power does not.
+    """
+    at, found = run(bench(_dry), task(duration=DURATION, sample_rate=1.0 / step, **fields), step)
+    rate, drive = found["relative_rate"], RATIO * KT * found["motor_current"]
+    if fields["mode"] == "spring":
+        far = np.interp(at, fields["command"].times, fields["command"].values)
+        drive = fields["spring_stiffness"] * (far - found["relative_angle"])
+    base = fields.get("base_acceleration")
+    shaken = INERTIA * (0.0 if base is None else base.sample(at))
+    work = cumulative_trapezoid((drive - shaken - found["friction_torque"]) * rate, at, initial=0.0)
+    kinetic = 0.5 * INERTIA * rate**2
+    gap = np.max(np.abs(kinetic - kinetic[0] - work))
+    return float(gap / np.trapezoid(np.abs(found["friction_torque"] * rate), at))
+
+
+@pytest.mark.parametrize("trial", DRY_TRIALS)
+def test_dry_friction_takes_what_the_load_does_not_gain(trial: str) -> None:
+    coarse, middle, fine = (
+        left_over_by_dry_friction(DRY_TRIALS[trial], step) for step in (1e-3, 0.25e-3, 0.0625e-3)
+    )
+    assert middle < 1e-6
+    assert coarse > 100 * fine  # 256 times, if events fell alike in their steps
 
 
 def _undamped(tree: Tree) -> None:

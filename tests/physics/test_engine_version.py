@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.backends.sim import BACKEND, SimOptions
+from campaign.experiments.friction_models import with_model
 from campaign.physics.engine_version import ENGINE
 from campaign.protocol.bench_file import load_bench
 from campaign.signals import Polyline, Sine
@@ -25,11 +26,16 @@ TRIALS = {
     "simulink, none": ("simulink", "rate", "none", {"base_acceleration": SEA}),
     "simulink, lugre": ("simulink", "rate", "lugre", {"base_acceleration": SEA}),
     "simulink, observer": ("simulink", "rate", "observer", {"command": TURN}),
+    "simulink, static": ("simulink", "rate", "static", {"base_acceleration": SEA}),
+    "simulink, dry, none": ("simulink", "rate", "none", {"base_acceleration": SEA}),
+    "simulink, dry, lugre": ("simulink", "rate", "lugre", {"command": TURN}),
+    "simulink, dry, static": ("simulink", "rate", "static", {"base_acceleration": SEA}),
     "simulink, pushed": ("simulink", "torque", "none", {"command": PUSH}),
     "simulink, prescribed": ("simulink", "prescribed", "none", {"command": TURN}),
     "platform, none": ("platform", "rate", "none", {"base_acceleration": SEA}),
     "platform, static": ("platform", "rate", "static", {"command": TURN}),
     "platform, lugre": ("platform", "rate", "lugre", {"command": TURN}),
+    "platform, dry, none": ("platform", "rate", "none", {"command": TURN}),
     "platform, pushed": ("platform", "torque", "none", {"command": PUSH}),
 }  # fmt: skip
 
@@ -37,11 +43,12 @@ TRIALS = {
 def trajectory(name: str) -> dict[str, list[float]]:
     """Some samples of each channel, rounded."""
     bench, mode, compensation, signals = TRIALS[name]
+    on = load_bench(bench)
     task = Task(
         mode=mode, compensation=compensation, duration=0.4, window=(0.0, 0.4), sample_rate=1000.0,
         **signals,
     )  # fmt: skip
-    tree = load_bench(bench).model_dump(mode="json")
+    tree = with_model(on, "stribeck") if ", dry" in name else on.model_dump(mode="json")
     trial = Trial(number=1, test="t", kind="k", seed=7, bench=tree, task=task)
     recorder = MemoryRecorder()
     with BACKEND.open(SimOptions()) as backend:

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from tests.physics.benches import INERTIA, RATIO
-from tests.physics.event_reference import THESIS_DRY, Curve, Dry, DryLoop, simulate_events
+from tests.physics.event_reference import (
+    STATES,
+    THESIS_DRY,
+    Curve,
+    Dry,
+    DryLoop,
+    simulate_events,
+)
 from tests.physics.reference import trajectory
 
 AMPLITUDE, OMEGA = math.radians(18.0), 2 * math.pi * 0.24
@@ -27,7 +34,7 @@ def test_a_coasting_load_is_stopped_by_coulomb_and_viscous_friction() -> None:
     loop = DryLoop(
         friction=(Dry(Curve(coulomb, coulomb, viscous=viscous)),),
         spring=0.0,
-        initial=(rate, *(0.0,) * 9),
+        initial=(rate, *(0.0,) * (STATES - 1)),
     )
     out, history = simulate_events(loop, np.linspace(0.0, 2.0, 201))
     log = math.log(1.0 + viscous * rate / coulomb)
@@ -43,7 +50,7 @@ def test_an_oscillator_loses_the_same_amplitude_each_half_cycle() -> None:
     loop = DryLoop(
         friction=(Dry(Curve(26.0, 26.0)),),
         spring=STIFFNESS,
-        initial=(0.0, 0.0, 5.3 * reach, *(0.0,) * 7),
+        initial=(0.0, 0.0, 5.3 * reach, *(0.0,) * (STATES - 3)),
     )
     half = math.pi / NATURAL
     out, history = simulate_events(loop, np.array([0.0, half, 2 * half, 3.5 * half, 5 * half]))

@@ -11,7 +11,7 @@ import pytest
 from campaign.physics.lanes import Lane
 from campaign.physics.rows import OUTPUTS
 from campaign.physics.simulate import simulate, simulate_together
-from campaign.physics.step_function import LANES
+from campaign.physics.vector import LANES
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task
 from tests.physics.benches import Tree, bench, stribeck, task
@@ -39,6 +39,19 @@ def dry(tree: Tree) -> None:
     tree["friction"] = {"load": stribeck(32.0, 26.0, 4.0)}
 
 
+def dry_and_rippled(tree: Tree) -> None:
+    dry(tree)
+    tree["friction"]["load"]["ripple"] = {"amplitude": 0.2, "periods": 67, "phase": "0.3 rad"}
+    tree["friction"]["load"]["stribeck_exponent"] = 1.3
+    tree["controller"]["relative_rate_filter"] = "2 ms"
+
+
+def dry_and_bristles(tree: Tree) -> None:
+    motor = tree["friction"]["motor"]
+    dry(tree)
+    tree["friction"]["motor"] = motor
+
+
 def elastic(tree: Tree) -> None:
     tree["appendage"] = {"inertia": "3 kg m^2", "frequency": "12 Hz", "damping_ratio": 0.02}
 
@@ -60,6 +73,12 @@ CASES: dict[str, tuple[Callable[[Tree], object] | None, dict[str, object]]] = {
     "rippled": (rippled, SWING),
     "another exponent": (another_exponent, SWING),
     "dry": (dry, SWING),
+    "dry, static": (dry, {**SWING, "compensation": "static"}),
+    "dry, rippled, lugre, filtered": (dry_and_rippled, {**SWING, "compensation": "lugre"}),
+    "dry, rippled, static, filtered": (dry_and_rippled, {**SWING, "compensation": "static"}),
+    "dry and bristles": (dry_and_bristles, SWING),
+    "dry, sampled": (lambda tree: (dry(tree), sampled(tree)), SWING),
+    "dry, spring": (dry, {"mode": "spring", "command": PUSH, "spring_stiffness": 900.0}),
     "elastic": (elastic, SWING),
     "sampled": (sampled, {**SWING, "command": TURN}),
     "sampled, lugre": (sampled, {**SWING, "compensation": "lugre"}),
@@ -111,14 +130,15 @@ def test_alone_is_what_simulate_gives() -> None:
     assert np.hstack([out for _, out in blocks]).tobytes() == outputs([lane])[0].tobytes()
 
 
-def test_a_trial_that_diverges_changes_no_neighbour() -> None:
+@pytest.mark.parametrize("case", ["sampled", "dry, sampled"])
+def test_a_trial_that_diverges_changes_no_neighbour(case: str) -> None:
     """It goes on as numbers that are none, in its own lane."""
 
     def unstable(tree: Tree) -> None:
-        sampled(tree)
+        CASES[case][0](tree)  # type: ignore[misc]
         tree["controller"]["rate"]["proportional"] = "3e9 A s/rad"
 
-    lanes = trials("sampled", 4)
+    lanes = trials(case, 4)
     wild = Lane.of(bench(unstable), lanes[0].task, seed=1, longest_step=STEP)
     before = outputs(lanes)
     with np.errstate(all="ignore"):
@@ -155,6 +175,7 @@ def test_only_trials_of_one_structure_go_together() -> None:
         ("none", "elastic"),
         ("none", "sampled"),
         ("lugre", "static"),
+        ("none", "dry"),
     ],
 )
 def test_what_takes_other_code_is_another_structure(one: str, other: str) -> None:

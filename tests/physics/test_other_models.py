@@ -3,11 +3,13 @@
 A Maxwell-slip model of ten elements (the sticking part of the generalised Maxwell-slip model:
 Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883) has a state whose
 size follows from its options. Karnopp's model (J. Dyn. Sys., Meas., Control 107 (1985) 100) has
-none, and holds what is applied.
+none, and holds what is applied; or it is declared as a set at rest, and needs no band of rates.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +17,7 @@ import pytest
 from pydantic import Field
 
 from campaign.physics.elementary import where
-from campaign.physics.friction.interface import FrictionModel, FrictionOptions
+from campaign.physics.friction.interface import DryFriction, FrictionModel, FrictionOptions
 from campaign.physics.lanes import Lane
 from campaign.physics.rows import OUTPUTS
 from campaign.physics.simulate import simulate_together
@@ -198,6 +200,44 @@ def test_karnopp_holds_up_to_its_static_torque_and_slides_then() -> None:
     sliding = time > time[stuck][-1] + 0.02
     assert torque[sliding] == pytest.approx(25.0, rel=1e-12)
     assert angle[-1] > 0.01
+
+
+def _karnopp_sliding(parameters: Any, direction: float, speed: float) -> float:
+    return parameters[1]
+
+
+KARNOPP_SET = replace(
+    KARNOPP,
+    dry=DryFriction(
+        sliding=_karnopp_sliding, static_torque=lambda options, direction: options.static_torque
+    ),
+)
+
+
+def test_a_set_at_rest_breaks_away_inside_a_step_and_falls_to_its_sliding_torque() -> None:
+    """Pulled at V through a spring: it holds until k V t = Ts, and then, with tau from there on,
+
+    q = V tau + (Ts - Tc) / k (1 - cos(omega tau)) - V / omega sin(omega tau).
+    """
+    stiffness, speed, inertia = 4000.0, 0.0203, 35.0
+    pull = Polyline(times=(0.0, 1.0), values=(0.0, speed))
+    fields = {"mode": "spring", "command": pull, "spring_stiffness": stiffness}
+    omega, away = math.sqrt(stiffness / inertia), 30.0 / (stiffness * speed)
+    off = []
+    with known(KARNOPP_SET):
+        for step in (1e-3, 0.5e-3, 0.25e-3):
+            time, found = run(on(KARNOPP_TREE), task(duration=0.6, **fields), step)
+            tau = np.maximum(time - away, 0.0)
+            angle = speed * tau - speed / omega * np.sin(omega * tau)
+            angle += 5.0 / stiffness * (1.0 - np.cos(omega * tau))
+            assert np.max(np.abs(found["relative_angle"][time < away])) < 1e-18
+            held = time < away - 1e-3
+            pulled = stiffness * speed * time[held]
+            np.testing.assert_allclose(found["friction_torque"][held], pulled, atol=1e-9)
+            assert found["friction_torque"][-1] == pytest.approx(25.0, rel=1e-12)
+            off.append(np.max(np.abs(found["relative_angle"] - angle)) / angle[-1])
+    assert off[0] < 1e-5
+    assert off[0] > 8 * off[2]
 
 
 def test_a_model_of_the_former_kind_is_refused_by_name() -> None:

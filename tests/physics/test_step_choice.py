@@ -16,7 +16,8 @@ from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Task
 from tests.physics.bench_equations import poles
 from tests.physics.bench_reference import reference
-from tests.physics.benches import INERTIA, Tree, bench, stribeck, task
+from tests.physics.benches import INERTIA, Tree, bench, run, stribeck, task
+from tests.physics.dry_cases import errors, thesis
 from tests.physics.engine_errors import TOLERANCE, error_of
 from tests.physics.random_benches import random_bench
 
@@ -254,18 +255,14 @@ def test_what_is_too_stiff_is_refused_in_words() -> None:
     assert found.refused.startswith("bristle damping of friction.load needs steps of 0.07 us")
 
 
-def test_nothing_is_needed_without_bristles_or_without_a_plant() -> None:
-    def dry(tree: Tree) -> None:
-        tree["friction"] = {"load": stribeck(32.0, 26.0)}
-
+def test_nothing_is_needed_without_friction_or_without_a_plant() -> None:
     def free(tree: Tree) -> None:
         tree["friction"] = {}
 
     shaken = task(base_acceleration=swing(50.0))
-    stiff = contact(1e9, 1e6)
+    stiff = contact(1e10, 1e7)
     assert longest_step(stiff, shaken).refused is not None
     for on, of in (
-        (bench(dry), shaken),
         (bench(free), shaken),
         (stiff, task(mode="prescribed", command=Sine(amplitude=1.0, frequency=5.0))),
     ):
@@ -280,6 +277,69 @@ def test_a_compensation_with_bristles_counts_on_a_dry_bench() -> None:
 
     found = longest_step(bench(dry), task(base_acceleration=swing(1.0), compensation="lugre"))
     assert found.because == "reversals on the bristles of compensation.lugre"
+
+
+def test_dry_friction_has_a_step_of_its_own() -> None:
+    """Its torque jumps at every reversal; against the engine at 1/64 of the step."""
+
+    def dry(tree: Tree) -> None:
+        tree["friction"] = {"load": stribeck(32.0, 26.0, 4.0)}
+
+    on, of = bench(dry), task(base_acceleration=swing(1.5))
+    found = longest_step(on, of)
+    assert (found.step, found.because) == (LONGEST / 4.0, "dry friction.load")
+    _, fine = run(on, of, found.step / 64.0)
+
+    def off(step: float) -> float:
+        _, out = run(on, of, step)
+        changes = out["friction_torque"] - fine["friction_torque"]
+        return float(np.sqrt(np.mean(changes**2) / np.mean(fine["friction_torque"] ** 2)))
+
+    assert off(found.step) < TOLERANCE / 2 < off(LONGEST)
+
+
+@pytest.mark.parametrize("static", [(32.0, 26.0), (37.65, 30.24), (45.0, 40.0)])
+def test_a_compensation_that_jumps_with_dry_friction_leaves_what_is_right(
+    static: tuple[float, float],
+) -> None:
+    """Exact, a sixth too weak, a third too weak; what is left is the difference of two jumps."""
+
+    def dry(tree: Tree) -> None:
+        tree["friction"] = {"load": stribeck(*static, 4.0)}
+
+    on = bench(dry)
+    of = task(base_acceleration=swing(1.5), compensation="static", duration=2.0)
+    found = longest_step(on, of)
+    assert found.because == "jumps of dry friction at compensation.static"
+    _, fine = run(on, of, found.step / 4.0)
+
+    def off(step: float) -> float:
+        _, out = run(on, of, step)
+        change = out["load_rate"] - fine["load_rate"]
+        return float(np.sqrt(np.mean(change**2) / np.mean(fine["load_rate"] ** 2)))
+
+    assert off(found.step) < TOLERANCE < off(0.5e-3)
+
+
+@pytest.mark.parametrize(("compensation", "step"), [("static", 0.03125e-3), ("observer", 0.125e-3)])
+def test_what_compensates_a_dry_bench_meets_its_jumps_in_shorter_steps(
+    compensation: str, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = thesis(compensation, periods=2.0)
+    found = longest_step(case.bench, task(base_acceleration=case.base, compensation=compensation))
+    assert found.because == f"jumps of dry friction at compensation.{compensation}"
+    assert found.step == step
+    expected = case.expected()
+    of = ("load_rate", "pointing_angle", "relative_angle", "motor_current")
+
+    def worst() -> float:
+        chosen = errors(case, expected, None)
+        return max(chosen[name] for name in of)
+
+    assert worst() < TOLERANCE / 2
+    for limit in ("JUMPS", "FED", "DRY"):
+        monkeypatch.setattr(step_choice, limit, 1e9)
+    assert worst() > TOLERANCE
 
 
 @pytest.mark.parametrize(

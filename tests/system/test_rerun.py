@@ -11,12 +11,13 @@ import pytest
 from campaign.archive import open_run
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
-from campaign.cli.rerun import rerun_trial
+from campaign.cli.rerun import _error, rerun_trial
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.execution import provenance
 from campaign.execution.comparison import changes, differences
 from campaign.physics import grid
+from campaign.physics.step_choice import StepChoice
 from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
 from tests.system.user import SEA, write
 
@@ -73,7 +74,9 @@ def test_another_sample_is_found_and_named(
 def older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> Path:
     """A run of an engine 1 whose steps were other ones, and whose samples are, too."""
     monkeypatch.setattr(provenance, "ENGINE", 1)
-    monkeypatch.setattr(grid, "_needed", lambda bench, task: 1e-3 / 32)
+    monkeypatch.setattr(
+        grid, "_choice", lambda bench, task: StepChoice(1e-3 / 32, 1e-3 / 32, "older")
+    )
     request = Request(str(write(tmp_path, SEA)))
     run_protocol(request, tmp_path / "results", workers=1, report=False)
     monkeypatch.undo()
@@ -84,7 +87,7 @@ def older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> Path:
 def test_a_trial_of_an_older_engine_is_held_against_that_engine_s_error(older: Path, capsys):
     assert rerun_trial(older.stem, "1", older.parent) is ExitCode.DONE
     first, *channels, _ = capsys.readouterr().out.splitlines()
-    assert "simulated by engine 1, repeated by engine 2: the same within 10 times" in first
+    assert "simulated by engine 1, repeated by engine 3: the same within 10 times" in first
     assert len(channels) == 11
     (rate,) = (line for line in channels if line.strip().startswith("load_rate: "))
     assert 0.0 < float(rate.split("changed by ")[1].split()[0]) < 1e-3
@@ -145,3 +148,10 @@ def test_lengths_outcomes_and_missing_channels_are_differences():
         "samples: 1 → 2; compared are those that both have",
     ]
     assert differences(long, replace(long, channels={})) == ["rate: is only in the archive"]
+
+
+@pytest.mark.parametrize(("engine", "rate", "torque"), [(2, 1.1e-2, 3e-3), (3, 2e-4, 2e-4)])
+def test_older_engines_had_larger_errors_of_dry_friction(engine: int, rate: float, torque: float):
+    assert _error(engine, "load_rate", dry=True) == rate
+    assert _error(engine, "friction_torque", dry=True) == torque
+    assert _error(engine, "load_rate", dry=False) == 2e-4

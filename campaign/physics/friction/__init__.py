@@ -18,3 +18,14 @@ def friction_models() -> Kinds[FrictionModel]:
 
 FrictionField = Annotated[Any, Choice("model", friction_models)]
 """The options of one friction model, told by `model`."""
+
+
+def is_dry(options: Any) -> bool:
+    """Whether a model is a set at rest, which as a plant's friction the engine solves for."""
+    return friction_models()[options.model].dry is not None
+
+
+def jumps(options: Any) -> bool:
+    """Whether its torque, as a compensation, has the sign of the rate."""
+    dry = friction_models()[options.model].dry
+    return dry is not None and dry.jumps(options)

@@ -74,6 +74,35 @@ class SmallSignal:
     sliding_damping: float = 0.0
 
 
+def _always(options: Any) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    """Friction that is a set at rest: |T| <= `static_torque` when stuck, and `sliding` in motion.
+
+    A step function can not say that: it is told the rate, and at rest the torque follows from all
+    that acts. As a plant's friction such models are solved together, by the engine
+    (`campaign.physics.dry_step`); their step function is for prescribed motion.
+
+    Attributes:
+        sliding: torque against the motion (N m, 0 or more, `FrictionModel.viscous` apart), compiled
+            as a step function is: `sliding(parameters, direction, speed)`, direction 1.0 or -1.0,
+            speed in that direction (rad/s of the interface, 0 or more); see
+            `campaign.physics.sliding_torque`.
+        static_torque: the most (N m) that it holds before it slides in a direction (1.0 or -1.0),
+            from validated options; no less than `sliding` at speed 0.
+        jumps: whether a compensation with these options has the sign of the rate, zero at rest; the
+            engine then meets the jump inside its step. Else its step function says what it does, as
+            it does for a sampled controller.
+    """
+
+    sliding: Callable[..., float]
+    static_torque: Callable[[Any, float], float]
+    jumps: Callable[[Any], bool] = _always
+
+
 @dataclass(frozen=True)
 class FrictionModel:
     """A friction model.
@@ -97,6 +126,7 @@ class FrictionModel:
             module's own (each function is compiled for itself); None: there is none.
         small_signal: its answer to small motions, from validated options; None: not declared, and
             the loop of a bench with it is known only while it slides.
+        dry: what it is at rest, of a model without a state; None: its step function says all.
     """
 
     name: str
@@ -111,6 +141,7 @@ class FrictionModel:
     small_signal: Callable[[Any], SmallSignal] | None = None
     stored_energy: Callable[[Any, Array], float] | None = None
     step_for: Callable[[Any], Callable[..., Any]] | None = None
+    dry: DryFriction | None = None
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""

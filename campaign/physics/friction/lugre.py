@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.physics.compiled import inlined
-from campaign.physics.elementary import exp, expm1, power, where
+from campaign.physics.elementary import any_of, exp, expm1, power, where
 from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
@@ -67,28 +67,35 @@ def _parameters(options: LuGreOptions) -> Array:
 
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     """See `campaign.physics.step_function`. state[0] is sigma0 z (N m)."""
-    v, speed = _mean_rates(motion)
+    v, speed, direction = _mean_rates(motion)
     exponent_forwards, exponent_backwards = parameters[3], parameters[7]
     exponent = where(v >= 0.0, exponent_forwards, exponent_backwards)
-    return _advance(
-        parameters, state, motion, v, speed, power(_ratio(parameters, v, speed), exponent)
-    )
+    powered = power(_ratio(parameters, v, speed), exponent)
+    return _advance(parameters, state, motion, v, speed, direction, powered)
 
 
 def _gaussian_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     """The same with delta = 2, which takes half the time."""
-    v, speed = _mean_rates(motion)
+    v, speed, direction = _mean_rates(motion)
     ratio = _ratio(parameters, v, speed)
-    return _advance(parameters, state, motion, v, speed, ratio * ratio)
+    return _advance(parameters, state, motion, v, speed, direction, ratio * ratio)
 
 
 @inlined
-def _mean_rates(motion: Motion) -> tuple[float, float]:
-    """Means of v and of |v|; where the sign changes, the latter is that of a straight line."""
+def _mean_rates(motion: Motion) -> tuple[float, float, float]:
+    """Means of v and of |v|, and their quotient: the direction, or less of it.
+
+    Where the sign of v changes, |v| is taken from a straight line.
+    """
     v0, v1, v = motion.rate_start, motion.rate_end, motion.rate_mean
+    speed = abs(v)
+    direction = where(speed > 0.0, where(v > 0.0, 1.0, -1.0), v)
     turns = v0 * v1 < 0.0
-    turning = 0.5 * (v0 * v0 + v1 * v1) / where(turns, abs(v0) + abs(v1), 1.0)
-    return v, where(turns, turning, abs(v))
+    if any_of(turns):
+        turning = 0.5 * (v0 * v0 + v1 * v1) / where(turns, abs(v0) + abs(v1), 1.0)
+        speed = where(turns, turning, speed)
+        direction = v / where(speed > 0.0, speed, 1.0)
+    return v, speed, direction
 
 
 @inlined
@@ -100,7 +107,13 @@ def _ratio(parameters: Any, v: float, speed: float) -> Any:
 
 @inlined
 def _advance(
-    parameters: Any, state: Any, motion: Motion, v: float, speed: float, power_of_ratio: float
+    parameters: Any,
+    state: Any,
+    motion: Motion,
+    v: float,
+    speed: float,
+    direction: float,
+    power_of_ratio: float,
 ) -> tuple[float, float]:
     """Advance the bristles; mean torque and its change."""
     tc_forwards, ts_forwards = parameters[0], parameters[1]
@@ -112,7 +125,6 @@ def _advance(
     per_s = 1.0 / s
     # z relaxes towards (v / |v|) s / stiffness, by exp(-x) over the step.
     x = stiffness * motion.step * speed * per_s
-    direction = v / where(speed > 0.0, speed, 1.0)
     before = state[0]
     change = (direction * s - before) * -expm1(-x)
     after = before + change

@@ -1,8 +1,7 @@
 """Static Stribeck friction: T = (Tc + (Ts - Tc) exp(-|v/vs|^delta)) sgn(v) + sigma2 v (Eq. 4.6).
 
-At rest the model is a set, |T| <= Ts. As a plant's friction it is therefore solved implicitly over
-a step (Moreau's time stepping: T is what brings the velocity to zero, if the friction can give
-that much); as a compensation, where the velocity does not answer within the step, it is Eq. 4.6.
+At rest the model is a set, |T| <= Ts (`DryFriction`): as a plant's friction, the engine finds
+within each step whether it sticks or slides. As a compensation it is Eq. 4.6 with sgn(0) = 0.
 """
 
 from __future__ import annotations
@@ -13,9 +12,11 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
+from campaign.physics.compiled import inlined
 from campaign.physics.elementary import exp, power, tanh, where
 from campaign.physics.friction.interface import (
     Array,
+    DryFriction,
     FrictionModel,
     FrictionOptions,
     Presliding,
@@ -130,36 +131,39 @@ def _parameters(options: StribeckOptions) -> Array:
 
 
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
-    """See `campaign.physics.step_function`. No state is kept."""
+    """See `campaign.physics.step_function`: Eq. 4.6 at the mean rate. No state is kept."""
+    v0, v1, smoothing = motion.rate_start, motion.rate_end, parameters[9]
+    v = 0.5 * (v0 + v1)
+    size = _curve(parameters, where(v >= 0.0, 1.0, -1.0), abs(v))
+    smooth = size * tanh(v / (smoothing if smoothing > 0.0 else 1.0))
+    # The sign may change inside the step: its mean over the step, not a whole step of either.
+    path = abs(v0) + abs(v1)
+    sign = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
+    sign = (v0 + v1) / (path if path > 0.0 else 1.0) if v0 * v1 < 0.0 else sign
+    return (smooth if smoothing > 0.0 else size * sign) + parameters[8] * abs(v), 0.0
+
+
+def _sliding(parameters: Any, direction: float, speed: float) -> float:
+    """See `campaign.physics.sliding_torque`: s(v), and the half difference of sigma2."""
+    torque: float = _curve(parameters, direction, speed) + direction * parameters[8] * speed
+    return torque
+
+
+@inlined
+def _curve(parameters: Any, direction: float, speed: float) -> Any:
+    """s(v) of Equation 4.4 (N m)."""
     tc_forwards, ts_forwards, vs_forwards, exponent_forwards = (
         parameters[0], parameters[1], parameters[2], parameters[3],
     )  # fmt: skip
     tc_backwards, ts_backwards, vs_backwards, exponent_backwards = (
         parameters[4], parameters[5], parameters[6], parameters[7],
     )  # fmt: skip
-    viscous, smoothing = parameters[8], parameters[9]
-    v0, v1, compliance = motion.rate_start, motion.rate_end, motion.compliance
-    answers = compliance > 0.0
-    v1 = v0 + compliance * motion.applied if answers else v1
-    v = 0.5 * (v0 + v1)
-    # v1 is without this friction: read the curve at the rate that its torque will leave.
-    reach = compliance * (ts_forwards if v1 >= 0.0 else ts_backwards)
-    v -= 0.5 * min(max(v1, -reach), reach)
-    coulomb = where(v >= 0.0, tc_forwards, tc_backwards)
-    static = where(v >= 0.0, ts_forwards, ts_backwards)
-    stribeck_velocity = where(v >= 0.0, vs_forwards, vs_backwards)
-    exponent = where(v >= 0.0, exponent_forwards, exponent_backwards)
-    size = coulomb + (static - coulomb) * exp(-power(abs(v) / stribeck_velocity, exponent))
-    # What would bring the velocity to zero by the end of the step; sliding if that is too much.
-    stopping = v1 / (compliance if answers else 1.0)
-    held = min(max(stopping, -size), size)
-    smooth = size * tanh(v / (smoothing if smoothing > 0.0 else 1.0))
-    # The sign may change inside the step: its mean over the step, not a whole step of either.
-    path = abs(v0) + abs(v1)
-    sign = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
-    sign = (v0 + v1) / (path if path > 0.0 else 1.0) if v0 * v1 < 0.0 else sign
-    fed_forward = smooth if smoothing > 0.0 else size * sign
-    return (held if answers else fed_forward) + viscous * abs(v), 0.0
+    forwards = direction >= 0.0
+    coulomb = where(forwards, tc_forwards, tc_backwards)
+    static = where(forwards, ts_forwards, ts_backwards)
+    stribeck_velocity = where(forwards, vs_forwards, vs_backwards)
+    exponent = where(forwards, exponent_forwards, exponent_backwards)
+    return coulomb + (static - coulomb) * exp(-power(speed / stribeck_velocity, exponent))
 
 
 def _small_signal(options: StribeckOptions) -> SmallSignal:
@@ -184,4 +188,9 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     changeable=CURVE,
     small_signal=_small_signal,
+    dry=DryFriction(
+        sliding=_sliding,
+        static_torque=lambda options, direction: in_direction(options, "static_torque", direction),
+        jumps=lambda options: options.sign_smoothing == 0.0,
+    ),
 )

@@ -1,6 +1,6 @@
 """Dry friction over one step: sliding, stuck, or an event in between, to second order in the step.
 
-Friction is a set at rest, |T| <= Ts, and s(v) sgn(v) when sliding (Equation 4.6). Parallel dry
+Dry friction is a set at rest, |T| <= Ts, and s(v) sgn(v) when sliding (Equation 4.6). Parallel dry
 interfaces share one relative rate, so they slide and stick together: the sum of their curves is
 one curve, the sum of their static torques one static torque. What is kept from step to step is the
 direction of sliding: 1, -1, or 0 for stuck.
@@ -21,39 +21,42 @@ It is the applied torque with its mean and first moment over the step. Three thi
   although the torque jumps inside the step. If it can not, friction turns round at p: two
   constants, entered as the line of their mean and first moment.
 - Stuck: the holding line to rate 0 and motion 0. Where that line leaves -Ts .. Ts, it breaks away:
-  what lies beyond Ts is taken off, again by its mean and first moment.
+  what lies beyond Ts is taken off, again by its mean and first moment, and where the slowest
+  sliding has less torque than rest, so is the difference from then on.
 
 With both moments right, a step with an event is off by third order, as the trapezoidal rule is in
 a step without. A constant that brings the rate to zero by the end of the step (Moreau's time
 stepping) is off by second order in the angle.
-
-Where the loop has friction with a state or a compensation, too, these are asked with the rate and
-motion that `dry_step` expects while their torques stay as they are: one prediction for all, or what
-should cancel does not. Once their lines are known a step that ends stuck is held again, with
-`holding_line`; all else stays as predicted.
-
-After a step that ends stuck the caller sets the load's rate to the base's: rounding is no sliding.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compiled import called
 
 
 class Response(NamedTuple):
-    """How much the relative rate and angle at the end of a step fall per N m of friction.
-
-    With the columns g and h of `loop.discretise` for friction: rate_mean = -g[RATE],
-    rate_change = g[RATE] / 2 - h[RATE]; the angle's are the same of row RELATIVE_ANGLE.
-    """
+    """How much the relative rate and angle at the end of a step fall per N m of friction."""
 
     rate_mean: float
     rate_change: float
     angle_mean: float
     angle_change: float
+
+
+class Limits(NamedTuple):
+    """Torques (N m, unsigned) about rest, in the direction of sliding (when stuck, forwards).
+
+    holds: the most before it slides that way.   starts: of the slowest sliding.
+    ..._back: the same the other way.
+    """
+
+    holds: float
+    holds_back: float
+    starts: float
+    starts_back: float
 
 
 class DryStep(NamedTuple):
@@ -82,34 +85,7 @@ class DryStep(NamedTuple):
     begins: float
 
 
-@inlined
-def sliding_torque(curves: Any, direction: float, v: float) -> float:
-    """Sum of the sliding torques (N m, unsigned) at rate v in `direction`; Ts where v is not.
-
-    curves: (interfaces, 9), at the load: Tc, Ts, vs, delta forwards, the same backwards, and half
-    the difference of sigma2 (`stribeck.curve_parameters`).
-    """
-    speed = max(direction * v, 0.0)
-    at = 0 if direction >= 0.0 else 4
-    total = 0.0
-    for e in range(curves.shape[0]):
-        fall = math.exp(-((speed / curves[e, at + 2]) ** curves[e, at + 3]))
-        total += curves[e, at] + (curves[e, at + 1] - curves[e, at]) * fall
-        total += direction * curves[e, 8] * speed
-    return total
-
-
-@inlined
-def static_torque(curves: Any, direction: float) -> float:
-    """Sum of the static torques (N m, unsigned) in `direction`."""
-    at = 1 if direction >= 0.0 else 5
-    total = 0.0
-    for e in range(curves.shape[0]):
-        total += curves[e, at]
-    return total
-
-
-@inlined
+@called
 def holding_line(rate: float, motion: float, response: Response) -> tuple[float, float]:
     """Mean and change of the torque line that takes `rate` and `motion` off the end of a step."""
     per = 1.0 / (
@@ -121,7 +97,7 @@ def holding_line(rate: float, motion: float, response: Response) -> tuple[float,
     )
 
 
-@inlined
+@called
 def crossing(v0: float, v1: float, mean_rate: float) -> float:
     """Share of a step at which a rate from v0 to v1, of other sign, is zero; in 0 .. 1.
 
@@ -136,7 +112,7 @@ def crossing(v0: float, v1: float, mean_rate: float) -> float:
     return min(max(part, 0.0), 1.0)
 
 
-@inlined
+@called
 def beyond(
     first: float, last: float, least: float, most: float
 ) -> tuple[float, float, float, float]:
@@ -157,34 +133,29 @@ def beyond(
     return mean, change, sign, 1.0 - share if over_first == 0.0 else 0.0
 
 
-@inlined
-def dry_step(
-    curves: Any,
+@called
+def step_of(
     direction: float,
     v0: float,
     v1: float,
     motion: float,
     step: float,
     response: Response,
+    limits: Limits,
+    start: float,
+    end: float,
 ) -> DryStep:
     """The step from relative rate v0; v1 and `motion` are what it ends with without this friction.
 
-    Three evaluations of the curves, no loop but over the interfaces, and no branch that could not
-    be a choice between numbers that are there already.
+    start, end: sliding torques (N m, unsigned) at v0 and at the rate that sliding on leads to. No
+    branch that could not be a choice between numbers that are there already.
     """
     stuck = direction == 0.0
     way = -1.0 if direction < 0.0 else 1.0
-    static, other = static_torque(curves, way), static_torque(curves, -way)
-    low, high = (other, static) if way > 0.0 else (static, other)
+    low = limits.holds_back if way > 0.0 else limits.holds
+    high = limits.holds if way > 0.0 else limits.holds_back
 
-    # Sliding on. Where friction rises with the rate, the corrected rate is the linearly implicit
-    # one: however steep the rise, it does not throw the rate across zero.
-    start = sliding_torque(curves, way, v0)
-    gain = way * (v1 - v0) - response.rate_mean * start
-    rise = sliding_torque(curves, way, v0 + way * gain) - start
-    slope = 0.5 * response.rate_mean * rise / (gain if gain != 0.0 else 1.0)
-    gain = gain / (1.0 + slope) if slope > 0.0 else gain * (1.0 - slope)
-    end = sliding_torque(curves, way, v0 + way * gain)
+    # Sliding on.
     mean, change = way * 0.5 * (start + end), way * (end - start)
     reached = v1 - response.rate_mean * mean - response.rate_change * change
     moved = motion - response.angle_mean * mean - response.angle_change * change
@@ -196,19 +167,22 @@ def dry_step(
     hold, slope = holding_line(v1, motion - stopped, response)
 
     # Turning round, where in the rest of the step that would be more than friction can hold.
-    until = way * 0.5 * (start + static)
-    rest = way * (hold - until * part)
-    too_much = rest < -other * (1.0 - part) or rest > static * (1.0 - part)
+    until = way * 0.5 * (start + limits.starts)
+    left = way * (hold - until * part)
+    too_much = left < -limits.holds_back * (1.0 - part) or left > limits.holds * (1.0 - part)
     turns = not stuck and not slides and too_much
-    after = -way * other if rest < 0.0 else way * static
+    after = -way * limits.starts_back if left < 0.0 else way * limits.starts
     turned = until * part + after * (1.0 - part)
     jump = 6.0 * (after - until) * part * (1.0 - part)
 
-    # Breaking away: what is beyond the limits is not held.
+    # Breaking away: what is beyond the limits is not held, and sliding may take less than rest.
     first, last = hold - 0.5 * slope, hold + 0.5 * slope
     excess, bent, broken, began = beyond(first, last, -low, high)
-    excess, bent = (excess, bent) if stuck else (0.0, 0.0)
-    held = last if stuck else way * rest / max(1.0 - part, 1e-9)
+    least = limits.holds - limits.starts if broken > 0.0 else limits.holds_back - limits.starts_back
+    drop = broken * least * (1.0 - began)
+    excess, bent = (excess + drop, bent + 6.0 * drop * began) if stuck else (0.0, 0.0)
+    held = last if stuck else way * left / max(1.0 - part, 1e-9)
+    held = min(max(held, -low), high) - (broken * least if stuck else 0.0)
 
     mean = mean if slides else (turned if turns else hold - excess)
     change = change if slides else (jump if turns else slope - bent)
@@ -220,30 +194,10 @@ def dry_step(
         mean=mean,
         change=change,
         start=min(max(first, -low), high) if stuck else way * start,
-        end=way * end if slides else min(max(held, -low), high),
+        end=way * end if slides else held,
         direction=onward if moves else 0.0,
         rate_end=reached if moves else 0.0,
         motion=moved if moves else stopped,
         leaves=1.0 if slides else part,
         begins=began if stuck else (part if turns else 1.0),
     )
-
-
-@inlined
-def dry_feedforward(
-    curves: Any, before: float, after: float, leaves: float, begins: float, v0: float, v1: float
-) -> tuple[float, float]:
-    """Mean and change of s(v) sgn(v), with sgn(0) = 0: Equation 4.6 as a compensation.
-
-    before, after: directions of the plant at the ends of the step; leaves, begins: as in `DryStep`,
-    so that where the plant sticks for a while the compensation is zero for that while. Without dry
-    friction in the plant, both are where the rate crosses zero (`crossing`), or 1. A jump inside
-    the step enters by its mean and first moment.
-    """
-    start = before * sliding_torque(curves, before, v0)
-    end = after * sliding_torque(curves, after, v1)
-    jumps = before != after or leaves < 1.0
-    first = 0.5 * (start + before * static_torque(curves, before)) * leaves
-    last = 0.5 * (end + after * static_torque(curves, after)) * (1.0 - begins)
-    bent = 6.0 * (last * begins - first * (1.0 - leaves))
-    return (first + last, bent) if jumps else (0.5 * (start + end), end - start)

@@ -1,0 +1,146 @@
+"""The machine code that simulations need, made before anybody waits for it.
+
+The engine has four entry points, for one trial and for a block of LANES trials, with a plant and
+at a prescribed motion; each has one signature, whatever the bench. Friction models have functions
+of their own, compiled for the lanes of either, for the sizes that their options give, and for how
+many of a kind a bench has side by side: what a trial needs is made when it is made ready. All of it
+is kept on disk (`campaign.physics.compiled`), so it is made once per installation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from llvmlite import binding
+from numba.core import event
+
+from campaign.physics.bench import Bench
+from campaign.physics.compiled import cache_folder, is_kept_for_good
+from campaign.physics.lanes import Lane, together
+from campaign.physics.simulate import simulate_together
+from campaign.physics.vector import LANES
+from campaign.signals import Sine
+from campaign.trial import Task
+
+WIDTHS = (1, LANES)
+"""Lanes for which the engine is compiled."""
+_SOURCES = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Part:
+    """Machine code that is made at once.
+
+    Attributes:
+        name: for people.
+        make: loads it from the disk, or compiles it and keeps it there.
+    """
+
+    name: str
+    make: Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A part that is there now; seconds on the clock, and whether it had to be compiled."""
+
+    name: str
+    seconds: float
+    compiled: bool
+
+
+def folder() -> Path | None:
+    """Where the engine is kept; None: nowhere, as the user's cache cannot be written."""
+    kept = cache_folder(__name__)
+    return kept if kept is not None and is_kept_for_good(kept) else None
+
+
+def parts(width: int, benches: Sequence[Bench]) -> Iterator[Part]:
+    """What simulating `benches` needs, for one trial (`width` 1) or for LANES side by side."""
+    side_by_side = "one trial" if width == 1 else f"{width} trials side by side"
+    empty = benches[0].with_friction({})
+    yield Part(f"engine, {side_by_side}", partial(_simulate, empty, "rate", width))
+    for bench in benches:
+        name = f"friction models of the bench {bench.name}, {side_by_side}"
+        yield Part(name, partial(_make_ready, bench, width))
+    name = f"engine, prescribed motion, {side_by_side}"
+    yield Part(name, partial(_simulate, empty, "prescribed", width))
+
+
+def make(part: Part) -> Made:
+    """Make one part, and say what it took."""
+    compiling = _Compiling()
+    began = time.perf_counter()
+    with event.install_listener("numba:run_pass", compiling):
+        part.make()
+    return Made(part.name, time.perf_counter() - began, compiling.seen)
+
+
+def all_made() -> bool:
+    """Whether everything was made already, by this installation on a machine of this kind."""
+    note = _note()
+    return note is not None and note.exists()
+
+
+def note_all_made() -> None:
+    """From now on `all_made` is true, until a source or the processor changes."""
+    note = _note()
+    if note is not None:
+        with suppress(OSError):
+            note.touch()
+
+
+class _Compiling(event.Listener):  # type: ignore[misc]
+    """Notices that a pass of the compiler runs, which none does for what comes from the disk."""
+
+    def __init__(self) -> None:
+        self.seen = False
+
+    def on_start(self, event: Any) -> None:
+        self.seen = True
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def _note() -> Path | None:
+    """An empty file, named by what numba distinguishes besides what names the folder."""
+    kept = folder()
+    if kept is None:
+        return None
+    written = max(source.stat().st_mtime_ns for source in _SOURCES.rglob("*.py"))
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    what = "\n".join((str(_SOURCES), str(written), *processor))
+    return kept / f"all-made-{hashlib.sha256(what.encode()).hexdigest()[:16]}"
+
+
+def _make_ready(bench: Bench, width: int) -> None:
+    """Trials of a bench in every mode, with every compensation."""
+    for mode in ("rate", "prescribed"):
+        for compensation in ("none", *bench.compensation):
+            together([Lane.of(bench, _some_task(bench, mode, compensation), 0)], width)
+
+
+def _simulate(bench: Bench, mode: str, width: int) -> None:
+    """Some milliseconds of a bench without friction, so that nothing else is compiled."""
+    for _ in simulate_together([Lane.of(bench, _some_task(bench, mode), 0)] * width):
+        pass
+
+
+def _some_task(bench: Bench, mode: str, compensation: str = "none") -> Task:
+    rate = bench.controller.sample_rate or 1000.0
+    return Task(
+        mode=mode,
+        command=Sine(amplitude=0.1, frequency=1.0),
+        compensation=compensation,
+        duration=2.5 / rate,
+        window=(0.0, 0.0),
+        sample_rate=rate,
+    )
