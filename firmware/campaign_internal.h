@@ -46,6 +46,8 @@ void campaign_on_bye(struct campaign_device *device, const struct campaign_frame
 
 void campaign_latch_init(struct campaign_device *device, const struct campaign_latch *latch);
 void campaign_on_safe(struct campaign_device *device, const struct campaign_frame *frame);
+/* Try again what could not be remembered. */
+void campaign_latch_tick(struct campaign_device *device);
 /* Why nothing may arm or start, if so. */
 struct campaign_refusal campaign_latch_check(struct campaign_device *device);
 struct campaign_refusal campaign_do_unlatch(struct campaign_device *device, uint32_t count);

@@ -31,11 +31,8 @@ static void set_latch(struct campaign_device *device, uint32_t session, const ch
 {
     struct campaign_latch *latch = &device->latch;
     const bool again = latch->latched && session != 0 && session == device->stopped_by;
-    if (again) {
-        if (device->unremembered)
-            (void)remember(device);
-        return;
-    }
+    if (again)
+        return; /* where it is not remembered yet, the next tick tries again */
     device->stopped_by = session;
     device->stopped_at = device->now;
     device->stopped_at_known = true;
@@ -44,6 +41,12 @@ static void set_latch(struct campaign_device *device, uint32_t session, const ch
     latch->cause = CAMPAIGN_STOPPED;
     strcpy(latch->by, by);
     (void)remember(device); /* where that fails it holds until the next reset, and is tried again */
+}
+
+void campaign_latch_tick(struct campaign_device *device)
+{
+    if (device->unremembered && !campaign_may_move(device))
+        (void)remember(device);
 }
 
 void campaign_on_safe(struct campaign_device *device, const struct campaign_frame *frame)

@@ -69,6 +69,7 @@ void campaign_device_tick(struct campaign_device *device, uint64_t now_us)
     const struct campaign_hooks *hooks = device->hooks;
     bool at_rest;
     device->now = now_us;
+    campaign_latch_tick(device);
     if (campaign_may_move(device) && !campaign_heard_lately(device))
         fail(device, CAMPAIGN_NO_HEARTBEATS, "no heartbeat was heard");
     if (!device->ending)

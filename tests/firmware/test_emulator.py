@@ -288,6 +288,12 @@ class Boots:
         ("raw", (wire.Kind.HEARTBEAT, wire.encode(wire.Heartbeat(7, TRIAL, 99, 42))[1]), "same"),
     ],
 )  # fmt: skip
+@example(  # a stop that could be remembered only later outlives a reset
+    past="",
+    steps=[
+        ("memory", False), ("send", wire.Safe(0, ""), "next"), ("memory", True), ("reset",),
+    ],
+)  # fmt: skip
 @example(past="", steps=[("raw", (wire.Kind.RESEND, wire.encode(wire.Resend(0, 0, 2))[1]), "same")])
 def test_the_same_frames_have_the_same_answers(
     console: Console, tmp_path: Path, stand_ins: None, past: str, steps: list[tuple]
