@@ -250,17 +250,26 @@ def _attribute(item: h5py.HLObject, name: str) -> h5a.AttrID:
 
 def own(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
     """What `parent` itself holds under a name; no link is followed."""
-    raw = name.encode()
-    if "/" in name or name == ".":  # on a path, only the last link would be looked at
-        raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
-    if not raw or raw not in parent.id:
-        raise ArchiveError(f"{_place(parent, name)}: is missing")
-    if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
-        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
-    found = h5o.open(parent.id, raw)
+    found = own_id(parent, name)
     if isinstance(found, h5g.GroupID):
         return h5py.Group(found)
     return h5py.Dataset(found) if isinstance(found, h5d.DatasetID) else None
+
+
+def own_id(parent: h5py.Group, name: str) -> Any:
+    """As `own`, of HDF5's low-level interface: a campaign has tens of thousands of objects."""
+    raw = name.encode()
+    if "/" in name or name == ".":  # on a path, only the last link would be looked at
+        raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
+    try:
+        link = parent.id.links.get_info(raw) if raw else None
+    except KeyError:
+        link = None
+    if link is None:
+        raise ArchiveError(f"{_place(parent, name)}: is missing")
+    if link.type != h5py.h5l.TYPE_HARD:
+        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
+    return h5o.open(parent.id, raw)
 
 
 def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:

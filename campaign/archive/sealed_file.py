@@ -11,6 +11,7 @@ from operator import attrgetter
 from pathlib import Path
 
 import h5py
+from h5py import h5d
 
 from campaign.archive import guarded, hdf5, nexus
 from campaign.archive.damage import DamageList
@@ -172,11 +173,11 @@ def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Sequence[_P
     for group_name, members in groupby(placed, key=attrgetter("group")):
         group = guarded.inner_group(entry, group_name)
         for each in members:
-            series = guarded.own(group, each.name)
-            if not isinstance(series, h5py.Dataset) or layout_of(series.id) != each.layout:
+            series = guarded.own_id(group, each.name)
+            if not isinstance(series, h5d.DatasetID) or layout_of(series) != each.layout:
                 place = f"{group.file.filename}: {group.name}/{each.name}"
                 raise ArchiveError(f"{place}: does not lie where it was written")
-            check_unit(series, each.unit)
+            check_unit(h5py.Dataset(series), each.unit)
 
 
 def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, str | int]:

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5o, h5t
+from h5py import h5d, h5t
 
 from campaign.archive import hdf5
 from campaign.archive.checksums import SeriesDigest, series_digest
+from campaign.archive.guarded import own_id
 from campaign.errors import ArchiveError
 from campaign.trial import Array
 
@@ -92,20 +92,16 @@ MISMATCH = "does not match its checksum; it was damaged or changed"
 
 def series_at(parent: h5py.Group, name: str, length: int) -> Series:
     """A series of `length` samples that `parent` itself holds. Raises ArchiveError."""
-    raw = name.encode()
-    if not raw or b"/" in raw or raw not in parent.id:
-        raise ArchiveError(f"{_place(parent, name)}: is missing")
-    if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
-        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
-    found: Any = h5o.open(parent.id, raw)
+    found = own_id(parent, name)
     plan = found.get_create_plist() if isinstance(found, h5d.DatasetID) else None
-    if plan is None or plan.get_layout() != h5d.CHUNKED or found.rank != 1:
+    shape: tuple[int, ...] = found.shape if plan is not None else ()
+    if plan is None or plan.get_layout() != h5d.CHUNKED or len(shape) != 1:
         raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
     filters = [plan.get_filter(number)[0] for number in range(plan.get_nfilters())]
     if filters not in (_SHUFFLED, _DEFLATED):
         what = "is stored with a filter other than shuffle and deflate"
         raise ArchiveError(f"{_place(parent, name)}: {what}")
-    (stated,), (chunk,) = found.shape, plan.get_chunk()
+    (stated,), (chunk,) = shape, plan.get_chunk()
     if not found.get_type().equal(h5t.IEEE_F64LE):
         raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
     if not 0 < chunk <= _LARGEST_CHUNK:
