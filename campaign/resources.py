@@ -34,6 +34,11 @@ def shipped_protocol(name: str) -> Path | None:
     return protocols_folder() / f"{name}.toml" if name in shipped_protocols() else None
 
 
+def shipped_benches() -> tuple[str, ...]:
+    """Names of the shipped benches, sorted."""
+    return tuple(sorted(path.stem for path in (protocols_folder() / "benches").glob("*.toml")))
+
+
 def copy_shipped(destination: Path) -> tuple[Path, ...]:
     """Copy protocols, benches and templates into `destination` and return what was written.
 

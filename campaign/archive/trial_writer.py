@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from campaign.archive.journal import Entry, TrialAbandoned, TrialFinished
 from campaign.estimate import Estimate, Window
+from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import ChannelInfo, Ending, Event, Trial
 
 if TYPE_CHECKING:
@@ -25,13 +26,19 @@ class TrialWriter:
     """
 
     def __init__(
-        self, trial: Trial, attempt: int, file: TrialFile, note: Callable[[Entry], None]
+        self,
+        trial: Trial,
+        attempt: int,
+        file: TrialFile,
+        note: Callable[[Entry], None],
+        timing: Timing = UNTIMED,
     ) -> None:
         """`note` puts a line into the run's journal."""
         self._trial = trial
         self._attempt = attempt
         self._file = file
         self._note = note
+        self._timing = timing
         self._open = True
 
     @property
@@ -43,7 +50,8 @@ class TrialWriter:
         self._file.start(channels)
 
     def append(self, time: Array, block: Array) -> None:
-        self._file.append(time, block)
+        with self._timing.span(Work.TRIAL_FILES):
+            self._file.append(time, block)
 
     def event(self, event: Event) -> None:
         self._file.event(event)
@@ -73,21 +81,22 @@ class TrialWriter:
             ArchiveError: it could not be written; nothing of it remains.
         """
         self._open = False
-        file = self._file.close(ending, started, ended, windows, estimates)
-        self._note(
-            TrialFinished(
-                at=ended,
-                trial=self._trial.number,
-                attempt=self._attempt,
-                file=file.name,
-                sha256=file.sha256,
-                record=file.record,
-                bytes=file.bytes,
-                outcome=ending.outcome,
-                reason=ending.reason,
-                safe_state=ending.safe_state,
+        with self._timing.span(Work.TRIAL_FILES):
+            file = self._file.close(ending, started, ended, windows, estimates)
+            self._note(
+                TrialFinished(
+                    at=ended,
+                    trial=self._trial.number,
+                    attempt=self._attempt,
+                    file=file.name,
+                    sha256=file.sha256,
+                    record=file.record,
+                    bytes=file.bytes,
+                    outcome=ending.outcome,
+                    reason=ending.reason,
+                    safe_state=ending.safe_state,
+                )
             )
-        )
 
     def abandon(self, at: str, reason: str = "") -> None:
         """Keep nothing of the trial but that it was begun."""

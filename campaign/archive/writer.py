@@ -23,6 +23,7 @@ from campaign.archive.resuming import reopen
 from campaign.archive.run_lock import RunLock
 from campaign.archive.trial_writer import TrialWriter
 from campaign.errors import UsageError
+from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Outcome, SafeState, Trial
 
 __all__ = ["RunWriter", "TrialWriter"]
@@ -32,11 +33,15 @@ class RunWriter:
     """Writes one run: `create` or `resume` it, `begin` each trial, `seal` it.
 
     Threads may share it. No other process can write the run meanwhile.
+
+    Attributes:
+        timing: told what is done for trial files and journal, and for the sealed file.
     """
 
     def __init__(self, folder: Path, journal: Journal, lock: RunLock) -> None:
         from campaign.archive.sealing import Sealer
 
+        self.timing: Timing = UNTIMED
         self._folder = folder
         self._journal = journal
         self._run_lock = lock
@@ -148,8 +153,9 @@ class RunWriter:
         with self._lock:
             last = self._last.get(trial.number)
         attempt = last.attempt + 1 if last else 1
-        file = TrialFile(self._folder, trial, attempt, not_kept)
-        writer = TrialWriter(trial, attempt, file, self._note)
+        with self.timing.span(Work.TRIAL_FILES):
+            file = TrialFile(self._folder, trial, attempt, not_kept)
+        writer = TrialWriter(trial, attempt, file, self._note, self.timing)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
         return writer
@@ -183,7 +189,8 @@ class RunWriter:
             self._abandon_open(ended)
             self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
-            return self._sealer.seal()
+            with self.timing.span(Work.SEALING):
+                return self._sealer.seal()
         finally:
             self.close()
 
@@ -205,7 +212,8 @@ class RunWriter:
             with self._lock:
                 self._last[entry.trial] = entry
                 self._sealer.add(entry)
-            self._sealer.advance()
+            with self.timing.span(Work.SEALING):
+                self._sealer.advance()
 
 
 def _now() -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from campaign.backends.interface import Source
+from campaign.stopwatch import UNTIMED, Timing
 from campaign.trial import Array, ChannelInfo, Trial
 
 Subscriber = Callable[[Trial, tuple[ChannelInfo, ...], Array, Array], None]
@@ -51,6 +52,7 @@ class Supervision:
     Attributes:
         source, live: as the backend's `BackendKind` declares.
         clock: a steady one (s).
+        timing: told what the trial's own thread does.
     """
 
     source: Source = Source.SIMULATION
@@ -58,6 +60,7 @@ class Supervision:
     patience: Patience = Patience()
     subscribers: tuple[Subscriber, ...] = ()
     clock: Callable[[], float] = time.monotonic
+    timing: Timing = UNTIMED
 
 
 class TrialStop:

@@ -57,7 +57,7 @@ def campaign(folder: Path, *arguments: str, code: int = 0) -> Done:
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=300,
+        timeout=600,  # the first one compiles the engine
         stdin=subprocess.DEVNULL,
     )
     assert "Traceback" not in process.stderr, process.stderr

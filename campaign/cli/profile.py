@@ -1,0 +1,66 @@
+"""`campaign run --profile`: where the time of a run went, on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from campaign.cli.output import print_note
+from campaign.stopwatch import Spent, Stopwatch, Work
+
+REST = "everything else"
+FASTER = {
+    Work.PREPARING: "a smaller matrix, or `--only TEST`, is a shorter plan",
+    Work.COMPILING: "it is done once per installation; `campaign warmup` does it before a run",
+    Work.SETTING_UP: "it is paid per trial: fewer and longer trials cost less",
+    Work.ENGINE: "shorter trials, `--workers`, or a longer step where the error allows it "
+    "(`backend.longest_step`); the fastest sine and the stiffest contact make steps short",
+    Work.SAMPLES: "a lower sample_rate records less",
+    Work.TRIAL_FILES: "a lower sample_rate, or fewer and longer trials; a faster disk",
+    Work.WAITING: "more `--workers`, if processors were idle; a bench that moves sets its own pace",
+    Work.SEALING: "a lower sample_rate, or fewer and longer trials; a faster disk",
+    Work.REPORT: "leave --report out; `campaign report` makes it at any time",
+}
+"""What would make it less."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Seconds on the clock, their share of the whole, and seconds of processors."""
+
+    what: str
+    clock: float
+    share: float
+    processor: float
+
+
+def rows(spent: dict[Work, Spent], elapsed: float, processor: float, workers: int) -> Iterator[Row]:
+    """What was done, in order, and the rest; the clocks add up to `elapsed`.
+
+    What `workers` threads do side by side counts on the clock with its share of one of them, and
+    what the main thread waits meanwhile is what no worker was at work.
+    """
+    at_work = sum(each.others for each in spent.values()) / workers
+    left, left_processor = elapsed, processor
+    for work, each in spent.items():
+        clock = each.main + each.others / workers
+        if work is Work.WAITING:
+            clock = max(0.0, clock - at_work)
+        left, left_processor = left - clock, left_processor - each.processor
+        yield Row(work, clock, clock / elapsed, each.processor)
+    yield Row(REST, max(0.0, left), max(0.0, left) / elapsed, max(0.0, left_processor))
+
+
+def print_profile(stopwatch: Stopwatch, workers: int) -> None:
+    """A table, and what would make the longest of it shorter."""
+    elapsed, processor = stopwatch.elapsed()
+    table = list(rows(stopwatch.spent(), elapsed, processor, workers))
+    threads = "1 worker" if workers == 1 else f"{workers} workers"
+    print_note(f"{'where the time went':26}{'clock':>10}{'share':>8}{'processor':>12}")
+    for row in table:
+        print_note(f"  {row.what:24}{row.clock:8.2f} s{row.share:7.0%} {row.processor:9.2f} s")
+    print_note(f"  {f'all, with {threads}':24}{elapsed:8.2f} s{1:7.0%} {processor:9.2f} s")
+    longest = max(table, key=lambda row: row.clock)
+    hint = FASTER.get(Work(longest.what)) if longest.what != REST else None
+    if hint:
+        print_note(f"most of it: {longest.what}; {hint}")

@@ -1,0 +1,133 @@
+"""Where the time of a run goes: kinds of work, measured where they are done.
+
+A `Stopwatch` is handed to whoever works; `UNTIMED` in its place costs next to nothing. Work inside
+of other work counts as its own only, so all of a thread's seconds count once.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
+
+
+class Work(StrEnum):
+    """What a run spends time on, in the order in which it is told."""
+
+    IMPORTING = "importing"
+    PREPARING = "preparing the plan"
+    COMPILING = "compiling the engine"
+    SETTING_UP = "setting trials up"
+    ENGINE = "engine"
+    SAMPLES = "samples and limits"
+    TRIAL_FILES = "trial files and journal"
+    WAITING = "waiting for trials"
+    SEALING = "sealed file"
+    REPORT = "report"
+
+
+@dataclass
+class Spent:
+    """Seconds: on the clock in the main thread and in all others together, and of processors."""
+
+    main: float = 0.0
+    others: float = 0.0
+    processor: float = 0.0
+
+
+class Timing(Protocol):
+    """What measures, or does not."""
+
+    def span(self, work: Work) -> AbstractContextManager[None]:
+        """What is done inside the block, in this thread, is `work`."""
+
+    def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
+        """The same items; getting each of them is `work`."""
+
+    def add(self, work: Work, processor: float) -> None:
+        """Processor time (s) that was spent on `work` beside all spans."""
+
+
+class Stopwatch:
+    """Measures. Any thread may use it."""
+
+    def __init__(self) -> None:
+        self._began = time.perf_counter(), time.process_time()
+        self._thread = threading.local()
+        self._lock = threading.Lock()
+        self._spent: dict[Work, Spent] = {}
+
+    @contextmanager
+    def span(self, work: Work) -> Iterator[None]:
+        """See `Timing`."""
+        outer: Work | None = getattr(self._thread, "work", None)
+        self._begin(work)
+        try:
+            yield
+        finally:
+            self._begin(outer)
+
+    def each(self, work: Work, items: Iterable[T]) -> Iterator[T]:
+        """See `Timing`."""
+        iterator = iter(items)
+        while True:
+            with self.span(work):
+                try:
+                    item = next(iterator)
+                except StopIteration:
+                    return
+            yield item
+
+    def add(self, work: Work, processor: float) -> None:
+        """See `Timing`."""
+        with self._lock:
+            self._spent.setdefault(work, Spent()).processor += processor
+
+    def elapsed(self) -> tuple[float, float]:
+        """Seconds since it was made: on the clock, and of processors in this process."""
+        return time.perf_counter() - self._began[0], time.process_time() - self._began[1]
+
+    def spent(self) -> dict[Work, Spent]:
+        """What was measured so far; of work under way, only what has ended or was interrupted."""
+        with self._lock:
+            return {work: Spent(**vars(self._spent[work])) for work in Work if work in self._spent}
+
+    def _begin(self, work: Work | None) -> None:
+        """From now on this thread does `work`; what it did until now is counted."""
+        now, used = time.perf_counter(), time.thread_time()
+        before: Work | None = getattr(self._thread, "work", None)
+        if before is not None:
+            clock = now - self._thread.now
+            with self._lock:
+                spent = self._spent.setdefault(before, Spent())
+                if threading.current_thread() is threading.main_thread():
+                    spent.main += clock
+                else:
+                    spent.others += clock
+                spent.processor += used - self._thread.used
+        self._thread.work, self._thread.now, self._thread.used = work, now, used
+
+
+class Untimed:
+    """Measures nothing."""
+
+    def span(self, work: Work) -> AbstractContextManager[None]:
+        """See `Timing`."""
+        return _NOTHING
+
+    def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
+        """See `Timing`."""
+        return items
+
+    def add(self, work: Work, processor: float) -> None:
+        """See `Timing`."""
+
+
+_NOTHING = nullcontext()
+UNTIMED = Untimed()
