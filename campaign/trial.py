@@ -423,4 +423,7 @@ def trial_number(wanted: str) -> int:
 
 
 def _short(value: JsonValue) -> str:
+    if isinstance(value, dict):  # what a swept table describes; the bench has all of it
+        kinds = (value[name] for name in ("model", "method", "kind") if name in value)
+        return str(next(kinds, "{...}"))
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from campaign.channels import missing
+from campaign.experiments.swept_tables import table_names
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
-from campaign.trial import Ending, Recording, Tree, Trial, TrialRequest
+from campaign.trial import Ending, Recording, Tree, Trial, TrialRequest, canonical_json
 
 
 class TrialData(Protocol):
@@ -84,13 +85,36 @@ class Experiment:
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
     """What the analysis finds, with a note on every channel that it had to do without."""
-    result = experiment.analyse(data)
+    result = experiment.analyse(with_named_tables(data))
     lacking: dict[str, None] = {}
     for item in data.trials:
         if item.trial.can_use and item.ending.outcome == "completed":
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
     notes = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
     return replace(result, notes=(*result.notes, *notes))
+
+
+def with_named_tables(data: TestData) -> TestData:
+    """The same, with a name in place of each swept value that is a table (`table_names`)."""
+    swept = [value for item in data.trials for value in item.trial.point.values()]
+    names = table_names(swept)
+    if not names:
+        return data
+    return replace(data, trials=tuple(_Named(item, names) for item in data.trials))
+
+
+class _Named:
+    """A trial whose point has names in place of tables; all else is as it was."""
+
+    def __init__(self, data: TrialData, names: Mapping[str, str]) -> None:
+        point = {
+            path: names[canonical_json(value)] if isinstance(value, dict) else value
+            for path, value in data.trial.point.items()
+        }
+        self.trial = data.trial.model_copy(update={"point": point})
+        self.ending = data.ending
+        self.recording = data.recording
+        self.channel_names = data.channel_names
 
 
 def lost_without(experiment: Experiment, name: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
+from campaign.experiments.swept_tables import table_names
 from campaign.options import Options
 from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Line, Scoreboard, Status, to_csv
@@ -326,7 +327,9 @@ def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
         if path not in points:
             yield _label(path), _with_unit(test, path, [value])
     for path, values in points.items():
-        yield f"{_label(path)} (swept)", _with_unit(test, path, list(values.values()))
+        names = table_names(list(values.values()))
+        shown = [names.get(key, value) for key, value in values.items()]
+        yield f"{_label(path)} (swept)", _with_unit(test, path, shown)
 
 
 def _label(path: str) -> str:
