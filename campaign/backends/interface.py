@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
 from campaign.archive import RunReader
 from campaign.options import Options
+from campaign.stopwatch import Timing
 from campaign.trial import Ending, PanicStop, Recorder, SafeState, Trial
 
 
@@ -85,6 +86,62 @@ class StoppedOutside(Protocol):
 
 
 @runtime_checkable
+class ExecutesTogether(Protocol):
+    """What a backend does besides when many trials together cost less than one after the other.
+
+    Attributes:
+        fewest_together, most_together: how many at a time are worth it, and possible.
+    """
+
+    fewest_together: int
+    most_together: int
+
+    def group(self, trial: Trial) -> Hashable:
+        """Trials of equal groups can be executed together. Asked of trials that are not refused."""
+
+    def execute_together(
+        self, trials: Sequence[Trial], recorders: Sequence[Recorder], stops: Sequence[StopFlag]
+    ) -> Iterator[tuple[int, Ending]]:
+        """As `execute` of each of these trials of one group, with its own recorder and stop flag.
+
+        Yields place and ending of each as soon as that one has ended. What one of them records
+        does not depend on the others. Raises BackendError when the backend cannot go on; then it
+        has not executed those whose ending it did not yield.
+        """
+
+
+@dataclass(frozen=True)
+class TrialCost:
+    """What a trial costs a backend that computes its samples.
+
+    Attributes:
+        step: of the integration (s).
+        steps: of them in all.
+        because: why the step is shorter than it could be; empty when it is not.
+    """
+
+    step: float
+    steps: int
+    because: str = ""
+
+
+@runtime_checkable
+class KnowsCost(Protocol):
+    """What a backend does besides when it can say beforehand what a trial costs it."""
+
+    def cost(self, trial: Trial) -> TrialCost:
+        """Asked of trials that are not refused."""
+
+
+@runtime_checkable
+class Timed(Protocol):
+    """What a backend has besides when it can tell what it spends its time on."""
+
+    timing: Timing
+    """Told of it from now on; whoever executes a plan may set it before the first trial."""
+
+
+@runtime_checkable
 class ServesArchive(Protocol):
     """What a backend has besides when its samples come out of an archived run."""
 
@@ -106,6 +163,8 @@ class BackendKind:
             a bench that falls silent in mid-trial is made safe.
         stopped_outside: whether others can switch its bench off: it is a `StoppedOutside`, too.
         several: whether several trials may be executed at a time (`--workers`).
+        simulates: whether it runs the engine of `campaign.physics`, which is compiled at its first
+            start.
     """
 
     name: str
@@ -116,3 +175,4 @@ class BackendKind:
     live: bool = False
     stopped_outside: bool = False
     several: bool = False
+    simulates: bool = False

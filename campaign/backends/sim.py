@@ -2,61 +2,30 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from itertools import repeat
+from typing import TYPE_CHECKING, Any, NamedTuple
+
 from pydantic import Field
 
-from campaign.backends.interface import BackendKind, Source, StopFlag
-from campaign.channels import (
-    BASE_RATE,
-    COMMAND,
-    COMPENSATION_TORQUE,
-    DRIVE_TORQUE,
-    FRICTION_TORQUE,
-    GYRO_RATE,
-    LOAD_RATE,
-    MOTOR_CURRENT,
-    POINTING_ERROR,
-    RELATIVE_ANGLE,
-    RELATIVE_RATE,
-    info,
-)
+from campaign.backends.interface import BackendKind, Source, StopFlag, TrialCost
+from campaign.backends.simulated_trial import CHANNELS, COMMANDS, OUTPUTS, SimulatedTrial
+from campaign.backends.step_check import StepCheck
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.limit_watch import LimitWatch
-from campaign.trial import (
-    Array,
-    Ending,
-    Event,
-    Outcome,
-    Recorder,
-    SafeState,
-    Task,
-    Trial,
-)
+from campaign.stopwatch import UNTIMED, Timing, Work
+from campaign.trial import Array, Ending, Recorder, SafeState, Tree, Trial
 from campaign.units import Time
 
-CHANNELS = tuple(
-    info(name)
-    for name in (
-        COMMAND,
-        BASE_RATE,
-        GYRO_RATE,
-        RELATIVE_RATE,
-        RELATIVE_ANGLE,
-        MOTOR_CURRENT,
-        DRIVE_TORQUE,
-        POINTING_ERROR,
-        COMPENSATION_TORQUE,
-        FRICTION_TORQUE,
-        LOAD_RATE,
-    )
-)
-"""In the order of a block; what the command is depends on the task."""
+if TYPE_CHECKING:  # the engine takes its time to be imported
+    from campaign.physics.lanes import Lane
 
-COMMANDS = {mode: info(COMMAND, mode) for mode in ("rate", "torque", "prescribed", "spring")}
-"""What the command channel holds, by the mode of the task."""
+__all__ = ["BACKEND", "CHANNELS", "COMMANDS", "SimBackend", "SimOptions"]
 
-_NAMES = frozenset(channel.name for channel in CHANNELS)
+MOST_BENCHES = 64
+"""Benches that are kept validated: trials of a test mostly share one."""
+MOST_KNOWN = 200_000
+"""Trials of which step and structure are kept: more than a plan has."""
 
 
 class SimOptions(Options):
@@ -65,13 +34,33 @@ class SimOptions(Options):
     longest_step: Time | None = Field(default=None, gt=0, le=0.01)
     """Longest integration step; absent: what the trial needs, 1 ms or 1/2^k of it. Sample rates and
     the frequencies of sines make it shorter."""
+    check_step: bool = False
+    """Simulate each trial once more at half its step, and archive how much that changes."""
+
+
+class _Known(NamedTuple):
+    """What is kept of a trial that was looked at: what it costs, and whom it goes with."""
+
+    cost: TrialCost
+    group: Hashable
 
 
 class SimBackend:
-    """Simulates every trial from rest, whatever came before it."""
+    """Simulates every trial from rest, whatever came before it.
+
+    Trials of one structure go side by side through the engine: each one's samples are, to the bit,
+    what they are when it is simulated alone.
+    """
+
+    fewest_together = 4
+    """A block costs what four trials cost alone, however few are in it."""
 
     def __init__(self, options: SimOptions) -> None:
         self._options = options
+        self._benches: dict[int, tuple[Tree, Bench]] = {}
+        self._known: dict[str, _Known] = {}
+        self._groups: dict[Hashable, Hashable] = {}
+        self.timing: Timing = UNTIMED
 
     def __enter__(self) -> SimBackend:
         return self
@@ -79,16 +68,21 @@ class SimBackend:
     def __exit__(self, *exception: object) -> None:
         return None
 
+    @property
+    def most_together(self) -> int:
+        """Lanes of a block."""
+        from campaign.physics.vector import LANES
+
+        return LANES
+
     def refuses(self, trial: Trial) -> str | None:
         """Why this backend cannot execute `trial`, or None."""
-        from campaign.physics.simulate import make_grid
-
-        bench, name = _bench(trial), trial.task.compensation
+        bench, name = self._bench(trial), trial.task.compensation
         if name != "none" and name not in bench.compensation:
             return f"bench {bench.name!r} has no compensation {name!r}"
         try:
-            make_grid(bench, trial.task, self._options.longest_step)
-        except ValueError as error:
+            self._look_at(trial)
+        except (ArithmeticError, ValueError) as error:
             return str(error)
         return None
 
@@ -96,88 +90,91 @@ class SimBackend:
         """All that the simulation knows."""
         return _NAMES
 
+    def group(self, trial: Trial) -> Hashable:
+        """Trials of one structure: the same models, inputs, sensors, sample rates and step."""
+        return self._look_at(trial).group
+
+    def cost(self, trial: Trial) -> TrialCost:
+        """The step that was chosen for a trial, and how many there are."""
+        return self._look_at(trial).cost
+
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""
-        from campaign.physics.base_motion import base_rate
-        from campaign.physics.simulate import simulate
+        ((_, ending),) = self.execute_together([trial], [recorder], [stop])
+        return ending
 
-        bench, task = _bench(trial), trial.task
-        watch = LimitWatch(bench.limits, task.sample_rate, [info.name for info in CHANNELS])
-        recorder.start((COMMANDS[task.mode], *CHANNELS[1:]))
-        for time, out in simulate(bench, task, trial.seed, self._options.longest_step):
-            gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
-            command = task.command.sample(time)
-            block = np.stack(
-                [
-                    command,
-                    base_rate(task.base_acceleration, time),
-                    gyro,
-                    relative,
-                    angle,
-                    current,
-                    _drive_torque(bench, task, command, angle, current),
-                    pointing,
-                    compensation,
-                    friction,
-                    load_rate,
-                ]
+    def execute_together(
+        self, trials: Sequence[Trial], recorders: Sequence[Recorder], stops: Sequence[StopFlag]
+    ) -> Iterator[tuple[int, Ending]]:
+        """As `execute` of each of these trials of one structure, side by side."""
+        from campaign.physics.simulate import samples_at_a_time, simulate_together
+
+        lanes = [self._lane(trial) for trial in trials]
+        halves: Iterable[tuple[Any, Sequence[Array | None]]] = repeat((None, [None] * len(lanes)))
+        stretch = None
+        if self._options.check_step:
+            half = [
+                self._lane(trial, lane.grid.step / 2.0)
+                for trial, lane in zip(trials, lanes, strict=True)
+            ]
+            stretch = samples_at_a_time(half[0].grid, alone=len(half) == 1)
+            halves = self.timing.each(Work.ENGINE, simulate_together(half, stretch))
+        going = {
+            place: self._begun(lane, recorder, stop)
+            for place, (lane, recorder, stop) in enumerate(
+                zip(lanes, recorders, stops, strict=True)
             )
-            # By the gyro: the angle sensor, differenced, is too coarse for slow motion.
-            reached = _first_beyond(gyro - block[1], task.stop_rate)
-            end, ending = _first_violation(watch, time[:reached], block[:, :reached])
-            recorder.append(time[:end], block[:, :end])
-            if ending is not None:
-                late = ending.outcome is Outcome.LIMIT  # its own sample is the last one kept
-                recorder.event(Event(float(time[end - 1 if late else end]), ending.reason))
-                return ending
-            if reached < len(time):
-                recorder.event(
-                    Event(float(time[reached]), "the rate that ends the trial was reached")
-                )
-                return Ending(Outcome.COMPLETED)
-            if stop():
-                return Ending(Outcome.INTERRUPTED, "stopped by the operator")
-        return Ending(Outcome.COMPLETED)
+        }
+        whole = self.timing.each(Work.ENGINE, simulate_together(lanes, stretch))
+        for (times, outs), (_, outs_of_half) in zip(whole, halves, strict=False):
+            for place, trial in tuple(going.items()):
+                out = outs[place]
+                ending = trial.take(times[: out.shape[1]], out, outs_of_half[place])
+                if ending is not None:
+                    del going[place]
+                    yield place, ending
+            if not going:
+                return
+
+    def _begun(self, lane: Lane, recorder: Recorder, stop: StopFlag) -> SimulatedTrial:
+        check = StepCheck(lane.grid.step, OUTPUTS) if self._options.check_step else None
+        return SimulatedTrial(lane.bench, lane.task, lane.grid.samples, recorder, stop, check)
 
     def make_safe(self) -> SafeState:
         """A simulation has nothing that moves."""
         return SafeState.CONFIRMED
 
+    def _look_at(self, trial: Trial) -> _Known:
+        known = self._known.get(trial.fingerprint)
+        if known is None:
+            lane = self._lane(trial)
+            cost = TrialCost(lane.grid.step, lane.grid.samples * lane.grid.every, lane.grid.because)
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+                self._groups.clear()
+            structure = lane.structure
+            group = self._groups.setdefault(structure, structure)  # one object for all that have it
+            known = self._known[trial.fingerprint] = _Known(cost, group)
+        return known
 
-def _bench(trial: Trial) -> Bench:
-    return Bench.model_validate(trial.bench, context={"si": True})
+    def _lane(self, trial: Trial, longest_step: float | None = None) -> Lane:
+        from campaign.physics.lanes import Lane
+
+        longest_step = longest_step or self._options.longest_step
+        with self.timing.span(Work.SETTING_UP):
+            return Lane.of(self._bench(trial), trial.task, trial.seed, longest_step)
+
+    def _bench(self, trial: Trial) -> Bench:
+        kept = self._benches.get(id(trial.bench))  # it is kept, and so is its id
+        if kept is None:
+            kept = trial.bench, Bench.model_validate(trial.bench, context={"si": True})
+            if len(self._benches) >= MOST_BENCHES:
+                self._benches.clear()
+            self._benches[id(trial.bench)] = kept
+        return kept[1]
 
 
-def _drive_torque(bench: Bench, task: Task, command: Array, angle: Array, current: Array) -> Array:
-    """What pulls the load (N m): the motor, or the spring that stands in for it."""
-    if task.mode == "spring":
-        return task.spring_stiffness * (command - angle)
-    return current * bench.torque_per_current
-
-
-def _first_beyond(samples: Array, bound: float | None) -> int:
-    """Index of the first sample beyond `bound` either way; all of them when there is none."""
-    if bound is None:
-        return len(samples)
-    beyond = np.abs(samples) > bound
-    return int(np.argmax(beyond)) if beyond.any() else len(samples)
-
-
-def _first_violation(watch: LimitWatch, time: Array, block: Array) -> tuple[int, Ending | None]:
-    """How many samples are good, and why the trial ends there (None: it goes on).
-
-    Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
-    Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
-    """
-    bad = ~np.isfinite(block).all(axis=0)
-    first = int(np.argmax(bad)) if bad.any() else len(time)
-    violation = watch.look(time[:first], block[:, :first])
-    if violation is not None:  # the offending sample is kept: it is the evidence
-        return violation.index + 1, Ending(Outcome.LIMIT, violation.text)
-    if first < len(time):
-        reason = f"the simulation diverged at {time[first]:.4g} s: no finite value"
-        return first, Ending(Outcome.DIVERGED, reason)
-    return len(time), None
+_NAMES = frozenset(channel.name for channel in CHANNELS)
 
 
 def _open(options: Options) -> SimBackend:
@@ -191,4 +188,5 @@ BACKEND = BackendKind(
     open=_open,
     source=Source.SIMULATION,
     several=True,
+    simulates=True,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -11,12 +11,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.backends import backends
-from campaign.backends.interface import Backend
+from campaign.backends.sim import SimBackend, SimOptions
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import residuals, restricted
 from campaign.errors import CampaignError, ProtocolError, UsageError
-from campaign.experiments.interface import Experiment, TestData, bench_of
+from campaign.experiments.interface import (
+    Experiment,
+    TestData,
+    bench_of,
+    with_named_tables,
+)
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test
@@ -71,9 +75,8 @@ class Simulation:
         self._workers = workers
         self._published = restricted(problem.published, problem.targets)
         self._stopped = threading.Event()
-        kind = backends()["sim"]
         step = {"longest_step": problem.options.longest_step}
-        self._backend: Backend = kind.open(kind.options.model_validate(step, context={"si": True}))
+        self._backend = SimBackend(SimOptions.model_validate(step, context={"si": True}))
 
     def check(self) -> Evaluation:
         """What the bench reproduces as it is. Raises UsageError when a cell cannot be found."""
@@ -128,15 +131,14 @@ class Simulation:
             planned = list(self._planned(values))
         except PointError as error:  # the bench does not accept these values together
             return Evaluation({}, (str(error),))
-        flat = [trial for _, trials in planned for trial in trials]
-        if alone and self._workers > 1:
-            done = iter(self._at_once(self._execute, flat))
-        else:
-            done = map(self._execute, flat)
+        batches = list(self._batches([trial for _, trials in planned for trial in trials]))
+        at_once = alone and self._workers > 1
+        ended = (self._at_once if at_once else map)(self._execute, batches)
+        by_number = {item.trial.number: item for batch in ended for item in batch}
         problems: list[str] = []
         evidence = []
         for test, trials in planned:
-            finished = tuple(next(done) for _ in trials)
+            finished = tuple(by_number[trial.number] for trial in trials)
             problems += (
                 f"{item.trial.name} {item.trial.label}: {item.ending.reason}"
                 for item in finished
@@ -159,15 +161,37 @@ class Simulation:
             before += len(trials)
             yield test, trials
 
-    def _execute(self, trial: Trial) -> FinishedTrial:
-        """A trial that fails is a recording like any other."""
-        recorder = MemoryRecorder()
+    def _batches(self, trials: Iterable[Trial]) -> Iterator[tuple[Trial, ...]]:
+        """Trials that are simulated together, as far as there are enough of a kind."""
+        groups: dict[Hashable, list[Trial]] = {}
+        for trial in trials:
+            groups.setdefault(self._group(trial), []).append(trial)
+        fewest, most = self._backend.fewest_together, self._backend.most_together
+        for group in groups.values():
+            size = most if len(group) >= fewest else 1
+            yield from (tuple(group[k : k + size]) for k in range(0, len(group), size))
+
+    def _group(self, trial: Trial) -> Hashable:
+        try:
+            return self._backend.group(trial)
+        except (ArithmeticError, ValueError, CampaignError):
+            return trial.number  # it goes alone, and fails
+
+    def _execute(self, batch: Sequence[Trial]) -> list[FinishedTrial]:
+        """Trials that fail are recordings like any other."""
+        recorders = [MemoryRecorder() for _ in batch]
+        stops = [self._stopped.is_set] * len(batch)
+        endings: dict[int, Ending] = {}
+        failed = Ending(Outcome.FAULT)
         try:
             with np.errstate(all="ignore"):
-                ending = self._backend.execute(trial, recorder, self._stopped.is_set)
+                endings |= self._backend.execute_together(batch, recorders, stops)
         except (ArithmeticError, ValueError, CampaignError) as error:
-            ending = Ending(Outcome.FAULT, f"{type(error).__name__}: {error}")
-        return FinishedTrial(trial, recorder.recording(ending))
+            failed = Ending(Outcome.FAULT, f"{type(error).__name__}: {error}")
+        return [
+            FinishedTrial(trial, recorder.recording(endings.get(place, failed)))
+            for place, (trial, recorder) in enumerate(zip(batch, recorders, strict=True))
+        ]
 
     def _analyse(
         self, test: Test, finished: tuple[FinishedTrial, ...], problems: list[str]
@@ -179,7 +203,7 @@ class Simulation:
         first = finished[0].trial
         data = TestData(name, test.entry.kind, first.options, finished)
         try:
-            findings = experiment.analyse(data).findings
+            findings = experiment.analyse(with_named_tables(data)).findings
         except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
             problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
             findings = ()

@@ -105,12 +105,28 @@ def run(
     clear_stop: ClearStopOption = None,
     sign: SignOption = None,
     allow_large: LargeOption = False,
+    check_step: Annotated[
+        bool,
+        typer.Option(
+            "--check-step",
+            help="Simulate each trial once more at half its step, and say what that changes.",
+        ),
+    ] = False,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Say at the end where the time went.")
+    ] = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
-    from campaign.cli.prepare import Request, short_settings
-    from campaign.cli.run import Remarks, run_protocol
+    from campaign.stopwatch import UNTIMED, Stopwatch, Work
+
+    stopwatch = Stopwatch() if profile else None
+    with (stopwatch or UNTIMED).span(Work.IMPORTING):
+        from campaign.cli.prepare import Request, short_settings
+        from campaign.cli.run import Remarks, run_protocol
+        from campaign.cli.step_check import SETTING
 
     settings = (*(changes or ()), *short_settings(port, source, results))
+    settings += (SETTING,) if check_step else ()
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
     remarks = Remarks(operator, note, tuple(tags or ()))
     raise typer.Exit(
@@ -123,6 +139,7 @@ def run(
             clear_stop=clear_stop,
             remarks=remarks,
             sign=sign,
+            stopwatch=stopwatch,
         )
     )
 
@@ -406,6 +423,14 @@ def kinds(
         list_kinds()
     else:
         show_kind(name)
+
+
+@app.command()
+def warmup() -> None:
+    """Compile the engine now, once per installation, instead of in the first run."""
+    from campaign.cli.warmup import warm_up
+
+    raise typer.Exit(warm_up())
 
 
 @app.command()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
+from campaign.cli.cost import Cost, cost_lines, costs
 from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.prepare import Prepared, Request, lacking, prepare
@@ -41,11 +43,12 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
     backend = prepared.open_backend()  # refuses what it cannot execute; it is not connected
     source = archive_of(backend)
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
+    cost = costs(backend, prepared.plan)
     if as_json:
         tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
-        print_json(tree)
+        print_json({**tree, "cost": {test: asdict(each) for test, each in cost.items()}})
     else:
-        _print(prepared, results, losses)
+        _print(prepared, results, losses, cost)
     code = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     check_limits(prepared.plan)
     check_loops(prepared.plan)
@@ -63,7 +66,12 @@ def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, st
     ]
 
 
-def _print(prepared: Prepared, results: Path, losses: Sequence[Mapping[str, str]]) -> None:
+def _print(
+    prepared: Prepared,
+    results: Path,
+    losses: Sequence[Mapping[str, str]],
+    cost: Mapping[str, Cost],
+) -> None:
     plan = prepared.plan
     if plan.title:
         print_line(plan.title)
@@ -71,7 +79,8 @@ def _print(prepared: Prepared, results: Path, losses: Sequence[Mapping[str, str]
     headings = ("test", "kind", "bench", "trials", "bench time", "closest limits")
     print_table(headings, [_row(test) for test in plan.tests])
     for test in plan.tests:
-        _print_details(plan, test, [loss for loss in losses if loss["test"] == test.name])
+        own = [loss for loss in losses if loss["test"] == test.name]
+        _print_details(plan, test, own, cost.get(test.name))
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
@@ -133,7 +142,9 @@ def _row(test: PlannedTest) -> tuple[str, ...]:
     return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
 
 
-def _print_details(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]]) -> None:
+def _print_details(
+    plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]], cost: Cost | None
+) -> None:
     """How close the test comes to every limit, and what its trials are noted with."""
     trials = [plan.trials[number - 1] for number in test.numbers]
     print_line(f"{test.name}{f': {test.title}' if test.title else ''}")
@@ -160,6 +171,8 @@ def _print_details(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, 
         print_line(
             f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
         )
+    for line in () if cost is None else cost_lines(cost):
+        print_line(f"  {line}")
     notes = Counter(trial.note for trial in trials if trial.note)
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")

@@ -11,12 +11,14 @@ from campaign.archive import RunReader, RunWriter, find_run, open_run
 from campaign.archive.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
+from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, choose_workers, conduct, print_warning
 from campaign.cli.sign import rehearse_signing
+from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.attempt import utc_now
@@ -69,14 +71,16 @@ def resume_run(
     run = open_run(path)
     read = say_damaged(path, run.damaged)
     check_resumable(run)
-    remade = remake(run, port)
-    _check_changes(run, remade.changes, accepted=accept_changes)
-    finished = not_repeated(run)
-    left = [trial for trial in remade.trials if trial.number not in finished]
-    workers = choose_workers(remade.kind, len(left), workers)
-    if sign is not None:
-        rehearse_signing(sign)
-    backend = open_backend(remade.kind, remade.options, left)
+    with compiling_meanwhile(run.header.backend) as compiling:
+        remade = remake(run, port)
+        _check_changes(run, remade.changes, accepted=accept_changes)
+        finished = not_repeated(run)
+        left = [trial for trial in remade.trials if trial.number not in finished]
+        workers = choose_workers(remade.kind, len(left), workers)
+        if sign is not None:
+            rehearse_signing(sign)
+        backend = open_backend(remade.kind, remade.options, left)
+        wait_until_compiled(compiling)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
     allow_motion(remade.kind, left, remade.tests, yes=yes)
 
@@ -104,6 +108,7 @@ def resume_run(
         yes,
         clear_stop,
         finished,
+        checks_step=is_checked(remade.options),
     )
     code = conduct(session, open_archive, report=report, sign=sign)
     return worst_exit_code([code, read])

@@ -8,13 +8,17 @@ from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.cli.ask import allow_motion
+from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_low_margins
 from campaign.cli.prepare import Prepared, Request, prepare
+from campaign.cli.profile import print_profile
 from campaign.cli.session import Session, choose_workers, conduct
 from campaign.cli.sign import rehearse_signing
+from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.protocol import as_tree, check_limits, check_loops
+from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
 
 @dataclass(frozen=True)
@@ -41,20 +45,28 @@ def run_protocol(
     clear_stop: int | None = None,
     remarks: Remarks | None = None,
     sign: Path | None = None,
+    stopwatch: Stopwatch | None = None,
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output.
 
-    With a key to `sign` the run with: that it can sign is known before anything moves.
+    With a key to `sign` the run with: that it can sign is known before anything moves. With a
+    `stopwatch`, what took how long is told at the end.
     """
-    prepared = prepare(request)
-    plan = prepared.plan
-    check_limits(plan)
-    check_loops(plan)
-    print_low_margins(plan)
-    workers = choose_workers(prepared.kind, len(plan.trials), workers)
-    if sign is not None:
-        rehearse_signing(sign)
-    backend = prepared.open_backend()
+    timing = stopwatch or UNTIMED
+    with compiling_meanwhile(request.backend) as compiling:
+        with timing.span(Work.PREPARING):
+            prepared = prepare(request)
+            plan = prepared.plan
+            check_limits(plan)
+            check_loops(plan)
+            print_low_margins(plan)
+            workers = choose_workers(prepared.kind, len(plan.trials), workers)
+            if sign is not None:
+                rehearse_signing(sign)
+            backend = prepared.open_backend()
+        with timing.span(Work.COMPILING):
+            wait_until_compiled(compiling)
+        timing.add(Work.COMPILING, compiling.processor if compiling else 0.0)
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
     with reserved_name(results, prepared.path.stem, began) as lock:
@@ -64,9 +76,21 @@ def run_protocol(
             return RunWriter.create(results, header, plan.trials, lock)
 
         session = Session(
-            prepared.kind, backend, plan.trials, plan.policy, workers, lock.name, yes, clear_stop
+            prepared.kind,
+            backend,
+            plan.trials,
+            plan.policy,
+            workers,
+            lock.name,
+            yes,
+            clear_stop,
+            checks_step=is_checked(prepared.options),
+            timing=timing,
         )
-        return conduct(session, open_archive, report=report, sign=sign)
+        code = conduct(session, open_archive, report=report, sign=sign)
+    if stopwatch is not None:
+        print_profile(stopwatch, workers)
+    return code
 
 
 def run_header(

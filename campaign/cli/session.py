@@ -12,13 +12,14 @@ from pathlib import Path
 
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.header import SEALED
-from campaign.backends.interface import Backend, BackendKind, StoppedOutside
+from campaign.backends.interface import Backend, BackendKind, StoppedOutside, Timed
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import check_channels
 from campaign.cli.sign import sign_new_run
+from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.naming import how_to_go_on, reference
@@ -36,6 +37,7 @@ from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
+from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Outcome, Trial
 
 
@@ -49,7 +51,9 @@ class Session:
         run: the name that the run has or will have.
         yes: whether nobody is asked anything.
         clear_stop: the count of a stop of the bench from outside that a person has seen.
+        checks_step: whether it is told afterwards what half the step has changed.
         repeats: the run whose trial is repeated; a backend that serves a run says so itself.
+        timing: told what takes how long.
     """
 
     kind: BackendKind
@@ -61,7 +65,9 @@ class Session:
     yes: bool = False
     clear_stop: int | None = None
     finished: Mapping[int, Outcome] = field(default_factory=dict)
+    checks_step: bool = False
     repeats: RunReader | None = None
+    timing: Timing = UNTIMED
 
     @property
     def source(self) -> RunReader | None:
@@ -91,10 +97,12 @@ def conduct(
     codes = [code]
     say_outcome(outcome, time.monotonic() - began)
     try:
+        if session.checks_step:
+            say_step_check(outcome.archive)
         if sign is not None:
             codes.append(sign_new_run(outcome.archive, sign))
         if report:
-            with unwinding():
+            with unwinding(), session.timing.span(Work.REPORT):
                 codes.append(_report(outcome))
     finally:
         print_line(str(outcome.archive))
@@ -112,6 +120,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     if isinstance(session.backend, StoppedOutside):
         session.backend.introduce(session.run)
+    if isinstance(session.backend, Timed):
+        session.backend.timing = session.timing
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
@@ -123,6 +133,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
                 check_channels(session.kind, backend, session.left)
                 cleared = clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
+                writer.timing = session.timing
                 if cleared:
                     writer.decision("stop cleared", cleared)
                 if source:
@@ -171,7 +182,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             stop=stop,
             policy=session.policy,
             attendance=attendance_of(session.kind, display, yes=session.yes),
-            supervision=Supervision(session.kind.source, session.kind.live),
+            supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
             finished=session.finished,
         )
 

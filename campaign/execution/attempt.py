@@ -1,18 +1,19 @@
-"""Executing one trial once, in a worker thread, into its own file of the archive."""
+"""Executing trials once, in a worker thread, each into its own file of the archive."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from campaign.backends.interface import Backend
+from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
-from campaign.execution.writer import PlanWriter
+from campaign.execution.writer import PlanWriter, TrialWriter
+from campaign.stopwatch import Work
 from campaign.trial import Ending, Outcome, SafeState, Trial
 
 
@@ -32,38 +33,106 @@ class Executed:
     unwatched: tuple[str, ...] = ()
 
 
-def execute_once(
-    trial: Trial,
-    backend: Backend,
-    writer: PlanWriter,
-    halted: Callable[[], bool],
-    supervision: Supervision,
-) -> Executed:
+@dataclass(frozen=True)
+class Conditions:
+    """What is the same for every attempt of a run.
+
+    Attributes:
+        halted: whether the run is to end.
+    """
+
+    backend: Backend
+    writer: PlanWriter
+    halted: Callable[[], bool]
+    supervision: Supervision
+
+
+def execute_once(trial: Trial, conditions: Conditions) -> Executed:
     """One attempt at `trial`, archived however it ends. Raises only what the archive raises."""
-    started = utc_now()
-    file = writer.begin(trial)
-    stop = TrialStop(halted)
-    recorder = SupervisingRecorder(trial, file, stop, supervision)
-    attempt = _Attempt(trial, backend, recorder, stop)
-    if supervision.live:
-        executed = _attended(attempt, supervision)
-    else:
+    supervision = conditions.supervision
+    with supervision.timing.span(Work.SAMPLES):  # less what is told to be something else
+        attempt = _Attempt.begin(trial, conditions)
+        if supervision.live:
+            return attempt.archive(_attended(attempt, supervision))
         attempt.run()
-        executed = attempt.concluded()
-    file.finish(executed.ending, started, utc_now())
-    return replace(executed, unwatched=recorder.unwatched)
+        return attempt.archive(attempt.concluded())
+
+
+def execute_together(
+    trials: Sequence[Trial],
+    conditions: Conditions,
+    tell: Callable[[Trial, Executed], None],
+) -> None:
+    """One attempt at each of `trials`, together; `tell` is told of each once it is archived.
+
+    For backends that move nothing and are `ExecutesTogether`. Raises only what the archive raises.
+    """
+    backend = conditions.backend
+    if not isinstance(backend, ExecutesTogether):
+        raise TypeError("this backend executes one trial at a time")
+    with conditions.supervision.timing.span(Work.SAMPLES):
+        _execute_together(trials, backend, conditions, tell)
+
+
+def _execute_together(
+    trials: Sequence[Trial],
+    backend: ExecutesTogether,
+    conditions: Conditions,
+    tell: Callable[[Trial, Executed], None],
+) -> None:
+    attempts = dict(enumerate(_Attempt.begin(trial, conditions) for trial in trials))
+
+    def end(place: int, executed: Executed) -> None:
+        attempt = attempts.pop(place)
+        tell(attempt.trial, attempt.archive(attempt.concluding(executed)))
+
+    recorders = [attempt.recorder for attempt in attempts.values()]
+    stops = [attempt.stop for attempt in attempts.values()]
+    untold = Ending(Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED)
+    left = Executed(untold, gave_up=True)
+    try:
+        endings = iter(backend.execute_together(trials, recorders, stops))
+    except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
+        endings, left = iter(()), _failed(error)
+    while attempts:
+        try:
+            place, ending = next(endings)
+            if place not in attempts:
+                raise LookupError(f"no trial is at place {place!r}, or it has ended")
+        except StopIteration:
+            break
+        except Exception as error:  # noqa: BLE001 - likewise
+            left = _failed(error)
+            break
+        end(place, Executed(ending))
+    for place in tuple(attempts):
+        end(place, left)
 
 
 class _Attempt:
-    """One call of a backend's `execute`, and what came of it."""
+    """One trial that is being executed, and what came of it."""
 
     def __init__(
-        self, trial: Trial, backend: Backend, recorder: SupervisingRecorder, stop: TrialStop
+        self,
+        trial: Trial,
+        backend: Backend,
+        file: TrialWriter,
+        recorder: SupervisingRecorder,
+        stop: TrialStop,
     ) -> None:
         self.trial, self.backend, self.recorder, self.stop = trial, backend, recorder, stop
         self.over = threading.Event()
+        self._file = file
+        self._started = utc_now()
         self._executed: Executed | None = None
         self._error: BaseException | None = None
+
+    @classmethod
+    def begin(cls, trial: Trial, conditions: Conditions) -> _Attempt:
+        """Open the trial's file."""
+        file, stop = conditions.writer.begin(trial), TrialStop(conditions.halted)
+        recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
+        return cls(trial, conditions.backend, file, recorder, stop)
 
     def run(self) -> None:
         """Execute; raises nothing."""
@@ -80,8 +149,17 @@ class _Attempt:
             raise self._error
         if self._executed is None:
             raise RuntimeError("not over yet")
-        ending = self.recorder.conclude(self._executed.ending, forced=forced)
-        return replace(self._executed, ending=ending)
+        return self.concluding(self._executed, forced=forced)
+
+    def concluding(self, executed: Executed, *, forced: bool = False) -> Executed:
+        """How it ended as the recorder has seen it, once the backend has said so."""
+        ending = self.recorder.conclude(executed.ending, forced=forced)
+        return replace(executed, ending=ending)
+
+    def archive(self, executed: Executed) -> Executed:
+        """Keep the trial. Raises what the archive raises."""
+        self._file.finish(executed.ending, self._started, utc_now())
+        return replace(executed, unwatched=self.recorder.unwatched)
 
     def abandoned(self, safe_state: SafeState) -> Executed:
         """It did not come back, although the bench was made safe over its head."""
@@ -91,15 +169,18 @@ class _Attempt:
     def _execute(self) -> Executed:
         try:
             return Executed(self.backend.execute(self.trial, self.recorder, self.stop))
-        except BackendError as error:
-            ending = Ending(Outcome.FAULT, str(error), SafeState.NOT_CONFIRMED)
-            return Executed(ending, gave_up=True)
-        except CampaignError:
-            raise  # from the recorder: the archive cannot be written
         except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
-            reason = f"internal error: {describe(error)}"
-            ending = Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED)
-            return Executed(ending, bug=error, gave_up=True)
+            return _failed(error)
+
+
+def _failed(error: Exception) -> Executed:
+    """A backend that cannot go on, or has a bug. Raises what the recorder raised."""
+    if isinstance(error, CampaignError) and not isinstance(error, BackendError):
+        raise error  # from the recorder: the archive cannot be written
+    bug = None if isinstance(error, BackendError) else error
+    reason = str(error) if bug is None else f"internal error: {describe(error)}"
+    ending = Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED)
+    return Executed(ending, bug=bug, gave_up=True)
 
 
 def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,6 +55,11 @@ class Rests:
     def worked(self, seconds: float) -> None:
         """The bench was in use for so long."""
         self._since += seconds
+
+    @property
+    def left(self) -> float:
+        """Bench time (s) until the next one."""
+        return math.inf if self._rest is None else self._rest.every - self._since
 
     @property
     def due(self) -> Rest | None:

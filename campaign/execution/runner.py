@@ -26,6 +26,7 @@ from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
+from campaign.stopwatch import Work
 from campaign.trial import Outcome, PanicStop, Trial
 
 SIMULATED = Supervision()
@@ -68,11 +69,24 @@ def run_plan(
     waiting = [trial for trial in trials if trial.number not in finished]
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(
-        waiting, backend, writer, ledger, ended, stop, policy or Policy(), attendance, supervision
+        waiting,
+        backend,
+        writer,
+        workers,
+        ledger,
+        ended,
+        stop,
+        policy or Policy(),
+        attendance,
+        supervision,
     )
     with unsafe_first(ended):
-        with safe_afterwards(backend, ended), _threads(workers) as executor:
-            sequence.execute(executor, workers)
+        with (
+            supervision.timing.span(Work.WAITING),
+            safe_afterwards(backend, ended),
+            _threads(workers) as executor,
+        ):
+            sequence.execute(executor)
         sequence.outside.look()  # it may have come after the last trial
         outside = sequence.outside.stop
         status, reason = _verdict(ledger, ended, stop, outside)

@@ -6,13 +6,14 @@ own. Each decision is in the journal before it is acted upon.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
+from queue import Empty, SimpleQueue
 
 from campaign.backends.interface import Backend
-from campaign.execution.attempt import Executed, execute_once
+from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
 from campaign.execution.attendance import Attendance, SetUp
+from campaign.execution.batches import Batches
 from campaign.execution.decisions import Responses, Rests
 from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
@@ -25,6 +26,7 @@ from campaign.trial import Ending, Outcome, PanicStop, SafeState, Trial
 
 LOOK = 1.0
 """s after which a display is told how far the running trials are."""
+_Told = tuple[Trial, Executed]
 
 
 class TrialSequence:
@@ -39,6 +41,7 @@ class TrialSequence:
         trials: Sequence[Trial],
         backend: Backend,
         writer: PlanWriter,
+        workers: int,
         ledger: Ledger,
         ended: Ended,
         stop: StopSwitch,
@@ -46,8 +49,11 @@ class TrialSequence:
         attendance: Attendance,
         supervision: Supervision,
     ) -> None:
-        self._queue = deque(trials)
-        self._running: dict[Future[Executed], Trial] = {}
+        self._batches = Batches(trials, backend, workers, live=supervision.live)
+        self._workers = workers
+        self._running: set[Future[None]] = set()
+        self._under_way: dict[int, Trial] = {}
+        self._news: SimpleQueue[_Told | Future[None]] = SimpleQueue()  # trials that ended, batches
         self._backend = backend
         self._writer = writer
         self._ledger = ledger
@@ -58,34 +64,53 @@ class TrialSequence:
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
-        self._supervision = supervision
+        self._conditions = Conditions(backend, writer, self._halted, supervision)
         self._unwatched: set[str] = set()
 
-    def execute(self, executor: Executor, workers: int) -> None:
-        """Keep `workers` trials going. Raises what the archive raises, and KeyboardInterrupt."""
+    def execute(self, executor: Executor) -> None:
+        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt.
+
+        `executor` executes batches of trials; it may have more or fewer workers than were said.
+        """
         try:
             while True:
-                while len(self._running) < workers and (trial := self._next()) is not None:
-                    self._ledger.begin(trial)
-                    future = executor.submit(
-                        execute_once,
-                        trial,
-                        self._backend,
-                        self._writer,
-                        self._halted,
-                        self._supervision,
-                    )
-                    self._running[future] = trial
+                while len(self._running) < self._workers and (batch := self._next()):
+                    for trial in batch:
+                        self._ledger.begin(trial)
+                        self._under_way[trial.number] = trial
+                    future = executor.submit(self._execute, batch)
+                    self._running.add(future)
+                    future.add_done_callback(self._news.put)
                 if not self._running:
                     break
-                finished, _ = wait(self._running, LOOK, return_when=FIRST_COMPLETED)
-                if not finished:
-                    self._ledger.look()
-                for future in sorted(finished, key=lambda future: self._running[future].number):
-                    self._settle(self._running.pop(future), future.result())
+                self._hear()
         except BaseException:
             self._fail("the run cannot go on")  # lets the other trials end
             raise
+
+    def _execute(self, batch: Sequence[Trial]) -> None:
+        """In a worker: what becomes of each trial is told as soon as it is archived."""
+        if len(batch) == 1:
+            self._news.put((batch[0], execute_once(batch[0], self._conditions)))
+        else:
+            execute_together(batch, self._conditions, lambda *told: self._news.put(told))
+
+    def _hear(self) -> None:
+        """Wait for news, and act on all there is."""
+        try:
+            news = [self._news.get(timeout=LOOK)]
+        except Empty:
+            self._ledger.look()
+            return
+        while not self._news.empty():
+            news.append(self._news.get())
+        told = [each for each in news if isinstance(each, tuple)]
+        for trial, executed in sorted(told, key=lambda each: each[0].number):
+            self._settle(trial, executed)
+        for each in news:
+            if isinstance(each, Future):
+                self._running.remove(each)
+                each.result()  # raises what it raised
 
     def _halted(self) -> bool:
         return self._stop() or bool(self._ended.fault)
@@ -93,19 +118,22 @@ class TrialSequence:
     def _fail(self, reason: str) -> None:
         self._ended.fault = self._ended.fault or reason
 
-    def _next(self) -> Trial | None:
-        """The trial to begin now; None when there is none, or not before others have ended."""
-        if not self._queue or self._is_over():
-            return None
-        trial = self._queue[0]
+    def _next(self) -> Sequence[Trial]:
+        """The trials to begin now; empty when there are none, or not before others have ended."""
+        trial = self._batches.first
+        if trial is None or self._is_over():
+            return ()
         if self._rests.due is not None or self._set_up.is_due(trial):
             if self._running:
-                return None  # neither a rest nor a person's hands go with a trial that moves
+                return ()  # neither a rest nor a person's hands go with a trial that moves
             self._rest()
             due = not self._is_over() and self._set_up.is_due(trial)
             if due and not self._set_up.confirm(trial, self.outside):
                 self._stop.request("the operator")
-        return None if self._is_over() else self._queue.popleft()
+        if self._is_over():
+            return ()
+        under_way = sum(trial.task.duration for trial in self._under_way.values())
+        return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
 
     def _is_over(self) -> bool:
         """As `_halted`, between trials, when the bench can be asked as well."""
@@ -128,6 +156,7 @@ class TrialSequence:
     def _settle(self, trial: Trial, executed: Executed) -> None:
         """What follows from a trial's end: is the bench safe, is it tried again, does it go on."""
         ending = executed.ending
+        self._under_way.pop(trial.number, None)
         self._rests.worked(trial.task.duration)
         self._say_unwatched(trial, executed)
         if executed.gave_up:
@@ -172,5 +201,5 @@ class TrialSequence:
         pause = f" in {choice.pause:g} s" if choice.pause else ""
         self._ledger.remark(f"{trial.name} is executed again{pause}")
         self._attendance.wait(choice.pause, self.outside)
-        self._queue.appendleft(trial)  # when the run is stopped, it is left for who resumes it
+        self._batches.again(trial)  # when the run is stopped, it is left for who resumes it
         return False

@@ -13,6 +13,7 @@ from campaign.testing.archiving import archived_as_recorded
 from campaign.testing.outside import keeps_a_stop_from_outside
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.supervised import Disturb, got_through, supervised, with_narrow_limit
+from campaign.testing.together import executes_together_what_it_does_alone
 from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
 from campaign.trial import (
     Array,
@@ -58,6 +59,7 @@ def backend_checks() -> dict[str, Check]:
         is_made_safe_while_it_hangs,
         keeps_a_stop_from_outside,
         executes_twice,
+        executes_together_what_it_does_alone,
         lets_go_when_left,
         lets_exceptions_pass,
         records_what_can_be_archived,

@@ -11,7 +11,7 @@ import numpy as np
 
 from campaign.archive import RunStatus
 from campaign.backends.interface import Backend, StopFlag
-from campaign.execution.attempt import execute_once
+from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision
 from campaign.physics.limit_watch import WATCHED
 from campaign.testing.under_test import BackendUnderTest, CheckFailedError, require
@@ -63,13 +63,9 @@ def supervised(
     with under_test.open() as backend:
         between = _Between(backend, under_test.possible, disturb)
         archive = _Memory()
-        execute_once(
-            watched or under_test.possible,
-            between,
-            archive,
-            lambda: False,
-            Supervision(live=under_test.live),
-        )
+        supervision = Supervision(live=under_test.live)
+        conditions = Conditions(between, archive, lambda: False, supervision)
+        execute_once(watched or under_test.possible, conditions)
     ending, file = archive.ending, archive.file
     if ending is None:
         raise CheckFailedError("the trial was not archived")

@@ -230,3 +230,44 @@ def test_every_check_can_fail() -> None:
 def test_the_kit_needs_no_test_framework() -> None:
     code = "import sys, campaign.testing; sys.exit('pytest' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+class Careless(SimBackend):
+    """Executes together, with a mistake."""
+
+    mistake = ""
+
+    def group(self, trial: Any) -> Any:
+        return trial.number if self.mistake == "group" else super().group(trial)
+
+    def execute_together(self, trials: Any, recorders: Any, stops: Any) -> Any:
+        if len(trials) > 1 and self.mistake == "stops":
+            stops = [stops[1]] * len(stops)
+        if len(trials) > 1 and self.mistake == "samples":
+            trials = [t.model_copy(update={"seed": t.seed + t.number}) for t in trials]
+            trials = [_heavier(t) for t in trials]
+        for place, ending in super().execute_together(trials, recorders, stops):
+            if not (len(trials) > 1 and self.mistake == "endings" and place == 2):
+                yield place, ending
+
+
+def _heavier(trial: Any) -> Any:
+    axis = trial.bench["axis"]
+    bench = {**trial.bench, "axis": {**axis, "inertia": axis["inertia"] * (1.0 + 1e-12)}}
+    return trial.model_copy(update={"bench": bench})
+
+
+@pytest.mark.parametrize(
+    ("mistake", "said"),
+    [
+        ("group", "differ in their number only"),
+        ("stops", "beside a trial that was stopped, another one ended as interrupted"),
+        ("samples", "not those of the trial alone"),
+        ("endings", r"places of endings \[0, 1, 3, 4,"),
+    ],
+)
+def test_mistakes_of_a_backend_that_executes_together_are_found(mistake: str, said: str) -> None:
+    careless = type("Careless", (Careless,), {"mistake": mistake})
+    broken = replace(sim(), open=lambda: careless(SimOptions()))
+    with pytest.raises(CheckFailedError, match=said):
+        CHECKS["executes_together_what_it_does_alone"](broken)

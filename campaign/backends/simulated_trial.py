@@ -1,0 +1,157 @@
+"""One simulated trial: its outputs made channels, watched, and handed to its recorder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.backends.interface import StopFlag
+from campaign.backends.step_check import StepCheck
+from campaign.channels import (
+    BASE_RATE,
+    COMMAND,
+    COMPENSATION_TORQUE,
+    DRIVE_TORQUE,
+    FRICTION_TORQUE,
+    GYRO_RATE,
+    LOAD_RATE,
+    MOTOR_CURRENT,
+    POINTING_ERROR,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+    info,
+)
+from campaign.physics.base_motion import base_rate
+from campaign.physics.bench import Bench
+from campaign.physics.limit_watch import LimitWatch
+from campaign.trial import Array, Ending, Event, Outcome, Recorder, Task
+
+CHANNELS = tuple(
+    info(name)
+    for name in (
+        COMMAND,
+        BASE_RATE,
+        GYRO_RATE,
+        RELATIVE_RATE,
+        RELATIVE_ANGLE,
+        MOTOR_CURRENT,
+        DRIVE_TORQUE,
+        POINTING_ERROR,
+        COMPENSATION_TORQUE,
+        FRICTION_TORQUE,
+        LOAD_RATE,
+    )
+)
+"""In the order of a block; what the command is depends on the task."""
+
+COMMANDS = {mode: info(COMMAND, mode) for mode in ("rate", "torque", "prescribed", "spring")}
+"""What the command channel holds, by the mode of the task."""
+
+OUTPUTS = (
+    GYRO_RATE,
+    RELATIVE_RATE,
+    RELATIVE_ANGLE,
+    MOTOR_CURRENT,
+    POINTING_ERROR,
+    COMPENSATION_TORQUE,
+    FRICTION_TORQUE,
+    LOAD_RATE,
+)
+"""The channels that the engine's outputs are, in the order of its rows."""
+
+
+class SimulatedTrial:
+    """Takes the outputs of the engine until the trial ends."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        task: Task,
+        samples: int,
+        recorder: Recorder,
+        stop: StopFlag,
+        check: StepCheck | None = None,
+    ) -> None:
+        """`samples`: how many there are when nothing ends the trial before."""
+        self._bench = bench
+        self._task = task
+        self._left = samples
+        self._check = check
+        self._recorder = recorder
+        self._stop = stop
+        names = [channel.name for channel in CHANNELS]
+        self._watch = LimitWatch(bench.limits, task.sample_rate, names)
+        recorder.start((COMMANDS[task.mode], *CHANNELS[1:]))
+
+    def take(self, time: Array, out: Array, half: Array | None = None) -> Ending | None:
+        """The next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); None: it goes on.
+
+        `half`: the same outputs at half the step, where that is checked.
+        """
+        ending = self._take(time, out, half)
+        if ending is None or self._check is None:
+            return ending
+        return replace(ending, telemetry=self._check.telemetry())
+
+    def _take(self, time: Array, out: Array, half: Array | None) -> Ending | None:
+        block = self._block(time, out)
+        # By the gyro: the angle sensor, differenced, is too coarse for slow motion.
+        reached = _first_beyond(block[2] - block[1], self._task.stop_rate)
+        end, ending = _first_violation(self._watch, time[:reached], block[:, :reached])
+        self._recorder.append(time[:end], block[:, :end])
+        if self._check is not None and half is not None:
+            self._check.add(out[:, :end], half[:, :end])
+        self._left -= len(time)
+        if ending is not None:
+            late = ending.outcome is Outcome.LIMIT  # its own sample is the last one kept
+            self._recorder.event(Event(float(time[end - 1 if late else end]), ending.reason))
+            return ending
+        if reached < len(time):
+            self._recorder.event(
+                Event(float(time[reached]), "the rate that ends the trial was reached")
+            )
+            return Ending(Outcome.COMPLETED)
+        if self._stop():
+            return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+        return None if self._left > 0 else Ending(Outcome.COMPLETED)
+
+    def _block(self, time: Array, out: Array) -> Array:
+        """All channels, shape (11, n)."""
+        bench, task = self._bench, self._task
+        block = np.empty((len(CHANNELS), len(time)))
+        gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
+        block[0] = task.command.sample(time)
+        block[1] = base_rate(task.base_acceleration, time)
+        block[2], block[3], block[4], block[5] = gyro, relative, angle, current
+        if task.mode == "spring":  # it pulls the load in place of the motor
+            block[6] = task.spring_stiffness * (block[0] - angle)
+        else:
+            block[6] = current * bench.torque_per_current
+        block[7], block[8], block[9], block[10] = pointing, compensation, friction, load_rate
+        return block
+
+
+def _first_beyond(samples: Array, bound: float | None) -> int:
+    """Index of the first sample beyond `bound` either way; all of them when there is none."""
+    if bound is None:
+        return len(samples)
+    beyond = np.abs(samples) > bound
+    return int(np.argmax(beyond)) if beyond.any() else len(samples)
+
+
+def _first_violation(watch: LimitWatch, time: Array, block: Array) -> tuple[int, Ending | None]:
+    """How many samples are good, and why the trial ends there (None: it goes on).
+
+    Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
+    Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
+    """
+    bad = ~np.isfinite(block).all(axis=0)
+    first = int(np.argmax(bad)) if bad.any() else len(time)
+    violation = watch.look(time[:first], block[:, :first])
+    if violation is not None:  # the offending sample is kept: it is the evidence
+        return violation.index + 1, Ending(Outcome.LIMIT, violation.text)
+    if first < len(time):
+        reason = f"the simulation diverged at {time[first]:.4g} s: no finite value"
+        return first, Ending(Outcome.DIVERGED, reason)
+    return len(time), None

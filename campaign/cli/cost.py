@@ -1,0 +1,77 @@
+"""What the trials of a plan cost a backend that computes their samples: for `campaign plan`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass
+
+from campaign.backends.interface import Backend, ExecutesTogether, KnowsCost
+from campaign.protocol import Plan
+
+MILLISECOND = 1e-3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of the trials of one test.
+
+    Attributes:
+        steps: of the integration, in all.
+        shortest, longest: step (s).
+        because: what the shortest is needed for; empty when it is as long as steps get.
+        of_milliseconds: steps per millisecond of bench time, on average.
+        alone: trials that are executed one by one, because too few of the plan are like them.
+    """
+
+    steps: int
+    shortest: float
+    longest: float
+    because: str
+    of_milliseconds: float
+    alone: int
+
+
+def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
+    """By test; empty for a backend that does not compute."""
+    if not isinstance(backend, KnowsCost):
+        return {}
+    alone = _alone(backend, plan)
+    found = {}
+    for test in plan.tests:
+        each = [backend.cost(plan.trials[number - 1]) for number in test.numbers]
+        shortest = min(each, key=lambda cost: cost.step)
+        steps = sum(cost.steps for cost in each)
+        found[test.name] = Cost(
+            steps=steps,
+            shortest=shortest.step,
+            longest=max(cost.step for cost in each),
+            because=shortest.because,
+            of_milliseconds=MILLISECOND * steps / sum(cost.steps * cost.step for cost in each),
+            alone=sum(number in alone for number in test.numbers),
+        )
+    return found
+
+
+def _alone(backend: Backend, plan: Plan) -> frozenset[int]:
+    """Numbers of the trials that have too few companions."""
+    if not isinstance(backend, ExecutesTogether):
+        return frozenset()
+    groups: dict[int, Hashable] = {trial.number: backend.group(trial) for trial in plan.trials}
+    count = Counter(groups.values())
+    few = backend.fewest_together
+    return frozenset(number for number, group in groups.items() if count[group] < few)
+
+
+def cost_lines(cost: Cost) -> Iterator[str]:
+    """For people: the step, why it is what it is, and what cannot be done together."""
+    step = f"{1e3 * cost.shortest:.4g}"
+    if cost.longest != cost.shortest:
+        step += f" to {1e3 * cost.longest:.4g}"
+    line = f"{cost.steps / 1e6:.3g} million steps of {step} ms"
+    if cost.because:
+        line += f", {cost.of_milliseconds:.2g} times those of 1 ms: {cost.because}"
+    yield line
+    if cost.alone:
+        which = "it is" if cost.alone == 1 else f"{cost.alone} of the trials are"
+        yield f"{which} simulated alone: too few of the plan have the same structure"

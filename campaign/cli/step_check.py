@@ -1,0 +1,80 @@
+"""`campaign run --check-step`: what simulating each trial at half its step has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import JsonValue
+
+from campaign.archive import open_run
+from campaign.backends.step_check import CHANGE
+from campaign.cli.output import print_note
+from campaign.options import Options
+from campaign.trial import Outcome
+
+TOLERANCE = 1e-3
+"""Of a channel's RMS: what steps are chosen for."""
+SHOWN = 3
+"""trials beyond it that are named."""
+SETTING = "backend.check_step=true"
+"""What the option is short for."""
+
+
+class Change(NamedTuple):
+    """The largest change of a trial's channels; `share` of the channel's RMS, None if undefined."""
+
+    share: float | None
+    channel: str
+    trial: str
+
+    def __str__(self) -> str:
+        share = "no finite value" if self.share is None else f"{self.share:.2g} of its RMS"
+        return f"{self.channel} in {self.trial} ({share})"
+
+
+def is_checked(options: Options) -> bool:
+    """Whether a backend with these options checks its steps."""
+    return bool(getattr(options, "check_step", False))
+
+
+def say_step_check(archive: Path) -> None:
+    """What was found, and a warning for what is beyond the tolerance."""
+    found = _changes(archive)
+    if not found:
+        print_note("step check: no trial completed")
+        return
+    beyond = [each for each in found if each.share is None or each.share > TOLERANCE]
+    if not beyond:
+        print_note(f"step check: half the step changes no channel by more than {found[0]}")
+        return
+    named = "; ".join(str(each) for each in beyond[:SHOWN])
+    more = f"; and {len(beyond) - SHOWN} more" if len(beyond) > SHOWN else ""
+    print_note(
+        f"step check: half the step changes {len(beyond)} of {len(found)} trials by more than "
+        f"{TOLERANCE:g} of a channel's RMS: {named}{more}; steps: --set backend.longest_step=...",
+        "yellow",
+    )
+
+
+def _changes(archive: Path) -> Sequence[Change]:
+    """Of each completed trial, the largest first."""
+    found = []
+    for trial in open_run(archive).trials:
+        told = trial.ending.telemetry.get(CHANGE)
+        if trial.ending.outcome is Outcome.COMPLETED and isinstance(told, dict) and told:
+            found.append(_largest(told, trial.trial.name))
+    return sorted(found, key=_size, reverse=True)
+
+
+def _largest(told: Mapping[str, JsonValue], trial: str) -> Change:
+    changes = (
+        Change(share if isinstance(share, int | float) else None, channel, trial)
+        for channel, share in told.items()
+    )
+    return max(changes, key=_size)
+
+
+def _size(change: Change) -> float:
+    return float("inf") if change.share is None else change.share
