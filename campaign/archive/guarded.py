@@ -261,13 +261,9 @@ def own_id(parent: h5py.Group, name: str) -> Any:
     raw = name.encode()
     if "/" in name or name == ".":  # on a path, only the last link would be looked at
         raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
-    try:
-        link = parent.id.links.get_info(raw) if raw else None
-    except KeyError:
-        link = None
-    if link is None:
+    if not raw or raw not in parent.id:
         raise ArchiveError(f"{_place(parent, name)}: is missing")
-    if link.type != h5py.h5l.TYPE_HARD:
+    if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
         raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
     return h5o.open(parent.id, raw)
 

@@ -40,7 +40,8 @@ Samples have theirs in their trial's record."""
 
 SAMPLE = np.dtype("<f8")
 _LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
-_TRIED = 4096  # samples on which both ways of storing a series are tried
+_TRIED = 4096  # samples on which both ways of storing a series are tried ...
+_DIFFER = 1024  # ... unless so many of them all differ, as those of no converter do
 _COMPACT = 32_000  # bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes
 _STRING = h5py.string_dtype()
 _TEXT = h5t.py_create(_STRING, logical=True)
@@ -324,7 +325,8 @@ def _shuffling_helps(samples: Array) -> bool:
 
     They are, but for those of a converter: few values, each of which comes again and again whole.
     """
-    if len(np.unique(samples)) == len(samples):
+    told = samples[:_DIFFER]
+    if len(np.unique(told)) == len(told):
         return True
     return len(pack(samples, shuffled=True)) <= len(pack(samples, shuffled=False))
 
