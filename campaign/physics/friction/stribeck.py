@@ -135,12 +135,12 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     v0, v1, smoothing = motion.rate_start, motion.rate_end, parameters[9]
     v = 0.5 * (v0 + v1)
     size = _curve(parameters, where(v >= 0.0, 1.0, -1.0), abs(v))
-    smooth = size * tanh(v / (smoothing if smoothing > 0.0 else 1.0))
+    smooth = size * tanh(v / where(smoothing > 0.0, smoothing, 1.0))
     # The sign may change inside the step: its mean over the step, not a whole step of either.
     path = abs(v0) + abs(v1)
-    sign = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
-    sign = (v0 + v1) / (path if path > 0.0 else 1.0) if v0 * v1 < 0.0 else sign
-    return (smooth if smoothing > 0.0 else size * sign) + parameters[8] * abs(v), 0.0
+    sign = where(v > 0.0, 1.0, where(v < 0.0, -1.0, 0.0))
+    sign = where(v0 * v1 < 0.0, (v0 + v1) / where(path > 0.0, path, 1.0), sign)
+    return where(smoothing > 0.0, smooth, size * sign) + parameters[8] * abs(v), 0.0
 
 
 def _sliding(parameters: Any, direction: float, speed: float) -> float:
