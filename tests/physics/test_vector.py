@@ -169,10 +169,15 @@ def signs(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 def ordered(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     v, end = motion.rate_mean, motion.rate_end
-    return where((v > 0.0) > (end > 0.0), parameters[0], 2.0 * parameters[0]), abs(v > 0.0) + 0.0
+    return where((v > 0.0) > (end > 0.0), parameters[0], 2.0 * parameters[0]), 0.0
 
 
-@pytest.mark.parametrize("step", [signs, ordered])
+def counted(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    v, end = motion.rate_mean, motion.rate_end
+    return parameters[0] * ((v > 0.0) + (end > 0.0)), 0.0
+
+
+@pytest.mark.parametrize("step", [signs, ordered, counted])
 def test_truth_values_are_numbers_in_company_too(step: Any) -> None:
     """In one bit they would be others: such a function is computed lane by lane."""
     rates = [(1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0)]
