@@ -4,6 +4,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Literal, Self
+
+Kind = Literal["number", "count", "quantile", "at least", "at most"]
+
+
+class Origin(StrEnum):
+    """Where a number comes from."""
+
+    MEASURED = "measured"
+    ASSUMED = "assumed"  # a rule or a guess stands in for a measurement
+    GIVEN = "given"  # a document or a data sheet says so
+    AT_BOUND = "at its bound"  # the data would have it beyond what is physically possible
+    NOT_DETERMINED = "not determined"  # the data say nothing, or too little to be of use
+
+
+@dataclass(frozen=True)
+class Systematic:
+    """One cause that shifts all repetitions alike, so that no repetition can show it.
+
+    Attributes:
+        source: e.g. `torque constant`, `inertia`, `alignment`, `ramp rate`.
+        standard_uncertainty: what it does to the value (1 sigma, in the value's unit); None when
+            nobody has said how uncertain the source is.
+    """
+
+    source: str
+    standard_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)
@@ -12,10 +40,18 @@ class Estimate:
 
     Attributes:
         name: of the quantity, e.g. `coulomb_torque`.
-        value: SI, in `unit`.
-        low, high: bounds of its interval (SI); both None when it has none, and `reason` says why.
+        value: SI, in `unit`; NaN only when `origin` says that it is not determined.
+        low, high: bounds of the interval that scatter leaves (SI); both None when it has none, and
+            `reason` says why. One of them None: the interval is open on that side.
         level: the share of repetitions in which such an interval holds the truth, e.g. 0.95.
         method: how value and interval were found, in words.
+        reason: why there is no interval, or why the value is not determined.
+        origin: where the number comes from.
+        kind: what sort of number it is; a bound (`at least`, `at most`) says that the truth lies
+            on that side of it and has no interval of its own.
+        standard_error: 1 sigma of the value (SI), where that is meaningful.
+        freedom: degrees of freedom behind `standard_error`, or effective size of the sample.
+        systematic: what scatter does not show; apart from `low` and `high`.
     """
 
     name: str
@@ -26,11 +62,68 @@ class Estimate:
     level: float | None = None
     method: str = ""
     reason: str = ""
+    origin: Origin = Origin.MEASURED
+    kind: Kind = "number"
+    standard_error: float | None = None
+    freedom: float | None = None
+    systematic: tuple[Systematic, ...] = ()
 
     def __post_init__(self) -> None:
-        numbers = (self.value, self.low, self.high, self.level)
-        if not all(number is None or math.isfinite(number) for number in numbers):
+        open_value = self.origin is Origin.NOT_DETERMINED and math.isnan(self.value)
+        numbers = (self.low, self.high, self.level, self.standard_error, self.freedom)
+        finite = all(number is None or math.isfinite(number) for number in numbers)
+        if not finite or not (open_value or math.isfinite(self.value)):
             raise ValueError(f"{self.name}: an estimate is finite, or it is not given")
+
+    @classmethod
+    def without_interval(cls, name: str, value: float, unit: str, reason: str, **more: Any) -> Self:
+        """A number that has no interval, and why; NaN makes it `not determined`."""
+        if math.isnan(value):
+            more = {**more, "origin": Origin.NOT_DETERMINED}
+        return cls(name, value, unit, reason=reason, **more)
+
+    @property
+    def has_interval(self) -> bool:
+        """Whether at least one side of the value is bounded."""
+        return self.low is not None or self.high is not None
+
+    @property
+    def says_enough(self) -> bool:
+        """Whether there is an interval, a bound, or a reason for neither."""
+        return self.has_interval or self.kind in ("at least", "at most") or bool(self.reason)
+
+    @property
+    def systematic_uncertainty(self) -> float:
+        """Root of the sum of squares of the systematic parts whose size is known (1 sigma)."""
+        return math.hypot(*(part.standard_uncertainty or 0.0 for part in self.systematic))
+
+    @property
+    def combined(self) -> tuple[float | None, float | None]:
+        """Low and high with the systematic parts: half-widths add in squares (GUM 5.1.2, 6.2).
+
+        A systematic part counts with the normal quantile of `level`: it has no scatter, and so no
+        degrees of freedom of its own. The sides stay as unequal as scatter made them. A bound gives
+        way by the one-sided quantile, and is the only end there is.
+        """
+        from scipy.special import ndtri
+
+        level, shift = self.level or 0.95, self.systematic_uncertainty
+        if self.kind == "at least":
+            return self.value - float(ndtri(level)) * shift, None
+        if self.kind == "at most":
+            return None, self.value + float(ndtri(level)) * shift
+        if not self.has_interval or not shift:
+            return self.low, self.high
+        wide = float(ndtri(0.5 + 0.5 * level)) * shift
+        low = None if self.low is None else self.value - math.hypot(self.value - self.low, wide)
+        high = None if self.high is None else self.value + math.hypot(self.high - self.value, wide)
+        return low, high
+
+    @property
+    def half_width(self) -> float:
+        """Half of the combined interval; NaN when it is not closed."""
+        low, high = self.combined
+        return math.nan if low is None or high is None else 0.5 * (high - low)
 
 
 @dataclass(frozen=True)

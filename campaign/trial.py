@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pydantic import Field, JsonValue
 
 from campaign.errors import UsageError
+from campaign.estimate import Window
 from campaign.options import Options
 from campaign.signals import Signal, Zero
 
@@ -93,6 +94,9 @@ class Trial(Options):
             other swept values are the controller's business.
         requires: names of the channels without which its analysis finds nothing.
         can_use: names of those without which it only leaves something out.
+        windows: parts that its analysis uses, by name; it derives no times from the options.
+        truth: SHA-256 of the bench that is simulated in place of `bench`, which nobody who plans or
+            analyses the trial is told; empty: it is `bench` itself. See `physics.truth`.
     """
 
     number: int = Field(ge=1)
@@ -110,6 +114,8 @@ class Trial(Options):
     set_by_operator: tuple[str, ...] = ()
     requires: tuple[str, ...] = ()
     can_use: tuple[str, ...] = ()
+    windows: tuple[Window, ...] = ()
+    truth: str = ""
 
     @property
     def name(self) -> str:
@@ -126,8 +132,13 @@ class Trial(Options):
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of what determines the samples: bench, task and seed, in canonical JSON."""
+        """SHA-256 of what determines the samples: bench, task, seed, and a truth that there is.
+
+        In canonical JSON.
+        """
         what = {"bench": self.bench, "task": self.task.model_dump(mode="json"), "seed": self.seed}
+        if self.truth:
+            what["truth"] = self.truth
         return hashlib.sha256(canonical_json(what).encode()).hexdigest()
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -148,6 +159,7 @@ class TrialRequest:
             experiment that varies the bench itself; see `experiments.common.with_changes`.
         requires, can_use: names of the channels, where they are not all that the experiment
             declares; None: a measurement has all of those, and any other role none.
+        windows: parts of the recording that the analysis uses, by name; see `Trial`.
     """
 
     task: Task
@@ -157,6 +169,32 @@ class TrialRequest:
     bench: Tree | None = None
     requires: Collection[str] | None = None
     can_use: Collection[str] | None = None
+    windows: tuple[Window, ...] = ()
+
+
+@dataclass(frozen=True)
+class Most:
+    """What the trials of a stage take at most, said before anybody knows which they are.
+
+    Attributes:
+        trials: how many; 0 where the options ask for none.
+        duration: bench time of all of them (s).
+        samples: of all of them, per channel.
+    """
+
+    trials: int
+    duration: float
+    samples: int
+
+    def __add__(self, other: Most) -> Most:
+        return Most(
+            self.trials + other.trials,
+            self.duration + other.duration,
+            self.samples + other.samples,
+        )
+
+
+NONE_MORE = Most(0, 0.0, 0)
 
 
 class Outcome(StrEnum):
