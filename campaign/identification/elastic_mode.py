@@ -4,7 +4,9 @@ An elastic part hung on the load multiplies the smooth response of the rigid axi
 
     (wz^2 - w^2 + 2 i dz wz w) / (wp^2 - w^2 + 2 i dp wp w) * wp^2 / wz^2
 
-with its own frequency as antiresonance wz, and the resonance wp of part and load together.
+with its own frequency as antiresonance wz, and the resonance wp of part and load together. Their
+intervals follow from what the fit leaves over, be it noise or friction: Student's t, with the
+freedom of as many residuals as neighbours do not know of each other.
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.estimate import Estimate
 from campaign.identification.frequency_response import Array, ComplexArray, Response
+from campaign.identification.intervals import with_error
 
 SPAN = 2.0
 """The response is smooth, but for the mode, from the candidate over this to the candidate times
@@ -31,14 +35,15 @@ class ElasticMode:
     """A mode found.
 
     Attributes:
-        frequency: its resonance (Hz), damping ratio `damping_ratio`.
+        frequency: its resonance (Hz).
+        damping_ratio: of that resonance.
         antiresonance: (Hz); below the resonance for a part that hangs on the load.
         explained: squared residual of a smooth response over that with the mode.
     """
 
-    frequency: float
-    damping_ratio: float
-    antiresonance: float
+    frequency: Estimate
+    damping_ratio: Estimate
+    antiresonance: Estimate
     explained: float
 
 
@@ -110,10 +115,46 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
         for shift in (-0.01, 0.01)
     ]
     fit = min(fits, key=lambda each: float(each.cost))
-    pole, damping, shift, _ = fit.x
     smooth = float(np.sum(np.abs(_left(basis, y)) ** 2))
     explained = smooth / max(2.0 * float(fit.cost), 1e-30)
     peak = float(np.max(np.abs(np.exp(_mode(np.linspace(f[0], f[-1], 2000), fit.x)) - 1.0)))
     if explained < EVIDENCE or peak < SMALLEST_PEAK:
         return None
-    return ElasticMode(float(pole), float(damping), float(pole * np.exp(shift)), explained)
+    return _mode_found(fit.x, fit.jac, fit.fun, explained)
+
+
+def _mode_found(p: Array, jacobian: Array, left: Array, explained: float) -> ElasticMode:
+    """The mode of the parameters `p` of `_mode`, with intervals.
+
+    The smooth part is linear and projected out of residuals and Jacobian alike, so that J^T J is
+    the information on the mode alone.
+    """
+    freedom = _freedom(left, len(p) + 6)  # the parabola has six real numbers
+    variance = float(left @ left) / freedom if freedom > 0 else np.nan
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * variance
+    pole, damping, shift = (float(value) for value in p[:3])
+    zero = pole * float(np.exp(shift))
+    by_zero = np.array([zero / pole, 0.0, zero, 0.0])
+
+    def estimate(name: str, value: float, unit: str, gradient: Array) -> Estimate:
+        error = float(np.sqrt(gradient @ covariance @ gradient))
+        return with_error(name, value, unit, error, freedom, "mode on top of a smooth response")
+
+    return ElasticMode(
+        estimate("elastic_mode_frequency", pole, "Hz", np.eye(4)[0]),
+        estimate("damping_ratio", damping, "", np.eye(4)[1]),
+        estimate("antiresonance", zero, "Hz", by_zero),
+        explained,
+    )
+
+
+def _freedom(left: Array, parameters: int) -> float:
+    """Degrees of freedom of residuals over frequency (real parts, then imaginary parts).
+
+    Neighbours that resemble each other count less, by (1 - r) / (1 + r) of their correlation r.
+    """
+    halves = left.reshape(2, -1)
+    power = float(np.sum(halves**2))
+    together = float(np.sum(halves[:, 1:] * halves[:, :-1])) / power if power > 0 else 0.0
+    alike = min(max(together, 0.0), 0.95)
+    return (len(left) - parameters) * (1.0 - alike) / (1.0 + alike)

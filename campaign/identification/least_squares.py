@@ -1,4 +1,4 @@
-"""Nonlinear least squares with several starts, standard errors, and what the data cannot tell."""
+"""Nonlinear least squares: several starts, bounds, covariance, and what the data cannot tell."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+NULL = 1e-8
+"""Singular values of the scaled Jacobian below this share of the largest are null."""
+INVOLVED = 0.1
+"""Component in a null direction from which on a parameter counts as left open by the data."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,15 @@ class Fit:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
+def refuse_too_few(points: int, parameters: int) -> None:
+    """ValueError unless there are more points than parameters: else nothing shows the scatter."""
+    if points <= parameters:
+        raise ValueError(
+            f"{points} points cannot determine {parameters} parameters and their scatter; "
+            f"{parameters + 1} are the fewest"
+        )
+
+
 def fit(
     model: Callable[[Array, Mapping[str, float]], Array],
     x: Array,
@@ -55,13 +69,12 @@ def fit(
 ) -> Fit:
     """Fit y = model(x, parameters), best of all combinations of starts.
 
-    x, y: shape (n,). Raises ValueError when there are fewer points than parameters.
+    x, y: shape (n,). Raises ValueError when there are no more points than parameters.
     """
     from scipy.optimize import least_squares
 
     names = [parameter.name for parameter in parameters]
-    if len(y) < len(names):
-        raise ValueError(f"{len(y)} points cannot determine {len(names)} parameters")
+    refuse_too_few(len(y), len(names))
     lower = np.array([parameter.lower for parameter in parameters])
     upper = np.array([parameter.upper for parameter in parameters])
 
@@ -101,14 +114,130 @@ def fit(
 def _standard_errors(jacobian: Array, residuals: Array) -> tuple[Array, list[int]]:
     """Standard errors, and which parameters the data leave open (a null direction of J)."""
     n, k = jacobian.shape
-    variance = float(residuals @ residuals) / max(n - k, 1)
-    scale = np.linalg.norm(jacobian, axis=0)
-    flat = scale == 0.0
-    scaled = jacobian / np.where(flat, 1.0, scale)
-    _, singular, vt = np.linalg.svd(scaled, full_matrices=False)
-    small = singular <= 1e-8 * singular[0]
-    undetermined = np.abs(vt[small]).max(axis=0, initial=0.0) > 0.1
-    inverse = np.where(small, 0.0, 1.0 / np.where(small, 1.0, singular))
-    errors = np.sqrt(variance * ((vt.T * inverse) ** 2).sum(axis=1)) / np.where(flat, 1.0, scale)
+    variance = float(residuals @ residuals) / (n - k)
+    inverse, undetermined = covariance(jacobian)
+    errors = np.sqrt(variance * np.diag(inverse))
     errors[undetermined] = np.nan
     return errors, [int(i) for i in np.flatnonzero(undetermined)]
+
+
+def covariance(
+    jacobian: Array, null: float = NULL, flat: float = 0.0
+) -> tuple[Array, NDArray[np.bool_]]:
+    """(JᵀJ)⁻¹ without null directions, shape (k, k), and which parameters these involve, (k,).
+
+    Units of the parameters decide nothing: each column of J, shape (n, k), is scaled to length 1.
+
+    Args:
+        null: share of the largest singular value of that below which a direction is null.
+        flat: share of the longest column below which one is null whatever its direction, where
+            parameters have comparable units.
+    """
+    length = np.linalg.norm(jacobian, axis=0)
+    nothing = length <= flat * float(length.max(initial=0.0))
+    safe = np.where(nothing, 1.0, length)
+    _, singular, vt = np.linalg.svd(np.where(nothing, 0.0, jacobian / safe), full_matrices=False)
+    small = singular <= null * singular[0]
+    involved = np.abs(vt[small]).max(axis=0, initial=0.0) > INVOLVED
+    inverse = np.where(small, 0.0, 1.0 / np.where(small, 1.0, singular))
+    scaled = (vt.T * inverse**2) @ vt
+    return scaled / np.outer(safe, safe), np.asarray(nothing | involved)
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a sum of squares is smallest between bounds.
+
+    Attributes:
+        point: shape (k,).
+        residuals, jacobian: there, shapes (n,) and (n, k).
+        held: parameters that lie at a bound and would go beyond it, shape (k,).
+    """
+
+    point: Array
+    residuals: Array
+    jacobian: Array
+    held: NDArray[np.bool_]
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.residuals @ self.residuals)
+
+
+def minimum(
+    function: Callable[[Array], tuple[Array, Array]],
+    start: Array,
+    lower: Array,
+    upper: Array,
+    steps: int = 100,
+) -> Minimum:
+    """Smallest sum of squares between bounds: Levenberg and Marquardt, steps cut off at a bound.
+
+    For small problems with a derivative: a tenth of the time of `scipy.optimize.least_squares`,
+    most of which goes into its own bookkeeping.
+
+    Args:
+        function: residuals (n,) and their Jacobian (n, k) at a point (k,).
+        lower, upper: shape (k,); equal ones hold a parameter.
+    """
+    point = np.clip(start, lower, upper)
+    residuals, jacobian = function(point)
+    cost, damping = float(residuals @ residuals), 1e-3
+    for _ in range(steps):
+        gradient = jacobian.T @ residuals
+        held = _held(point, gradient, lower, upper)
+        free = np.flatnonzero(~held)
+        if len(free) == 0:
+            break
+        part = jacobian[:, free]
+        square = part.T @ part
+        scale = np.diag(np.maximum(np.diag(square), 1e-30 * max(float(np.trace(square)), 1e-300)))
+        while damping < 1e12:
+            step = np.zeros_like(point)
+            step[free] = np.linalg.solve(square + damping * scale, -gradient[free])
+            new = np.clip(point + step, lower, upper)
+            new_residuals, new_jacobian = function(new)
+            new_cost = float(new_residuals @ new_residuals)
+            if new_cost <= cost:
+                break
+            damping *= 5.0
+        else:
+            break
+        gain = cost - new_cost
+        point, residuals, jacobian, cost = new, new_residuals, new_jacobian, new_cost
+        damping = max(0.1 * damping, 1e-12)
+        if gain <= 1e-12 * cost:
+            break
+    held = _held(point, jacobian.T @ residuals, lower, upper)
+    return Minimum(point, residuals, jacobian, held)
+
+
+def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
+    """Which parameters are at a bound with the descent leading beyond it."""
+    return ((point <= lower) & (gradient >= 0)) | ((point >= upper) & (gradient <= 0))
+
+
+def profile_limit(
+    cost_at: Callable[[float], float], start: float, step: float, most: float
+) -> float:
+    """Where a profile of the sum of squares has risen by `most` above its value at `start`.
+
+    Args:
+        cost_at: smallest sum of squares with the parameter held at a value.
+        step: first step away from `start`, with its sign; doubled until the rise is passed.
+
+    Raises ValueError where it never rises so far: the data give no limit on that side.
+    """
+    from scipy.optimize import brentq
+
+    bottom = cost_at(start)
+    inner, outer = start, start + step
+    for _ in range(60):
+        if cost_at(outer) - bottom > most:
+            break
+        inner, outer = outer, start + 2.0 * (outer - start)
+    else:
+        raise ValueError("the data give no limit on that side")
+    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=1e-6)
+    return float(found)

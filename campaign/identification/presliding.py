@@ -1,190 +1,234 @@
-"""Presliding parameters from a slow torque ramp (section 4.3.3).
+"""Presliding stiffness from a slow torque ramp (section 4.3.3), by the rate at which it bends.
 
-Where sliding is slow, s(v) is Ts and the bristle equation dz/dq = 1 - sigma0 z / Ts has a closed
-form: T = Tb (1 - exp(-sigma0 q / Tb)). A straight chord through such a curve is always too low as
-an estimate of sigma0, so the curve itself is fitted. Interfaces in parallel add such curves; each
-slips at its own torque, and the slope falls step by step.
+A straight chord through the curve of torque over angle is always too low as an estimate of sigma0,
+so the curve itself is fitted. It is not fitted to angles: an encoder has few counts in presliding,
+and an integrated gyro rate is a random walk, whose residuals would promise far too much. The mean
+rate of short bins is fitted instead, the standstill before the ramp included, which says what the
+gyro's bias is. The torque at which everything slips is left free: the breakaway torque of a ramp is
+not the curve's asymptote, and a stiffness that leans on it is 1 to 7 % wrong.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.identification.least_squares import Array, Fit, Parameter, fit
+from campaign.estimate import Estimate
+from campaign.identification.autocorrelated import MISFIT
+from campaign.identification.bristle_fit import (
+    Array,
+    BristleFit,
+    fit_bristles,
+    one_interface,
+    two_interfaces,
+)
+from campaign.identification.intervals import exponential, judged, shifted_by, student, with_error
+from campaign.identification.presliding_curve import Interface
+from campaign.identification.torque_ramp import Ramp, ramp_of
 
-SMOOTHING = 0.1
-"""s; window over which the acceleration is taken: short against a ramp of many seconds."""
-SLACK = 0.03
-"""relative uncertainty of the measured breakaway torque as the curve's asymptote: the peak of a
-ramp lies a little below it."""
-FITTED_SAMPLES = 4000
-"""that a presliding curve is fitted to, at most."""
-SMALLEST_SHARE = 0.02
-"""of the breakaway torque that a second interface must carry to be believed: the ramp's own start
-(the load must first be accelerated) bends the curve by less."""
+WINDOWS = (0.5, 0.65, 0.8, 0.9)
+"""Shares of the breakaway torque at which the fitted window may end, to see how much that does."""
+SMALLEST_SHARE = 0.05
+"""of the breakaway torque: where the fit begins, since the load must first be accelerated and its
+bristles' damping be loaded; and what a second interface must carry to be believed."""
+BENT = 0.3
+"""of its torque that the strongest interface must carry in a window."""
+NEAR = 0.16
+"""How far the share of another window may be for its stiffness to be told as a window's part."""
+SPLIT = 1.0 / 3.0
+"""By how much the angles of two weaker interfaces may lie apart, to either side, and be seen as
+one."""
+CLEARLY = 10.0
+"""by which two interfaces must lower the Bayesian information criterion."""
+APART = 2.0
+"""How much further the stronger interface must give way than the weaker: what is nearer is the
+model's own error, cut out of one curve."""
+METHOD = "curve of bristles fitted to the gyro rate, its bias and the asymptote free"
 
 
 @dataclass(frozen=True)
 class Presliding:
-    """What one ramp says.
+    """What one ramp says of the bristles.
 
     Attributes:
-        breakaway: torque at which sliding began (N m).
-        interfaces: (stiffness N m/rad, its standard error, torque N m) of each interface that the
-            curve shows, the one that carries the largest torque first.
-        chord: slope of a straight line over the same window (N m/rad), for comparison.
+        stiffness: of the interface that carries the largest torque (N m/rad).
+        stiffness_at_rest: slope before anything slips, the sum over all interfaces (N m/rad).
+        interfaces: that the curve shows, the one that carries the largest torque first.
+        bias: of the gyro (rad/s).
         window: torques between which the curve was fitted (N m).
-        by_window: stiffness of the first interface when the window ends at other shares of the
-            breakaway torque, share to N m/rad: how much the choice matters.
-        doubts: sentences.
+        chord: slope of a straight line through the same part of the curve (N m/rad).
+        by_window: stiffness when the window ends at other shares of the breakaway torque.
+        damping_shift: what 1 N m s/rad of bristle damping, which the curve leaves out, does to the
+            logarithms of stiffness and of stiffness at rest.
     """
 
-    breakaway: float
-    interfaces: tuple[tuple[float, float, float], ...]
-    chord: float
+    stiffness: Estimate
+    stiffness_at_rest: Estimate
+    interfaces: tuple[Interface, ...]
+    bias: float
     window: tuple[float, float]
-    by_window: Mapping[float, float]
-    doubts: tuple[str, ...]
+    chord: float
+    by_window: Mapping[float, Estimate]
+    damping_shift: tuple[float, float]
 
-    @property
-    def stiffness(self) -> float:
-        """Stiffness of the interface that carries the largest torque (N m/rad)."""
-        return self.interfaces[0][0]
-
-    @property
-    def stiffness_at_rest(self) -> float:
-        """Slope at the very start, where all interfaces still stick: the sum (N m/rad)."""
-        return sum(stiffness for stiffness, _, _ in self.interfaces)
-
-
-def breakaway_torque(
-    time: Array, rate: Array, torque: Array, inertia: float, threshold: float
-) -> tuple[float, int]:
-    """Largest friction torque (N m) of a torque ramp, and the sample where sliding began.
-
-    Friction is the drive torque less what accelerates the load (Eq. 4.1); the acceleration is the
-    slope of the rate over SMOOTHING. Sliding begins where the rate passes `threshold` (rad/s).
-    All arrays (n,). Raises ValueError when the load never moved that fast.
-    """
-    from scipy.signal import savgol_filter
-
-    moving = np.abs(rate) >= threshold
-    if not moving.any():
-        raise ValueError(
-            f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
+    def with_damping(self, damping: float) -> Presliding:
+        """With the shift by a bristle damping (N m s/rad) that is only assumed, as systematic."""
+        shifts = [damping * shift for shift in self.damping_shift]
+        return replace(
+            self,
+            stiffness=_shifted(self.stiffness, "bristle damping", shifts[0]),
+            stiffness_at_rest=_shifted(self.stiffness_at_rest, "bristle damping", shifts[1]),
         )
-    interval = float(np.ptp(time)) / (len(time) - 1)
-    length = max(3, 2 * round(0.5 * SMOOTHING / interval) + 1)
-    if length >= len(time):
-        raise ValueError(f"only {len(time)} samples: too short a recording for a breakaway torque")
-    acceleration = savgol_filter(rate, length, 1, deriv=1, delta=interval)
-    friction = savgol_filter(torque, length, 1) - inertia * acceleration
-    # Within half a window of either end the slope belongs to another moment: it would leave some
-    # of the acceleration at the end of the ramp in the friction.
-    inner = friction[length // 2 : len(friction) - length // 2]
-    return float(np.max(np.abs(inner))), int(np.argmax(moving))
 
 
-def fine_angle(time: Array, rate: Array, angle: Array) -> Array:
-    """Angle relative to a hull at rest, from gyro and angle sensor together, shape (n,).
+def fit_presliding(
+    time: Array,
+    rate: Array,
+    torque: Array,
+    start: float,
+    breakaway: float,
+    share: float = 0.8,
+) -> Presliding:
+    """Fit the curve of bristles to a ramp that begins at `start` (s), up to a share of breakaway.
 
-    The integrated gyro rate (rad/s) has the resolution that an encoder (rad) lacks, the encoder
-    knows no drift: the straight line between the two is taken off the integral.
+    time (s), gyro rate (rad/s) and drive torque (N m) have shape (n,), are evenly sampled, and go
+    to the positive side; breakaway in N m. One interface is assumed, unless two explain the rate
+    clearly better (Bayesian information criterion). Intervals are Student's t in the logarithm,
+    with residuals that may be autocorrelated. Raises ValueError when too few samples lie in the
+    window or the torque is no ramp.
     """
-    interval = float(np.ptp(time)) / max(len(time) - 1, 1)
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * interval
-    if len(time) < 3:
-        return angle
-    drift = np.polynomial.Polynomial.fit(time, angle - integral, 1)
-    return np.asarray(integral + drift(time))
-
-
-def presliding_curve(angle: Array, values: Mapping[str, float]) -> Array:
-    """Sum of Tb (1 - exp(-sigma0 q / Tb)) over interfaces 1, 2 ... present in `values`; (n,)."""
-    total = np.zeros_like(angle)
-    for k in (1, 2):
-        if f"stiffness_{k}" in values:
-            limit = values[f"torque_{k}"]
-            total -= limit * np.expm1(-values[f"stiffness_{k}"] * angle / limit)
-    return total
-
-
-def fit_presliding(angle: Array, torque: Array, breakaway: float, share: float = 0.8) -> Presliding:
-    """Fit the curve up to `share` of the breakaway torque; angle (rad) and torque (N m), (n,).
-
-    Angle and torque are positive and begin near zero. One interface is assumed, unless two explain
-    the curve clearly better (Bayesian information criterion lower by more than 10).
-    Raises ValueError when too few samples lie in the window.
-    """
-    start = 0.02 * breakaway
-    window = (start, share * breakaway)
-    best, chord = _fit_window(angle, torque, breakaway, window)
-    interfaces = _interfaces(best)
-    by_window: dict[float, float] = {}
-    for other in (0.5, 0.65, 0.8, 0.9):
-        try:
-            found, _ = _fit_window(angle, torque, breakaway, (start, other * breakaway))
-        except ValueError:
-            continue
-        by_window[other] = _interfaces(found)[0][0]
-    return Presliding(breakaway, interfaces, chord, window, by_window, best.doubts)
-
-
-def _fit_window(
-    angle: Array, torque: Array, breakaway: float, window: tuple[float, float]
-) -> tuple[Fit, float]:
-    inside = (torque >= window[0]) & (torque <= window[1])
-    past = int(np.argmax(torque > window[1])) if (torque > window[1]).any() else len(torque)
-    inside[past:] = False
-    q, t = angle[inside], torque[inside]
-    if len(q) < 10 or float(np.ptp(q)) <= 0.0:
-        raise ValueError(
-            f"only {len(q)} samples lie between {window[0]:.3g} and {window[1]:.3g} N m"
-        )
-    # Evenly spread: a slow ramp has far more samples than information.
-    pick = np.unique(np.linspace(0, len(q) - 1, min(len(q), FITTED_SAMPLES)).astype(int))
-    q, t = q[pick], t[pick]
-    slope = max(float(np.polyfit(q, t, 1)[0]), 1e-6)
-    first = max(float((t[3] - t[0]) / max(q[3] - q[0], 1e-12)), slope)
-    # All interfaces together carry the breakaway torque; it is measured, so it is nearly known.
-    total = Parameter("total", (1 - SLACK) * breakaway, (1 + SLACK) * breakaway, (breakaway,))
-    stiffness = Parameter("stiffness_1", 0.01 * slope, 1e4 * slope, (slope, first))
-    one = fit(_one_interface, q, t, [stiffness, total])
-    two = fit(
-        _two_interfaces,
-        q,
-        t,
-        [
-            stiffness,
-            total,
-            Parameter("stiffness_2", 0.01 * slope, 1e4 * slope, (first, 5.0 * first)),
-            Parameter("torque_2", SMALLEST_SHARE * breakaway, 0.5 * breakaway, (0.15 * breakaway,)),
-        ],
+    ramp = ramp_of(time, rate, torque, start, max(share, *WINDOWS) * breakaway)
+    whole = ramp.until(share * breakaway)
+    smallest = SMALLEST_SHARE * breakaway
+    one = fit_bristles(whole, smallest, one_interface(whole, breakaway))
+    two = fit_bristles(whole, smallest, two_interfaces(whole, breakaway, smallest))
+    if one is None:
+        raise ValueError("too little of the curve of bristles shows in the rate of this ramp")
+    best = two if two is not None and _believed(two, one) else one
+    own = _stiffness(best)
+    by_window = {share: own, **_by_window(ramp, smallest, breakaway, best, share)}
+    return Presliding(
+        stiffness=_shifted(own, "window", _window_shift(share, by_window)),
+        stiffness_at_rest=_shifted(_at_rest(best), "more interfaces than two", _split_shift(best)),
+        interfaces=best.interfaces,
+        bias=best.bias,
+        window=(smallest, float(whole.torque[-1])),
+        chord=_chord(whole, best.bias, smallest),
+        by_window=dict(sorted(by_window.items())),
+        damping_shift=_damping_shift(best),
     )
-    # How stiff the weaker interface is may stay open (it slips within the sensor's resolution),
-    # and the total may lean on its measurement; the rest may not.
-    certain = all(doubt.startswith(("stiffness_2", "total")) for doubt in two.doubts)
-    return (two if certain and two.bic < one.bic - 10.0 else one), slope
 
 
-def _one_interface(angle: Array, values: Mapping[str, float]) -> Array:
-    return presliding_curve(angle, {**values, "torque_1": values["total"]})
+def _believed(two: BristleFit, one: BristleFit) -> bool:
+    """Whether two interfaces explain the rate clearly better, and not by a curve cut in two."""
+    strong, weak = two.interfaces
+    apart = strong.torque / strong.stiffness > APART * weak.torque / weak.stiffness
+    return apart and two.criterion < one.criterion - CLEARLY
 
 
-def _two_interfaces(angle: Array, values: Mapping[str, float]) -> Array:
-    return presliding_curve(angle, {**values, "torque_1": values["total"] - values["torque_2"]})
+def _stiffness(fit: BristleFit) -> Estimate:
+    row = np.zeros(fit.jacobian.shape[1])
+    row[fit.of_stiffness[0]] = 1.0
+    return _of_logarithm(fit, "bristle_stiffness", fit.interfaces[0].stiffness, row)
 
 
-def _interfaces(found: Fit) -> tuple[tuple[float, float, float], ...]:
-    values, errors = found.values, found.errors
-    weaker = values.get("torque_2", 0.0)
-    rows = [(values["stiffness_1"], errors["stiffness_1"], values["total"] - weaker)]
-    if "stiffness_2" in values:
-        rows.append((values["stiffness_2"], errors["stiffness_2"], weaker))
-    return tuple(sorted(rows, key=lambda row: -row[2]))
+def _at_rest(fit: BristleFit) -> Estimate:
+    total = sum(each.stiffness for each in fit.interfaces)
+    return _of_logarithm(fit, "stiffness_at_rest", total, _row_of_sum(fit))
+
+
+def _row_of_sum(fit: BristleFit) -> Array:
+    """Derivatives of the logarithm of the summed stiffness by the parameters."""
+    row = np.zeros(fit.jacobian.shape[1])
+    total = sum(each.stiffness for each in fit.interfaces)
+    for index, each in zip(fit.of_stiffness, fit.interfaces, strict=True):
+        row[index] = each.stiffness / total
+    return row
+
+
+def _of_logarithm(fit: BristleFit, name: str, value: float, row: Array) -> Estimate:
+    error = float(np.sqrt(row @ fit.errors.covariance @ row))
+    inner = with_error(name, float(np.log(value)), "", error, fit.errors.freedom, METHOD)
+    found = exponential(inner, "N m/rad")
+    if fit.errors.misfit <= MISFIT:
+        return judged(found)
+    reason = "the rate leaves the curve of bristles by more than its noise explains"
+    return replace(found, low=None, high=None, level=None, reason=reason)
+
+
+def _by_window(
+    ramp: Ramp, smallest: float, breakaway: float, best: BristleFit, share: float
+) -> dict[float, Estimate]:
+    """The stiffness by windows that end elsewhere, with as many interfaces as were found.
+
+    A window that ends before the strongest interface bends says nothing of it.
+    """
+    found = {}
+    strongest, *weaker = best.interfaces
+    least = sum(each.torque for each in weaker) + BENT * strongest.torque
+    for other in WINDOWS:
+        part = ramp.until(other * breakaway)
+        if part.torque[-1] < least:
+            continue
+        fit = fit_bristles(part, smallest, best.again(part, breakaway, smallest))
+        if fit is not None and other != share:
+            found[other] = _stiffness(fit)
+    return found
+
+
+def _window_shift(share: float, by_window: Mapping[float, Estimate]) -> float:
+    """By how much the logarithm depends on where the window ends, beyond what scatter explains.
+
+    The windows lie in each other: the variance of a difference is that of the variances (Hausman,
+    Econometrica 46, 1978).
+    """
+    own, shifts = by_window[share], [0.0]
+    for other, found in by_window.items():
+        if abs(other - share) > NEAR or not (own.has_interval and found.has_interval):
+            continue
+        change = abs(float(np.log(found.value / own.value)))
+        errors = [(each.standard_error or 0.0) / each.value for each in (own, found)]
+        scatter = float(np.sqrt(abs(errors[0] ** 2 - errors[1] ** 2)))
+        if change > student(min(own.freedom or np.inf, found.freedom or np.inf)) * scatter:
+            shifts.append(change)
+    return max(shifts)
+
+
+def _damping_shift(fit: BristleFit) -> tuple[float, float]:
+    """See `Presliding`: one linear step of the fit to a curve whose bristles are damped."""
+    change = fit.change_by_damping()
+    step = np.linalg.lstsq(fit.jacobian, change, rcond=None)[0]
+    return float(step[fit.of_stiffness[0]]), float(_row_of_sum(fit) @ step)
+
+
+def _split_shift(fit: BristleFit) -> float:
+    """What the logarithm of the stiffness at rest lacks if the weaker interface is really two."""
+    if len(fit.interfaces) < 2:
+        return 0.0
+    strong, weak = fit.interfaces
+    parts = [
+        Interface(0.5 * weak.stiffness / apart, 0.5 * weak.torque)
+        for apart in (1.0 - SPLIT, 1.0 + SPLIT)
+    ]
+    step = np.linalg.lstsq(fit.jacobian, fit.change_by((strong, *parts)), rcond=None)[0]
+    seen = strong.stiffness + weak.stiffness
+    true = strong.stiffness + sum(part.stiffness for part in parts)
+    return float(_row_of_sum(fit) @ step - np.log(true / seen))
+
+
+def _chord(ramp: Ramp, bias: float, smallest: float) -> float:
+    """Slope of a straight line through torque over the integrated rate (N m/rad)."""
+    angle = np.concatenate([[0.0], np.cumsum((ramp.rate - bias) * np.diff(ramp.edges))])
+    inside = ramp.torque >= smallest
+    return float(np.polyfit(angle[inside], ramp.torque[inside], 1)[0])
+
+
+def _shifted(estimate: Estimate, source: str, relative: float) -> Estimate:
+    """With a part that is evenly likely up to a share of the value either way (GUM 4.3.7)."""
+    return shifted_by(estimate, source, abs(relative) * estimate.value / math.sqrt(3.0))
 
 
 def damping_by_ratio(stiffness: float, inertia: float, viscous: float, ratio: float) -> float:

@@ -1,81 +1,371 @@
-"""Static friction parameters from a friction-velocity map (Equation 4.6)."""
+"""Static friction parameters from a friction-velocity map, with intervals that hold.
+
+A point is the mean of a window, whose own deviation is known, and it deviates from the next point
+by more: friction changes from trial to trial, and what is left of its ripple over position is no
+noise of the window. So a point counts with 1 / (window² + (between × torque)²), where the relative
+deviation between points is what makes chi-square equal to its degrees of freedom (Paule and Mandel,
+"Consensus values and weighting factors", J. Res. NBS 87 (1982)). Intervals are Student's t with
+n - p, from (JᵀWJ)⁻¹. A parameter that ends at a bound is not known by that: p and J have it, too,
+so that the intervals of the others are rather too wide than too narrow.
+
+Every map is fitted with delta free, with delta = 2 as the LuGre model has it, and without a
+Stribeck effect. All three have the weights of the first, the most general: a model that does not
+fit the data must not call its misfit noise. Its interval is that of the curve of its kind that is
+closest to the truth.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from campaign.identification.least_squares import Array, Fit, Parameter, fit
-
-PARAMETERS = (
-    "viscous_friction",
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "stribeck_exponent",
+from campaign.estimate import Estimate, Origin
+from campaign.identification.intervals import judged, student, with_error
+from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
+from campaign.identification.point_weights import (
+    LEAST,
+    between_deviation,
+    lack_of_fit,
+    smoothed_deviation,
 )
-UNITS = {
-    "viscous_friction": "N m s/rad",
-    "coulomb_torque": "N m",
-    "static_torque": "N m",
-    "stribeck_velocity": "rad/s",
-    "stribeck_exponent": "",
-}
+from campaign.identification.stribeck import (
+    PARAMETERS,
+    UNITS,
+    StribeckFit,
+    fit_line,
+    fit_stribeck,
+    held_at,
+    stribeck,
+    with_misfit,
+)
+
+Model = Literal["free", "2", "none"]
+MODELS: tuple[Model, ...] = ("free", "2", "none")
+"""How the Stribeck effect is modelled: delta free, delta = 2, none."""
+HELD = {"free": None, "2": 2.0}
+ROUNDS = 20
+"""of fit and deviation in turn, at most; usually five."""
+SETTLED = 1e-3
+"""relative change of the deviation between points below which the rounds end."""
+LACKING = 0.05
+"""p-value of the lack of fit below which the model does not describe the repeated points."""
 
 
-def stribeck(speed: Array, values: Mapping[str, float]) -> Array:
-    """Friction torque (N m) of steady sliding at `speed` >= 0 (rad/s), shape (n,)."""
-    fall = np.exp(-((speed / values["stribeck_velocity"]) ** values["stribeck_exponent"]))
-    drop = values["static_torque"] - values["coulomb_torque"]
-    return np.asarray(values["coulomb_torque"] + drop * fall + values["viscous_friction"] * speed)
+@dataclass(frozen=True)
+class DirectionFit:
+    """The fits of one direction of a map; arrays of shape (n,), one entry for each speed.
 
-
-def fit_stribeck(speed: Array, torque: Array, exponent: float | None = None) -> Fit:
-    """Fit Equation 4.6 to one direction of a map: `speed` > 0 (rad/s), `torque` > 0 (N m), (n,).
-
-    `exponent` fixes delta (2 for the LuGre model); None fits it too. Ts is not forced above Tc,
-    because real axes with Ts < Tc exist.  Raises ValueError for fewer points than parameters.
+    Attributes:
+        place: what repeats had in common: the commanded speed; without repeats, `speed`.
+        speed, torque: positive (rad/s, N m).
+        window: deviation of each torque that its window shows (N m, 1 sigma).
+        between: relative deviation from point to point beyond that.
+        fits: by model.
+        lack_of_fit: p-value of `free` against repeated points; None without repeats.
     """
-    if len(speed) < len(PARAMETERS):
-        raise ValueError(f"{len(speed)} points are too few for {len(PARAMETERS)} parameters")
-    low, high = float(torque.min()), float(torque.max())
-    slope = max((high - low) / float(np.ptp(speed) or 1.0), 1e-9)
-    first = float(torque[np.argmin(speed)])
-    parameters = [
-        Parameter("viscous_friction", 0.0, 100.0 * slope + 1.0, (slope,)),
-        Parameter("coulomb_torque", 0.0, 10.0 * high, (low,)),
-        Parameter("static_torque", 0.0, 10.0 * high, (first,)),
-        Parameter(
-            "stribeck_velocity",
-            0.1 * float(speed.min()),
-            10.0 * float(speed.max()),
-            tuple(np.geomspace(3.0 * float(speed.min()), 0.3 * float(speed.max()), 4)),
-        ),
-    ]
-    if exponent is None:
-        parameters.append(Parameter("stribeck_exponent", 0.2, 5.0, (1.0, 2.0)))
-        return _doubting(fit(stribeck, speed, torque, parameters))
-    fixed = {"stribeck_exponent": exponent}
-    found = fit(lambda v, values: stribeck(v, {**values, **fixed}), speed, torque, parameters)
-    return _doubting(
-        replace(
-            found,
-            values={**found.values, **fixed},
-            errors={**found.errors, "stribeck_exponent": 0.0},
+
+    place: Array
+    speed: Array
+    torque: Array
+    window: Array
+    between: float
+    fits: Mapping[Model, StribeckFit]
+    lack_of_fit: float | None = None
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of every interval: points beyond what `free` fits, bounds or not."""
+        return len(self.speed) - len(self.fits["free"].free)
+
+    @property
+    def deviation(self) -> Array:
+        """Of each torque, window and between together (N m, 1 sigma)."""
+        return self.fits["free"].deviation
+
+    @property
+    def shows_stribeck_effect(self) -> bool:
+        """Whether Ts and Tc are apart by more than the interval of their difference."""
+        return differs(self.fits["free"], self.freedom)
+
+    @property
+    def preferred(self) -> Model:
+        """The model with the lowest Bayesian information criterion."""
+        return min(MODELS, key=lambda model: self.fits[model].bic)
+
+    @property
+    def misfit(self) -> float:
+        """Deviation of the residuals with delta = 2 over that with delta free."""
+        return math.sqrt(self.fits["2"].chi_square / max(self.fits["free"].chi_square, 1e-300))
+
+
+def fit_direction(
+    speed: Array, torque: Array, window: Array, repeat_of: Array | None = None
+) -> DirectionFit:
+    """The fits of one direction.
+
+    Args:
+        speed, torque: of each point, positive (rad/s, N m), shape (m,).
+        window: deviation of each torque that its window shows (N m); 0 or NaN where unknown.
+        repeat_of: points with the same entry repeat each other: the commanded speed, which has to
+            grow with `speed`; absent: none does.
+
+    Repeats are averaged first: what they have in common (ripple at one place) would count as often
+    as it was repeated. They tell the lack of fit; the intervals rest on the residuals of the means,
+    which hold whatever repeats cannot show.
+
+    Raises ValueError for fewer than 6 speeds.
+    """
+    order = np.argsort(speed)
+    speed, torque, window = speed[order], torque[order], np.nan_to_num(window[order])
+    place = np.arange(len(speed)) if repeat_of is None else np.asarray(repeat_of)[order]
+    shared, first, member, count = np.unique(
+        place, return_index=True, return_inverse=True, return_counts=True
+    )
+    refuse_too_few(len(first), len(PARAMETERS))
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(member, values) / count)
+
+    means, level = mean(speed), mean(torque)
+    scatter = smoothed_deviation(np.sqrt(mean(window**2) / count), np.log(means))
+    between, free = _between(means, level, scatter)
+    held = with_misfit(fit_stribeck(means, level, free.deviation, HELD["2"]), means, level)
+    fits: dict[Model, StribeckFit] = {
+        "free": free,
+        "2": held,
+        "none": fit_line(means, level, free.deviation),
+    }
+    lacking = lack_of_fit(torque, level, member, free.residuals, len(level) - len(free.free))
+    named = means if repeat_of is None else np.asarray(shared, dtype=float)
+    return DirectionFit(named, means, level, scatter, between, fits, lacking)
+
+
+def _between(speed: Array, torque: Array, window: Array) -> tuple[float, StribeckFit]:
+    """Relative deviation between points and the fit with delta free, which depend on each other.
+
+    Where windows alone explain more than there is (in a closed loop they do), a common factor makes
+    chi-square equal to its degrees of freedom on that side, too.
+    """
+    between = 1e-3
+    found = fit_stribeck(speed, torque, _deviation(torque, window, between))
+    for _ in range(ROUNDS):
+        freedom = len(speed) - len(found.free)
+        new = between_deviation(found.residuals / torque, window / torque, freedom)
+        settled = abs(new - between) <= SETTLED * between
+        between = new
+        deviation = _deviation(torque, window, between)
+        found = fit_stribeck(speed, torque, deviation, start=found.values)
+        if settled:
+            break
+    if between > 0:
+        return between, found
+    factor = math.sqrt(found.chi_square / (len(speed) - len(found.free)))
+    return between, replace(found, deviation=np.maximum(factor * deviation, LEAST * torque))
+
+
+def _deviation(torque: Array, window: Array, between: float) -> Array:
+    return np.sqrt(window**2 + (between**2 + LEAST**2) * torque**2)
+
+
+def differs(found: StribeckFit, freedom: float) -> bool:
+    """Whether Ts and Tc are apart by more than the t interval of their difference."""
+    drop = found.values["static_torque"] - found.values["coulomb_torque"]
+    between = {"static_torque": 1.0, "coulomb_torque": -1.0}
+    return abs(drop) > student(freedom) * math.sqrt(max(found.variance(between), 0.0))
+
+
+def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
+    """The parameters of one direction with their intervals, by name."""
+    found = fit.fits[model]
+    names = PARAMETERS if model != "none" else ("viscous_friction", "coulomb_torque")
+    return {name: _estimate(fit, model, found, name) for name in names}
+
+
+def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) -> Estimate:
+    value, unit = found.values[name], UNITS[name]
+    method = f"least squares, points weighted by window and scatter, t({fit.freedom})"
+    if name == "stribeck_exponent" and model == "2":
+        return Estimate(name, value, unit, reason="held at 2", origin=Origin.GIVEN)
+    if name in found.bounds:
+        return _at_bound(fit, model, name, method)
+    if name in found.open:
+        reason = "these points leave it open"
+        return _not_determined(Estimate(name, value, unit, method=method), reason)
+    error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
+    told = with_error(name, value, unit, error, fit.freedom, method)
+    return _without_effect(told, differs(found, fit.freedom))
+
+
+def _without_effect(told: Estimate, effect: bool) -> Estimate:
+    """Vs and delta say nothing where no Stribeck effect shows; nothing does that is too wide."""
+    if told.name in ("stribeck_velocity", "stribeck_exponent") and not effect:
+        return _not_determined(told, "Ts and Tc are the same within their interval")
+    return judged(told)
+
+
+def _not_determined(told: Estimate, reason: str) -> Estimate:
+    return replace(told, origin=Origin.NOT_DETERMINED, reason=reason)
+
+
+def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estimate:
+    """A friction that would be negative: one-sided, by profile; a search that ended: open."""
+    found = fit.fits[model]
+    value, unit = found.values[name], UNITS[name]
+    physical = name in ("viscous_friction", "coulomb_torque", "static_torque")
+    if not physical or model == "none":
+        reason = f"the search ended at {value:.3g}, its {found.bounds[name]} limit"
+        if physical:
+            reason = "the data would have it negative"
+        return _not_determined(Estimate(name, value, unit, method=method), reason)
+    exponent = HELD[model]
+
+    def cost(tried: float) -> float:
+        return held_at(found, fit.speed, fit.torque, name, tried, exponent)
+
+    # Profile likelihood on one side: the rise of chi-square is the square of Student's t there.
+    rise = student(fit.freedom, 0.90) ** 2
+    step = float(np.median(fit.deviation)) / (
+        float(fit.speed.max()) if name == "viscous_friction" else 1.0
+    )
+    try:
+        high = profile_limit(cost, value, step, rise)
+    except ValueError:
+        told = Estimate(name, value, unit, method=method)
+        return _not_determined(told, "these points leave it open")
+    return Estimate(
+        name,
+        value,
+        unit,
+        high=high,
+        level=0.95,
+        method=f"at its bound; one-sided by profile likelihood, t({fit.freedom})",
+        origin=Origin.AT_BOUND,
+    )
+
+
+def nominal_estimates(
+    positive: DirectionFit, negative: DirectionFit, model: Model
+) -> dict[str, Estimate]:
+    """Mean of both directions, by name; their errors are those of the same trials.
+
+    Points of one speed are of one trial, out and back. How far their errors go together is told by
+    the residuals; it was 0.73 to 0.99 where friction scatters from trial to trial.
+    """
+    one, other = (direction_estimates(fit, model) for fit in (positive, negative))
+    return {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
+
+
+def _mean(
+    positive: DirectionFit, negative: DirectionFit, model: Model, one: Estimate, other: Estimate
+) -> Estimate:
+    name, unit, value = one.name, one.unit, 0.5 * (one.value + other.value)
+    for each in (one, other):
+        if not each.has_interval or each.origin is Origin.AT_BOUND:
+            if each.origin is Origin.GIVEN:
+                return each
+            reason = each.reason or f"one direction is {each.origin}"
+            return _not_determined(Estimate(name, value, unit), reason)
+    found = positive.fits[model], negative.fits[model]
+    cross = cross_covariance(positive, negative, model)
+    i, j = found[0].free.index(name), found[1].free.index(name)
+    variance = 0.25 * (
+        found[0].covariance[i, i] + found[1].covariance[j, j] + 2.0 * float(cross[i, j])
+    )
+    freedom = min(positive.freedom, negative.freedom)
+    method = f"mean of both directions, with the covariance of their points, t({freedom})"
+    error = math.sqrt(max(float(variance), 0.0))
+    told = with_error(name, value, unit, error, freedom, method)
+    effect = all(differs(each, freedom) for each in found)
+    return _without_effect(told, effect)
+
+
+def correlation(positive: DirectionFit, negative: DirectionFit) -> float:
+    """Of the residuals of both directions with delta free, over their deviations; -1 to 1.
+
+    Over the speeds that both have; 1, the safe side, where these are too few to tell.
+    """
+    shared = _shared(positive, negative)
+    if shared is None:
+        return 1.0
+    one, other = (
+        (fit.fits["free"].residuals / fit.deviation)[own]
+        for fit, own in zip((positive, negative), shared, strict=True)
+    )
+    size = math.sqrt(float(np.sum(one**2)) * float(np.sum(other**2)))
+    return float(np.sum(one * other)) / size if size > 0 else 1.0
+
+
+def cross_covariance(positive: DirectionFit, negative: DirectionFit, model: Model) -> Array:
+    """Covariance of the free parameters of both directions, shape (k, l).
+
+    Points of different speeds are of different trials, and have none.
+    """
+    one, other = positive.fits[model], negative.fits[model]
+    together = correlation(positive, negative)
+    shared = _shared(positive, negative)
+    if shared is None:
+        size = np.sqrt(np.outer(np.diag(one.covariance), np.diag(other.covariance)))
+        return np.asarray(together * size)
+    ours, theirs = (
+        (found.influence * found.deviation)[:, own]
+        for found, own in zip((one, other), shared, strict=True)
+    )
+    return np.asarray(together * ours @ theirs.T)
+
+
+def _shared(
+    positive: DirectionFit, negative: DirectionFit
+) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Which points of either direction are of speeds that both have, shape (m,); None: too few."""
+    speeds, ours, theirs = np.intersect1d(positive.place, negative.place, return_indices=True)
+    return (ours, theirs) if len(speeds) > len(PARAMETERS) else None
+
+
+def shifts(found: StribeckFit, torque_shift: Array) -> dict[str, float]:
+    """By how much each parameter follows a shift of all torques (N m), shape (n,); by name."""
+    moved = found.influence @ torque_shift
+    return dict(zip(found.free, moved.tolist(), strict=True))
+
+
+def band(fit: DirectionFit, model: Model, speed: Array) -> Array:
+    """Half-width of the 95 % band of the fitted curve (N m) at `speed` (rad/s), shape (m,)."""
+    found = fit.fits[model]
+    columns = np.array([_slope(found, name, speed) for name in found.free])
+    variance = np.einsum("km,kl,lm->m", columns, found.covariance, columns)
+    return np.asarray(student(fit.freedom) * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _slope(found: StribeckFit, name: str, speed: Array) -> Array:
+    """Derivative of the torque by a parameter, by central differences; shape (m,)."""
+    value = found.values[name]
+    step = 1e-5 * (abs(value) or 1.0)
+    up, down = ({**found.values, name: value + s} for s in (step, -step))
+    return np.asarray((stribeck(speed, up) - stribeck(speed, down)) / (2.0 * step))
+
+
+def doubts(fit: DirectionFit) -> Iterator[str]:
+    """Sentences on what a fit with delta free does not tell, without a full stop."""
+    found = fit.fits["free"]
+    for name, side in found.bounds.items():
+        yield f"{name} ended at its {side} bound {found.values[name]:.4g}"
+    if not fit.shows_stribeck_effect:
+        yield (
+            "static_torque and coulomb_torque are the same within their interval: no Stribeck "
+            "effect shows, and stribeck_velocity is not determined"
         )
-    )
-
-
-def _doubting(found: Fit) -> Fit:
-    """The fit, with a doubt where the map is too flat to show a Stribeck effect."""
-    drop = abs(found.values["static_torque"] - found.values["coulomb_torque"])
-    error = float(np.hypot(found.errors["static_torque"], found.errors["coulomb_torque"]))
-    if drop >= 2.0 * error:  # an undetermined torque (NaN) is a doubt too
-        return found
-    doubt = "static_torque and coulomb_torque are the same within their errors: no Stribeck effect"
-    return replace(
-        found,
-        doubts=(*found.doubts, f"{doubt} shows, and stribeck_velocity is not determined"),
-    )
+    below = int(np.sum(fit.speed < found.values["stribeck_velocity"]))
+    if fit.shows_stribeck_effect and below < 3:
+        yield (
+            f"{below} speeds are below stribeck_velocity: add slower ones, static_torque is"
+            " extrapolated"
+        )
+    if fit.lack_of_fit is not None and fit.lack_of_fit < LACKING:
+        yield (
+            f"repeated points scatter less than they deviate from the curve (p = "
+            f"{fit.lack_of_fit:.2g}): Equation 4.6 is not all there is"
+        )

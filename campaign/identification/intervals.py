@@ -1,0 +1,177 @@
+"""Intervals of means: over repeats, and over the samples of one autocorrelated recording.
+
+All are Student's t intervals. What a repetition would not change (a wrong torque constant, say) is
+in none of them: that is the systematic part of an estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate, Origin, Systematic
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.95
+BATCHES = 10
+"""into which a recording is cut: enough for a deviation, few enough that neighbours hardly know of
+each other (AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""
+USELESS = 0.5
+"""Half-width over value from which on a parameter counts as not determined."""
+
+
+def student(freedom: float, level: float = LEVEL) -> float:
+    """Quantile of Student's t for a two-sided interval; infinite freedom gives the normal one."""
+    from scipy.special import ndtri, stdtrit
+
+    share = 0.5 + 0.5 * level
+    return float(ndtri(share) if math.isinf(freedom) else stdtrit(freedom, share))
+
+
+def with_error(
+    name: str, value: float, unit: str, error: float, freedom: float, method: str, **more: Any
+) -> Estimate:
+    """An estimate from its standard error and the degrees of freedom of that error.
+
+    No interval, and the reason, where there are no degrees of freedom or the error is not finite.
+    """
+    if not freedom > 0 or not math.isfinite(error) or not math.isfinite(value):
+        reason = "nothing is left over to judge its scatter by"
+        return Estimate.without_interval(name, value, unit, reason, method=method, **more)
+    half = student(freedom) * error
+    return Estimate(
+        name,
+        value,
+        unit,
+        value - half,
+        value + half,
+        LEVEL,
+        method,
+        standard_error=error,
+        freedom=freedom if math.isfinite(freedom) else None,
+        **more,
+    )
+
+
+def of_repeats(
+    name: str, values: Sequence[float] | Array, unit: str, what: str = "repeats", **more: Any
+) -> Estimate:
+    """Mean of independent values, e.g. of repeated trials, shape (n,); t with n - 1."""
+    found = np.asarray(values, dtype=float)
+    mean = float(np.mean(found))
+    if len(found) < 2:
+        reason = f"a single value: {what} would show how it scatters"
+        return Estimate.without_interval(name, mean, unit, reason, **more)
+    error = float(np.std(found, ddof=1)) / math.sqrt(len(found))
+    method = f"mean of {len(found)} {what}, Student's t"
+    return with_error(name, mean, unit, error, len(found) - 1, method, **more)
+
+
+def of_positive_repeats(
+    name: str, values: Sequence[float] | Array, unit: str, what: str = "repeats", **more: Any
+) -> Estimate:
+    """Geometric mean of independent positive values, shape (n,); t in the logarithm.
+
+    For sizes whose scatter is a share of them: the interval never reaches zero.
+    Raises ValueError for values that are not positive.
+    """
+    found = np.asarray(values, dtype=float)
+    if not np.all(found > 0):
+        raise ValueError(f"{name}: values must be positive")
+    inner = of_repeats(name, np.log(found), "", what, **more)
+    return exponential(inner, unit)
+
+
+def exponential(logarithm: Estimate, unit: str) -> Estimate:
+    """The estimate of x from one of ln x; its standard error by the delta method."""
+    value = math.exp(logarithm.value)
+    error = logarithm.standard_error
+    return replace(
+        logarithm,
+        value=value,
+        unit=unit,
+        low=None if logarithm.low is None else math.exp(logarithm.low),
+        high=None if logarithm.high is None else math.exp(logarithm.high),
+        standard_error=None if error is None else value * error,
+    )
+
+
+def of_series(
+    name: str, samples: Array, unit: str, batches: int = BATCHES, **more: Any
+) -> Estimate:
+    """Mean of an autocorrelated series of shape (n,) by batch means: t with `batches` - 1.
+
+    Holds where the correlation is short against a batch; what is slower must be modelled. Source:
+    Schmeiser, "Batch size effects in the analysis of simulation output", Oper. Res. 30 (1982).
+    """
+    if len(samples) < 2 * batches:
+        mean = float(np.mean(samples)) if len(samples) else math.nan
+        reason = f"{len(samples)} samples are too few for {batches} batches"
+        return Estimate.without_interval(name, mean, unit, reason, **more)
+    used = len(samples) // batches * batches
+    means = samples[:used].reshape(batches, -1).mean(axis=1)
+    error = float(np.std(means, ddof=1)) / math.sqrt(batches)
+    method = f"mean, deviation from {batches} batches"
+    return with_error(name, float(np.mean(samples)), unit, error, batches - 1, method, **more)
+
+
+def difference(name: str, one: Estimate, other: Estimate, unit: str, **more: Any) -> Estimate:
+    """Difference `one` - `other` of independent estimates; freedom by Welch and Satterthwaite."""
+    value = one.value - other.value
+    errors = (one.standard_error, other.standard_error)
+    if errors[0] is None or errors[1] is None:
+        reason = one.reason or other.reason or "one of the two has no standard error"
+        return Estimate.without_interval(name, value, unit, reason, **more)
+    error = math.hypot(errors[0], errors[1])
+    freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
+    return with_error(name, value, unit, error, freedom, "difference, Welch", **more)
+
+
+def ratio(name: str, one: Estimate, other: Estimate, unit: str = "", **more: Any) -> Estimate:
+    """Quotient `one` / `other` of independent positive estimates, in the logarithm (Welch)."""
+    if not (one.value > 0 and other.value > 0):
+        reason = "a ratio of numbers that are not positive"
+        return Estimate.without_interval(name, math.nan, unit, reason, **more)
+    value = one.value / other.value
+    if one.standard_error is None or other.standard_error is None:
+        reason = one.reason or other.reason or "one of the two has no standard error"
+        return Estimate.without_interval(name, value, unit, reason, **more)
+    errors = (one.standard_error / one.value, other.standard_error / other.value)
+    freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
+    error = math.hypot(*errors)
+    told = with_error(name, math.log(value), "", error, freedom, "ratio, Welch", **more)
+    return exponential(told, unit)
+
+
+def welch(*parts: tuple[float, float | None]) -> float:
+    """Degrees of freedom of a sum of independent errors, each (standard error, freedom).
+
+    None is infinitely many. Welch and Satterthwaite; GUM G.4.1.
+    """
+    total = sum(error**2 for error, _ in parts)
+    own = sum(error**4 / freedom for error, freedom in parts if freedom is not None)
+    return total**2 / own if own > 0 else math.inf
+
+
+def judged(estimate: Estimate, useless: float = USELESS) -> Estimate:
+    """The estimate, called `not determined` where its interval is too wide to be of use.
+
+    Value and interval stay: who reads them sees how little they say.
+    """
+    half = estimate.half_width
+    if estimate.origin is not Origin.MEASURED or not half > useless * abs(estimate.value):
+        return estimate
+    reason = f"its interval is wider than ±{100 * useless:.0f} % of it"
+    return replace(estimate, origin=Origin.NOT_DETERMINED, reason=reason)
+
+
+def shifted_by(estimate: Estimate, source: str, standard_uncertainty: float | None) -> Estimate:
+    """The estimate with one more systematic part (1 sigma in its unit; None: not known)."""
+    part = Systematic(source, standard_uncertainty)
+    return replace(estimate, systematic=(*estimate.systematic, part))

@@ -1,0 +1,175 @@
+"""Intervals of a ramp's numbers hold the truth as often as they say, whatever the gyro's noise.
+
+The estimators alone: ramps are made up here from closed forms. Seeds were chosen before looking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from campaign.estimate import Estimate
+from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.presliding import fit_presliding
+from campaign.identification.presliding_curve import Interface, presliding_angle
+from campaign.identification.readings import deviation_of_readings, mean_of_readings
+from tests.identification.coverage import holds, rejected
+
+Random = np.random.Generator
+Array = np.ndarray
+INTERVAL, INERTIA = 1e-3, 70.0
+COUNT = np.deg2rad(0.002)
+"""One count of a coarse gyro."""
+
+
+def white(random: Random, rate: Array) -> Array:
+    return rate + np.deg2rad(0.005) * random.normal(size=len(rate))
+
+
+def autoregressive(random: Random, rate: Array, rho: float = 0.9) -> Array:
+    noise = random.normal(size=len(rate) + 500) * np.sqrt(1.0 - rho**2)
+    return rate + np.deg2rad(0.001) * np.asarray(lfilter([1.0], [1.0, -rho], noise))[500:]
+
+
+def quantised(random: Random, rate: Array) -> Array:
+    return np.round((rate + 0.8 * COUNT * random.normal(size=len(rate))) / COUNT) * COUNT
+
+
+def biased(random: Random, rate: Array) -> Array:
+    return white(random, rate) + np.deg2rad(0.02) * random.normal()
+
+
+NOISE: dict[str, Callable[[Random, Array], Array]] = {
+    "white": white,
+    "AR(1)": autoregressive,
+    "quantised": quantised,
+    "biased": biased,
+}
+
+
+def drive(random: Random, torque: Array) -> Array:
+    """The drive torque as a current sensor tells it."""
+    return np.round((torque + 0.06 * random.normal(size=len(torque))) / 0.024) * 0.024
+
+
+REST, SLOPE = 5.0, 1.0
+
+
+def bending(*interfaces: Interface) -> tuple[Array, Array, Array]:
+    """Time, exact rate and torque of a ramp that bends bristles, up to 95 % of what they carry."""
+    top = 0.95 * sum(each.torque for each in interfaces)
+    time = INTERVAL * np.arange(round((REST + top / SLOPE) / INTERVAL))
+    torque = np.maximum(0.0, SLOPE * (time - REST))
+    # A sample of a gyro is its mean since the last one: exact differences of the angle.
+    edges = np.maximum(0.0, SLOPE * (np.append(time, time[-1] + INTERVAL) - REST - 0.5 * INTERVAL))
+    return time, np.diff(presliding_angle(edges, interfaces)) / INTERVAL, torque
+
+
+ONE = (Interface(15_000.0, 20.0),)
+TWO = (Interface(15_000.0, 21.0), Interface(400_000.0, 12.0))
+
+
+def stiffnesses(random: Random, noise: str, interfaces: tuple[Interface, ...]) -> list[Estimate]:
+    time, rate, torque = bending(*interfaces)
+    breakaway = 0.98 * sum(each.torque for each in interfaces)
+    found = fit_presliding(time, NOISE[noise](random, rate), drive(random, torque), REST, breakaway)
+    return [replace(each, systematic=()) for each in (found.stiffness, found.stiffness_at_rest)]
+
+
+def of_stiffness(draws: int, seed: int, interfaces: tuple[Interface, ...]) -> dict[str, list[bool]]:
+    held: dict[str, list[bool]] = {}
+    truths = (interfaces[0].stiffness, sum(each.stiffness for each in interfaces))
+    for noise in NOISE:
+        random = np.random.default_rng([seed, list(NOISE).index(noise), len(interfaces)])
+        for _ in range(draws):
+            found = stiffnesses(random, noise, interfaces)
+            for estimate, truth in zip(found, truths, strict=True):
+                if estimate.has_interval:  # not the 1 % whose residuals look like a misfit
+                    held.setdefault(f"{noise}, {estimate.name}", []).append(holds(estimate, truth))
+    assert all(len(each) > 0.95 * draws for each in held.values())
+    return held
+
+
+PACE = 0.25
+"""s in which the rate grows e-fold as the load lets go."""
+
+
+def letting_go(slope: float) -> tuple[Array, Array, Array, float]:
+    """Time, exact rate, torque of a load that slides away exponentially, and friction's top.
+
+    With w = w0 exp(t/tau) friction is T - J w/tau: largest where J w/tau^2 is the torque's
+    slope.
+    """
+    time = INTERVAL * np.arange(6000)
+    rate = 0.02 * np.exp((time - time[-1]) / PACE)
+    torque = 30.0 + slope * time
+    top = time[-1] + PACE * np.log(slope * PACE**2 / INERTIA / 0.02)
+    return time, rate, torque, 30.0 + slope * top - slope * PACE
+
+
+def of_torque(draws: int, seed: int) -> dict[str, list[bool]]:
+    held: dict[str, list[bool]] = {}
+    for slope in (1.0, 4.0):
+        time, rate, torque, truth = letting_go(slope)
+        for noise in NOISE:
+            random = np.random.default_rng([seed, list(NOISE).index(noise), int(slope)])
+            for _ in range(draws):
+                noisy = NOISE[noise](random, rate)
+                found = breakaway_torque(time, noisy, drive(random, torque), INERTIA, 0.005).torque
+                if found.has_interval:
+                    case = f"{noise}, {slope} N m/s"
+                    held.setdefault(case, []).append(holds(found, truth))
+    assert all(len(each) > 0.9 * draws for each in held.values())
+    return held
+
+
+RATIOS = (0.0, 0.1, 0.3, 0.5, 1.0, 3.0)
+"""Deviation of readings over one count of their sensor."""
+
+
+def of_readings(draws: int, seed: int) -> dict[str, list[bool]]:
+    held: dict[str, list[bool]] = {}
+    for ratio in RATIOS:
+        random = np.random.default_rng([seed, round(10 * ratio)])
+        for _ in range(draws):
+            mean = random.uniform(5.0, 6.0)
+            shown = np.round(mean + ratio * random.normal(size=10))
+            found = mean_of_readings("mean", shown, "", 1.0)
+            held.setdefault(f"mean, {ratio}", []).append(holds(found, mean))
+            found = deviation_of_readings("deviation", shown, "", 1.0)
+            held.setdefault(f"deviation, {ratio}", []).append(holds(found, ratio))
+    return held
+
+
+@pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
+def test_stiffness(interfaces: tuple[Interface, ...]) -> None:
+    assert not rejected(of_stiffness(5, 1, interfaces))
+
+
+def test_breakaway_torque() -> None:
+    assert not rejected(of_torque(12, 2))
+
+
+def test_readings_of_a_coarse_sensor() -> None:
+    """Wide on purpose where one count hides how they scatter."""
+    assert not rejected(of_readings(150, 3), "less")
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
+def test_stiffness_often(interfaces: tuple[Interface, ...]) -> None:
+    assert not rejected(of_stiffness(4000, 11, interfaces))
+
+
+@pytest.mark.soak
+def test_breakaway_torque_often() -> None:
+    assert not rejected(of_torque(4000, 12))
+
+
+@pytest.mark.soak
+def test_readings_often() -> None:
+    assert not rejected(of_readings(4000, 13), "less")
