@@ -20,6 +20,7 @@ from campaign.options import Options
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
 from campaign.physics.friction_paths import Keys, as_written, invalid
+from campaign.physics.known import KnownOptions, in_one_place, known_in_si
 from campaign.physics.preload import FORMER as FORMER_PRELOAD
 from campaign.physics.preload import PreloadOptions, loading, with_preload, wrong_shares
 from campaign.physics.scatter import FORMER as FORMER_VARIATION
@@ -257,10 +258,8 @@ class Bench(Options):
     """Its name, in the archive and on the page."""
     description: str = ""
     """What it is and where its numbers come from."""
-    given: tuple[str, ...] = ()
-    """Published cells it was given, `table` or `table/row/column`, * for any: `recovered`."""
-    fitted: tuple[str, ...] = ()
-    """Published cells it was fitted to, `table/row/column` or `table`: those are `calibrated`."""
+    known: KnownOptions = KnownOptions()
+    """What is known of it, and which published cells it was made from."""
     axis: AxisOptions
     """The stabilized axis."""
     appendage: AppendageOptions | None = None
@@ -294,6 +293,11 @@ class Bench(Options):
         }
         return {**tree, "compensation": named}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _known_in_one_place(cls, tree: Any) -> Any:
+        return in_one_place(tree)
+
     @field_validator("sensors")
     @classmethod
     def _sensors_are_sampled(cls, sensors: SensorsOptions, info: ValidationInfo) -> SensorsOptions:
@@ -325,18 +329,19 @@ class Bench(Options):
     def _paths_lead_somewhere(
         cls, tree: Any, handler: ModelWrapValidatorHandler[Bench], info: ValidationInfo
     ) -> Bench:
-        """Scatter and preload name what a model declares; anything else would silently not be.
+        """Scatter, preload and what is known name what is there; all else would silently not be.
 
         In the archive of a program that did not look, it was not: it is left out.
         """
         bench = handler(tree)
-        wrong = list(_wrong_paths(bench, tree))
-        if not wrong:
-            return bench
         archived = isinstance(info.context, Mapping) and info.context.get("si")
-        if archived and _in_former_spelling(tree):
+        wrong = list(_wrong_paths(bench, tree))
+        if wrong and archived and _in_former_spelling(tree):
             return bench.with_friction(bench.friction)
-        raise invalid(wrong)
+        if wrong:
+            raise invalid(wrong)
+        # What is archived is SI, and an experiment's own bench may lack what is known of the whole.
+        return bench if archived else bench.model_copy(update={"known": known_in_si(bench)})
 
     def with_friction(self, friction: Mapping[str, Any]) -> Bench:
         """This bench with other friction, and what scatter and preload say of that alone."""
@@ -347,6 +352,14 @@ class Bench(Options):
             preload = loading(self.gear.preload, friction)
             update["gear"] = self.gear.model_copy(update={"preload": preload})
         return self.model_copy(update=update)
+
+    def known_uncertainty(self, path: str) -> float | None:
+        """Standard uncertainty (1 sigma, SI) of the value at a dotted path, e.g. `axis.inertia`.
+
+        None when nobody has said how well it is known.
+        """
+        known = self.known.values.get(path)
+        return None if known is None else known.standard_deviation
 
     @property
     def torque_per_current(self) -> float:

@@ -60,11 +60,15 @@ class Lane:
     """A trial made ready: everything but its state.
 
     Attributes:
+        bench: the one that is simulated, as it is in this trial.
+        stated: whose numbers the software of the controller has: N, Kt, and what compensation is
+            built for. The same bench, unless the simulation has a truth of its own.
         f, g, h: the discretised loop; see `loop.discretise`.
         inputs: those that act on the loop, in the order of their signals.
     """
 
     bench: Bench
+    stated: Bench
     task: Task
     seed: int
     grid: Grid
@@ -78,16 +82,28 @@ class Lane:
     compensation: tuple[Interface, ...]
 
     @classmethod
-    def of(cls, bench: Bench, task: Task, seed: int, longest_step: float | None = None) -> Lane:
-        """Raises ValueError when the task's rates do not fit the bench's."""
+    def of(
+        cls,
+        bench: Bench,
+        task: Task,
+        seed: int,
+        longest_step: float | None = None,
+        stated: Bench | None = None,
+    ) -> Lane:
+        """Raises ValueError when the task's rates do not fit the bench's.
+
+        `stated`: see the attribute; None for `bench`.
+        """
+        stated = stated or bench
         bench = as_it_is(bench, seed)
         grid = make_grid(bench, task, longest_step)
-        compensator = make_compensator(bench, task.compensation)
-        loop = _loop(bench, task, compensator, grid)
+        compensator = make_compensator(stated, task.compensation)
+        loop = _loop(bench, task, compensator, grid, stated)
         f, g, h = discretise(loop.a, loop.b, grid.step)
         moves = task.mode != "prescribed"
         return cls(
             bench=bench,
+            stated=stated,
             task=task,
             seed=seed,
             grid=grid,
@@ -200,12 +216,12 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
     )
 
 
-def _loop(bench: Bench, task: Task, compensator: Compensator, grid: Grid) -> Loop:
+def _loop(bench: Bench, task: Task, compensator: Compensator, grid: Grid, stated: Bench) -> Loop:
     match task.mode:
         case "spring":
             return make_spring(bench, task.spring_stiffness)
         case "rate" | "torque" if grid.per_control == 0:
-            return make_loop(bench, task.mode, compensator)
+            return make_loop(bench, task.mode, compensator, stated)
     return make_plant(bench)
 
 
@@ -335,8 +351,8 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
         period=each(_period),
         proportional=each(lambda lane: lane.bench.controller.rate.proportional),
         integral=each(lambda lane: lane.bench.controller.rate.integral_gain),
-        torque_per_current=each(lambda lane: lane.bench.torque_per_current),
-        ratio=each(lambda lane: lane.bench.gear.ratio),
+        torque_per_current=each(lambda lane: lane.stated.torque_per_current),
+        ratio=each(lambda lane: lane.stated.gear.ratio),
         filter_pole=each(_filter_pole),
         pointing_pole=each(
             lambda lane: math.exp(

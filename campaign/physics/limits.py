@@ -151,12 +151,13 @@ def worst_friction(bench: Bench, rate: float) -> float:
     total = 0.0
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
-        speed = rate * (bench.gear.ratio if friction.velocity == "motor" else 1.0)
+        ratio, rate_ratio = friction.at_load(bench.gear.ratio)
+        speed = rate * rate_ratio
         speeds = np.concatenate([-shares, shares]) * speed
         viscous = model.viscous(friction)
         dry = float(np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds)))
         torque = dry * (1.0 + friction.ripple.amplitude) + viscous * speed
-        total += torque * (bench.gear.ratio if friction.side == "motor" else 1.0)
+        total += torque * ratio
     return total
 
 

@@ -74,11 +74,7 @@ def make_compensator(bench: Bench, name: str) -> Compensator:
 
 def at_load(friction: FrictionOptions, bench: Bench) -> tuple[float, float]:
     """What one N m of this interface counts at the load, and its rate per load relative rate."""
-    ratio = bench.gear.ratio
-    return (
-        ratio if friction.side == "motor" else 1.0,
-        ratio if friction.velocity == "motor" else 1.0,
-    )
+    return friction.at_load(bench.gear.ratio)
 
 
 def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
@@ -88,9 +84,19 @@ def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
     return model.viscous(friction) * torque * rate
 
 
-def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compensator) -> Loop:
-    """The loop with a continuous controller, closed on the rate or open for a torque command."""
+def make_loop(
+    bench: Bench,
+    mode: Literal["rate", "torque"],
+    compensator: Compensator,
+    stated: Bench | None = None,
+) -> Loop:
+    """The loop with a continuous controller, closed on the rate or open for a torque command.
+
+    `stated`: the bench by whose N Kt the controller makes torques of currents and currents of
+    torques, where that is not the one it drives.
+    """
     block = compensator.linear
+    per_current = (stated or bench).torque_per_current
     order = 0 if block is None else len(block.c)
     filtered = bench.controller.relative_rate_filter > 0.0
     rate_integral = _plant_order(bench)
@@ -108,10 +114,10 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
 
     torque_x, torque_u = np.zeros(len(a)), np.zeros(INPUTS)
     if block is not None:
-        _add_block(a, b, block, first, bench.torque_per_current, filter_x, filter_u)
+        _add_block(a, b, block, first, per_current, filter_x, filter_u)
         torque_x[first:] = block.c
         torque_x[RATE] += block.d[0]
-        torque_x[CURRENT] += block.d[1] * bench.torque_per_current
+        torque_x[CURRENT] += block.d[1] * per_current
         torque_x += block.d[2] * filter_x
         torque_u += block.d[2] * filter_u
 
@@ -122,12 +128,12 @@ def make_loop(bench: Bench, mode: Literal["rate", "torque"], compensator: Compen
         command_x[rate_integral] = gains.integral_gain
         a[rate_integral, RATE], b[rate_integral, DRIVE] = -1.0, 1.0
     else:
-        command_u[DRIVE] = 1.0 / bench.torque_per_current
-    command_x += torque_x / bench.torque_per_current
-    command_u += torque_u / bench.torque_per_current
-    command_u[COMPENSATION] += 1.0 / bench.torque_per_current
+        command_u[DRIVE] = 1.0 / per_current
+    command_x += torque_x / per_current
+    command_u += torque_u / per_current
+    command_u[COMPENSATION] += 1.0 / per_current
     for friction, gain in compensator.friction:
-        viscous = gain * viscous_at_load(friction, bench) / bench.torque_per_current
+        viscous = gain * viscous_at_load(friction, bench) / per_current
         command_x += viscous * filter_x
         command_u += viscous * filter_u
     _close_current_loop(a, b, bench, command_x, command_u)

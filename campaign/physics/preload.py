@@ -132,7 +132,7 @@ def with_preload(
         return dict(friction)
     loaded = _loaded(friction)
     declared = {name: torques(options) for name, options in loaded.items()}
-    ratios = {name: ratio if f.side == "motor" else 1.0 for name, f in loaded.items()}
+    ratios = {name: options.at_load(ratio)[0] for name, options in loaded.items()}
     added: dict[str, dict[str, float]] = {name: {} for name in loaded}
     for path, share in preload.by_path.items():
         gaining = dict(matched(path, declared))

@@ -22,9 +22,8 @@ def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
     dry, viscous = np.zeros_like(rate), np.zeros_like(rate)
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
-        ratio = bench.gear.ratio
-        torque = ratio if friction.side == "motor" else 1.0
-        speed = rate * (ratio if friction.velocity == "motor" else 1.0)
+        torque, rate_ratio = friction.at_load(bench.gear.ratio)
+        speed = rate * rate_ratio
         linear = model.viscous(friction) * speed
         viscous += torque * linear
         dry += torque * (model.steady_state(friction, speed) - linear)

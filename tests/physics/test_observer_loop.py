@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.experiments.observer_gain import amplitude
+from campaign.identification.sine_amplitude import amplitude
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.signals import Sine
-from campaign.trial import Channel, Recording
 from tests.physics.benches import INERTIA, KT, RATIO, bench, run, task
 
 FREQUENCY = np.geomspace(0.05, 50.0, 40)
@@ -68,8 +67,8 @@ def test_the_simulated_loop_rejects_as_equation_5_4_says(name: str, frequency: f
     stop = 2.0 + 4 / frequency
     time, out = run(linear(), task(compensation=name, disturbance=disturbance, duration=stop))
     late = time >= 2.0
-    channel = Channel("w", "rad/s", "", "", out["load_rate"][late])
-    measured = amplitude(Recording(time[late], {"w": channel}), "w", frequency) / 5.0
+    rate = amplitude("rate", time[late], out["load_rate"][late], frequency, "rad/s")
+    measured = rate.value / 5.0
     corner = 2.0 if name == "observer" else 0.0
     expected = abs(theory.rejection(linear(), corner, None, np.array([frequency]))[0])
     assert measured == pytest.approx(expected, rel=0.02)

@@ -41,6 +41,16 @@ class FrictionOptions(Options):
     ripple: Ripple = Ripple()
     """How the torque varies with the angle of the load."""
 
+    def at_load(self, ratio: float) -> tuple[float, float]:
+        """What one N m of it counts at the load behind a gear `ratio`, and its rate per load rate.
+
+        The rates are relative to the hull.
+        """
+        return (
+            ratio if self.side == "motor" else 1.0,
+            ratio if self.velocity == "motor" else 1.0,
+        )
+
 
 @dataclass(frozen=True)
 class Presliding:

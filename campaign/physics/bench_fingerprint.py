@@ -1,0 +1,118 @@
+"""Which bench it is: a hash over the SI values that act on motion.
+
+Left out is what acts on nothing: names, comments, limits, how well values are known, and whatever
+is absent, off or at its default, so that an optional field of a later program alters no bench. Each
+compensation has a hash of its own, so that adding another alters nothing. The values at the bench's
+`operating` paths are left out, too, but which paths these are is not. Nor is which published cells
+the bench was made from: whoever takes one of them away describes another bench.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+from campaign.physics.bench import Bench
+from campaign.physics.friction.interface import Ripple
+from campaign.physics.known import FingerprintOptions
+from campaign.physics.scatter import VariationOptions
+from campaign.trial import canonical_json
+
+DIGITS = 12
+"""significant ones that count: the same value in another unit differs in the last bits."""
+NOT_MOTION = frozenset(
+    {("name",), ("description",), ("known",), ("limits",), ("compensation",), ("axis", "name")}
+)
+"""Fields of a bench that move nothing; compensations are hashed one by one."""
+STATED = ("given", "fitted", "seen", "operating")
+"""Lists of `known` that count nevertheless, in any order and where they name something."""
+
+
+def fingerprint(bench: Bench) -> FingerprintOptions:
+    """The fingerprint of a bench and of each of its compensations."""
+    operating = frozenset(tuple(path.split(".")) for path in bench.known.operating)
+    acting = {"bench": _acting(bench, (), NOT_MOTION | operating)}
+    for name in STATED:
+        if entries := getattr(bench.known, name):
+            acting[name] = sorted(set(entries))
+    return FingerprintOptions(
+        bench=_hash(acting),
+        compensation={
+            name: _hash(_acting(options, ("compensation", name), operating))
+            for name, options in bench.compensation.items()
+        },
+    )
+
+
+def why_altered(bench: Bench, compensation: str = "none") -> str:
+    """Why this is not the bench that it says something is known of; "" when it is, or says nothing.
+
+    Args:
+        compensation: the method that runs on it; what the others are does not matter then.
+    """
+    if not bench.known.describes:
+        return ""
+    stated = bench.known.fingerprint
+    if stated is None:
+        return f"the bench '{bench.name}' states no fingerprint of the bench that was described"
+    now = fingerprint(bench)
+    if now.bench != stated.bench:
+        return f"the bench is not the '{bench.name}' that was described"
+    if compensation == "none" or compensation not in now.compensation:
+        return ""
+    if compensation not in stated.compensation:
+        return f"the compensation '{compensation}' was not there when '{bench.name}' was described"
+    if now.compensation[compensation] != stated.compensation[compensation]:
+        return f"the compensation '{compensation}' is not the one of '{bench.name}' as described"
+    return ""
+
+
+def _acting(options: BaseModel, keys: tuple[str, ...], without: frozenset[tuple[str, ...]]) -> Any:
+    """What of a table differs from its defaults, without the fields at the paths `without`."""
+    if _is_off(options):
+        return {}
+    found: dict[str, Any] = {}
+    for name, field in type(options).model_fields.items():
+        value, here = getattr(options, name), (*keys, name)
+        default = field.get_default(call_default_factory=True, validated_data={})
+        at_default = default is not PydanticUndefined and value == default
+        if here in without or value is None or at_default:
+            continue
+        plain = _plain(value, here, without)
+        if plain != {} and plain != []:
+            found[name] = plain
+    return found
+
+
+def _plain(value: Any, keys: tuple[str, ...], without: frozenset[tuple[str, ...]]) -> Any:
+    if isinstance(value, BaseModel):
+        return _acting(value, keys, without)
+    if isinstance(value, Mapping):
+        inside = {
+            str(key): _plain(item, (*keys, str(key)), without)
+            for key, item in value.items()
+            if (*keys, str(key)) not in without
+        }
+        return {key: item for key, item in inside.items() if item != {}}
+    if isinstance(value, list | tuple):
+        return [_plain(item, keys, without) for item in value]
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}") + 0.0  # -0 is 0
+    return value if isinstance(value, bool | int) else str(value)
+
+
+def _is_off(options: BaseModel) -> bool:
+    """Whether a table is there and does nothing."""
+    if isinstance(options, Ripple):
+        return options.amplitude == 0.0
+    if isinstance(options, VariationOptions):
+        return not options.day_to_day and not options.trial_to_trial
+    return False
+
+
+def _hash(acting: Any) -> str:
+    return hashlib.sha256(canonical_json(acting).encode()).hexdigest()[:16]
