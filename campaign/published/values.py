@@ -18,12 +18,13 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from campaign.errors import UsageError
 from campaign.options import Options
+from campaign.published.patterns import covers
 from campaign.result import Value
 from campaign.units import to_si
 
 T = TypeVar("T")
-Relation = Literal["equal", "near", "at most", "at least"]
-Verdict = Literal["inconsistent", "not reproducible"]
+Relation = Literal["equal", "near", "at most", "at least", "rank"]
+Mark = Literal["inconsistent", "not reproducible"]
 
 
 class Part(Options):
@@ -36,7 +37,8 @@ class Part(Options):
     unit: str | None = None
     """The unit of the printed number; absent for a number without one."""
     relation: Relation | None = None
-    """What the document claims: this value (the default), near it, at most or at least it."""
+    """What the document claims: this value (the default), near it, at most or at least it; or that
+    it is a place in an order, of which no percent can be told."""
     decimals: int | None = Field(default=None, ge=0, le=12)
     """Printed digits after the point."""
     conditions: dict[str, str | int | float | bool] = {}
@@ -58,11 +60,12 @@ class MarkOptions(Options):
     """A remark on some cells of a table."""
 
     cells: tuple[str, ...] = Field(min_length=1)
-    """`row/column`; `*` stands for all of them."""
-    status: Verdict | None = None
+    """`row/column` or `row`; `*` stands for all of them."""
+    status: Mark | None = None
     """Whether the document contradicts itself there, or nobody could reproduce it."""
     repeats: tuple[str, ...] = ()
-    """Tables whose condition they have too, or that they follow from: fitted there, fitted here."""
+    """Tables, rows or cells whose condition they have too, or that they follow from: fitted there,
+    or seen there, is fitted or seen here."""
     reason: str = Field(min_length=1)
     """Why, or what to know about it."""
 
@@ -75,7 +78,7 @@ class TableOptions(Part):
     title: str
     """What it shows."""
     domain: Literal["", "simulation", "hardware"] = ""
-    """Where the document has it from; for the reader, not matched."""
+    """Where the document has it from; for reader and headline, not matched."""
     rows: Names | None = None
     """What row names are values of."""
     columns: Names | None = None
@@ -121,7 +124,7 @@ class TableOptions(Part):
             if row not in self.cells:
                 raise ValueError(f"row {row!r} has no cells")
         for pattern in (pattern for mark in self.mark for pattern in mark.cells):
-            if not any(_covers(pattern, row, column) for row in self.cells for column in columns):
+            if not any(covers(pattern, f"{row}/{col}") for row in self.cells for col in columns):
                 raise ValueError(f"a mark names {pattern!r}, which is no row/column of it")
         return self
 
@@ -130,7 +133,7 @@ class TableOptions(Part):
         return (
             mark
             for mark in self.mark
-            if any(_covers(pattern, row, column) for pattern in mark.cells)
+            if any(covers(pattern, f"{row}/{column}") for pattern in mark.cells)
         )
 
 
@@ -154,8 +157,9 @@ class Cell:
         decimals: printed digits after the point, None when unknown.
         status: `inconsistent`, `not reproducible` or None; `reason` says why.
         notes: what else to know about it.
-        repeats: tables that were measured at the same condition, or that it follows from.
+        repeats: tables or cells that were measured at the same condition, or that it follows from.
         symbol: the document's sign for its row, or for its column.
+        domain: where the document has it from, "simulation" or "hardware"; "" when it does not say.
     """
 
     table: str
@@ -167,11 +171,12 @@ class Cell:
     conditions: Mapping[str, Value]
     relation: Relation = "equal"
     decimals: int | None = None
-    status: Verdict | None = None
+    status: Mark | None = None
     reason: str = ""
     notes: tuple[str, ...] = ()
     repeats: tuple[str, ...] = ()
     symbol: str = ""
+    domain: str = ""
 
     @property
     def path(self) -> str:
@@ -284,12 +289,8 @@ def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
         notes=tuple(mark.reason for mark in marks if mark.status is None),
         repeats=tuple(name for mark in marks for name in mark.repeats),
         symbol=parts[1].symbol or parts[2].symbol,
+        domain=str(conditions.get("domain", table.domain)),
     )
-
-
-def _covers(pattern: str, row: str, column: str) -> bool:
-    wanted_row, _, wanted_column = pattern.partition("/")
-    return wanted_row in ("*", row) and wanted_column in ("*", column)
 
 
 def _innermost(values: Iterable[T | None]) -> T | None:

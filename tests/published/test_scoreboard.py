@@ -8,12 +8,13 @@ import math
 
 import pytest
 
+from campaign.estimate import Estimate
+from campaign.published.provenance import Place, Provenance
 from campaign.published.scoreboard import (
     COLUMNS,
     Evidence,
     Line,
     Scoreboard,
-    Status,
     score,
     to_csv,
 )
@@ -58,6 +59,7 @@ rise_time = [40]
 )
 SHAKEN = {"acceleration": math.radians(18), "compensation": "none", "frequency": 0.5}
 ERROR = Finding("error", 0.55e-3, "rad", SHAKEN)
+ALTERED = Provenance((Place({}, "none", "somebody changed it"),))
 
 
 def board(*findings: Finding, **more: object) -> Scoreboard:
@@ -91,16 +93,27 @@ def test_every_condition_of_the_cell_must_be_stated_and_met(
 ) -> None:
     conditions = {k: v for k, v in {**SHAKEN, **changed}.items() if v is not None}
     found = board(Finding("error", 0.55e-3, "rad", conditions))
-    assert any(line.cell.path == "1.1/0.5/none" for line in found.lines) is matches
+    assert (line(found, "1.1/0.5/none").found is not None) is matches
 
 
 def test_another_quantity_does_not_match() -> None:
     found = board(Finding("peak_error", 0.55e-3, "rad", SHAKEN))
-    assert [cell.path for cell in found.missing] == [
+    assert {line.verdict for line in found.lines} == {"not run"}
+
+
+def test_every_cell_of_a_table_that_was_spoken_to_is_a_line() -> None:
+    """What was not tried must not leave the board: it would look complete."""
+    found = board(ERROR)
+    assert [line.cell.path for line in found.lines] == [
         "1.1/0.5/none",
+        "1.1/0.5/lugre",
+        "1.1/2.0/none",
         "1.1/2.0/lugre",
         "text 1.2/rise_time/value",
     ]
+    assert [line.verdict for line in found.lines] == ["agrees", *["not run"] * 4]
+    marks = [None, "inconsistent", "not reproducible", None, None]
+    assert [line.status for line in found.lines] == ["simulated", *marks[1:]]
 
 
 def test_a_table_nobody_reproduces_is_not_spoken_to() -> None:
@@ -118,10 +131,21 @@ def test_a_table_nobody_reproduces_is_not_spoken_to() -> None:
         ({"fitted": ("1.1/0.5/none",)}, False, "calibrated"),
         ({"fitted": ("1.1/0.5/lugre",)}, False, "predicted"),
         ({"fitted": ("1.11", "1.1/0.5/no")}, False, "predicted"),
+        ({"fitted": ("1.1/*/none",)}, False, "calibrated"),
+        ({"fitted": ("*/0.5",)}, False, "calibrated"),
+        ({"fitted": ("1.1/*/lugre",)}, False, "predicted"),
+        ({"fitted": ("1.1/0.5/none/x",)}, False, "predicted"),
+        ({"seen": ("1.1",)}, False, "selected"),
+        ({"seen": ("1.1/*/none",), "fitted": ("5.3",)}, False, "selected"),
+        ({"seen": ("1.1",)}, True, "recomputed"),
+        ({"seen": ("1.1",), "given": ("1.1",)}, False, "recovered"),
+        ({"seen": ("1.1",), "fitted": ("1.1",)}, False, "calibrated"),
+        ({"seen": ("1.1/0.5/lugre",)}, False, "simulated"),
+        ({"fitted": ("1.1",), "provenance": ALTERED}, True, "altered"),
     ],
 )
 def test_the_first_status_that_applies(
-    more: dict[str, tuple[str, ...]], recomputed: bool, status: str
+    more: dict[str, object], recomputed: bool, status: str
 ) -> None:
     finding = Finding("error", 0.55e-3, "rad", SHAKEN, recomputed)
     assert line(board(finding, **more), "1.1/0.5/none").status == status
@@ -139,7 +163,7 @@ def test_a_published_zero_has_no_deviation_in_percent() -> None:
     conditions = {**SHAKEN, "compensation": "lugre", "frequency": 2.0}
     found = line(board(Finding("error", 0.01e-3, "rad", conditions)), "1.1/2.0/lugre")
     assert found.deviation is None
-    assert found.agrees is True
+    assert found.verdict == "agrees"
 
 
 def test_nan_is_no_finding() -> None:
@@ -150,19 +174,31 @@ def test_the_first_test_that_found_a_cell_counts() -> None:
     other = Finding("error", 0.6e-3, "rad", SHAKEN)
     empty = Finding("error", math.nan, "rad", SHAKEN)
     tests = [Evidence(n, ("1.1",), [f]) for n, f in (("a", empty), ("b", ERROR), ("c", other))]
+    found = score(PUBLISHED, tests)
+    assert line(found, "1.1/0.5/none").test == "b"
+    assert [(line.test, line.reproduced) for line in found.further] == [("c", pytest.approx(0.6))]
+
+
+def test_a_number_counts_before_a_bound_that_an_earlier_test_found() -> None:
+    bound = Finding("error", 0.3e-3, "rad", SHAKEN, lower_bound=True)
+    tests = [Evidence(n, ("1.1",), [f]) for n, f in (("a", bound), ("b", ERROR))]
     assert line(score(PUBLISHED, tests), "1.1/0.5/none").test == "b"
+    within = score(PUBLISHED, [Evidence("a", ("1.1",), [bound, ERROR])])
+    assert line(within, "1.1/0.5/none").reproduced == pytest.approx(0.55)
+    assert within.further == ()
 
 
 @pytest.mark.parametrize(("seconds", "met"), [(0.039, True), (0.040, True), (0.041, False)])
 def test_a_claim_is_met_or_not(seconds: float, met: bool) -> None:
     found = line(board(Finding("rise_time", seconds, "s", {})), "text 1.2/rise_time/value")
-    assert found.agrees is met
+    assert found.verdict == ("met" if met else "missed")
+    assert found.deviation == (None if met else pytest.approx(2.5))
 
 
 def test_agreement_to_the_printed_digit() -> None:
     for value, agrees in ((0.549e-3, True), (0.5501e-3, False), (0.451e-3, True)):
         found = line(board(Finding("error", value, "rad", SHAKEN)), "1.1/0.5/none")
-        assert found.agrees is agrees
+        assert found.verdict == ("agrees" if agrees else "differs")
 
 
 def test_what_is_known_of_the_test_holds_for_its_findings() -> None:
@@ -187,7 +223,8 @@ def test_an_unknown_table_is_told() -> None:
 def test_the_file_has_exactly_these_columns_and_unrounded_values() -> None:
     rows = list(csv.DictReader(io.StringIO(to_csv(board(ERROR).lines))))
     assert tuple(rows[0]) == COLUMNS == (
-        "table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status"
+        "table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status",
+        "low", "high", "verdict", "source"
     )  # fmt: skip
     by_cell = {(r["row"], r["column"]): r for r in rows}
     found = by_cell["0.5", "none"]
@@ -202,11 +239,34 @@ def test_a_failed_trial_keeps_its_cells_on_the_board() -> None:
     """Otherwise a method that diverges would make the board look better."""
     tried = Evidence("shaken", ("1.1",), (), failed=True)
     found = score(PUBLISHED, [tried])
-    assert not found.missing
-    assert {line.status for line in found.lines} <= {Status.NOT_REPRODUCIBLE, Status.INCONSISTENT}
+    assert {line.verdict for line in found.lines} == {"not found"}
     assert all(line.reproduced is None for line in found.lines)
 
 
-def test_a_lower_bound_answers_only_a_claim_of_at_least() -> None:
-    bound = Finding("error", 0.55e-3, "rad", SHAKEN, lower_bound=True)
-    assert "1.1/0.5/none" in [cell.path for cell in board(bound).missing]
+def test_the_file_has_the_interval_and_a_bound_only_on_its_side() -> None:
+    found = Estimate("error", 0.56e-3, "rad", 0.5e-3, 0.6e-3, 0.95)
+    bound = Estimate.without_interval("error", 0.3e-3, "rad", "never passed", kind="at least")
+    there = {**SHAKEN, "compensation": "lugre"}
+    evidence = Evidence(
+        "t", ("1.1",), [Finding.of(found, SHAKEN), Finding.of(bound, there)], source="hardware"
+    )
+    rows = list(csv.DictReader(io.StringIO(to_csv(score(PUBLISHED, [evidence]).lines))))
+    number, beyond = rows[0], rows[1]
+    ends = [float(number["low"]), float(number["high"])]
+    assert ends == pytest.approx([0.5, 0.6], rel=1e-12)
+    assert (number["verdict"], number["source"]) == ("compatible", "hardware")
+    assert (beyond["reproduced"], beyond["high"]) == ("", "")
+    assert float(beyond["low"]) == pytest.approx(0.3)
+    assert beyond["verdict"] == "not reached"
+    assert (rows[3]["verdict"], rows[3]["status"], rows[3]["source"]) == ("not run", "", "")
+
+
+def test_the_file_of_further_runs_says_who_found_them() -> None:
+    tests = [Evidence(name, ("1.1",), [ERROR]) for name in ("first", "again")]
+    (row,) = csv.DictReader(io.StringIO(to_csv(score(PUBLISHED, tests).further, tests=True)))
+    assert (row["test"], row["row"]) == ("again", "0.5")
+
+
+def test_an_altered_bench_is_told_with_the_reason() -> None:
+    found = board(ERROR, provenance=ALTERED)
+    assert found.altered == ("test: somebody changed it",)

@@ -1,0 +1,160 @@
+"""What a test ran on, held against what its bench says of itself, trial by trial."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from campaign.physics.bench import Bench
+from campaign.published.provenance import provenance_of
+from campaign.trial import Role, Task, Tree, Trial
+
+BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
+
+
+def described(name: str = "platform") -> Tree:
+    text = (BENCHES / f"{name}.toml").read_text(encoding="utf-8")
+    return Bench.model_validate(tomllib.loads(text)).model_dump(mode="json")
+
+
+def with_value(path: str, value: Any, bench: Tree | None = None) -> Tree:
+    tree: Any = copy.deepcopy(bench or described())
+    *above, last = path.removeprefix("bench.").split(".")
+    table = tree
+    for key in above:
+        table = table[key]
+    table[last] = value
+    return tree
+
+
+def trial(
+    bench: Tree,
+    compensation: str = "none",
+    role: Role = Role.MEASUREMENT,
+    truth: str = "",
+    **point: Any,
+) -> Trial:
+    task = Task(
+        mode="rate", duration=1.0, window=(0.0, 1.0), sample_rate=10.0, compensation=compensation
+    )
+    return Trial(
+        number=1,
+        test="t",
+        kind="k",
+        seed=1,
+        bench=bench,
+        task=task,
+        role=role,
+        point=point,
+        truth=truth,
+    )
+
+
+def test_the_bench_as_described() -> None:
+    found = provenance_of([trial(described()), trial(described(), "lugre")])
+    assert found.why_altered({}) == ""
+
+
+def test_a_changed_bench_alters_what_it_found() -> None:
+    found = provenance_of([trial(with_value("axis.inertia", 60.0))])
+    assert "not the 'platform' that was described" in found.why_altered({})
+
+
+def test_only_the_points_that_the_conditions_name() -> None:
+    path = "bench.axis.inertia"
+    trials = [trial(with_value(path, v), **{path: v}) for v in (68.7796, 60.0)]
+    found = provenance_of(trials)
+    assert found.why_altered({path: 68.7796}) == ""
+    assert found.why_altered({path: 60.0})
+    assert found.why_altered({}), "it may be of both"
+    assert found.why_altered({path: 5.0}), "where no point fits, all are behind it"
+
+
+def test_a_matrix_over_an_operating_path_alters_nothing() -> None:
+    path = "bench.gear.preload.torque"
+    trials = [trial(with_value(path, v), **{path: v}) for v in (33.0, 50.0)]
+    assert provenance_of(trials).why_altered({}) == ""
+
+
+def test_a_compensation_counts_where_it_runs() -> None:
+    bench = with_value("compensation.lugre.gain", 0.5)
+    found = provenance_of([trial(bench, name) for name in ("none", "static", "lugre")])
+    assert found.why_altered({"compensation": "static"}) == ""
+    assert "compensation 'lugre'" in found.why_altered({"compensation": "lugre"})
+
+
+def test_warm_ups_are_behind_nothing() -> None:
+    other = trial(with_value("axis.inertia", 60.0), role=Role.WARM_UP)
+    assert provenance_of([other, trial(described())]).why_altered({}) == ""
+
+
+@pytest.mark.parametrize("bench", [described(), with_value("known", {})])
+@pytest.mark.parametrize("perturbs", [False, True])
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_truth_is_another_bench_whatever_is_stated(
+    bench: Tree, perturbs: bool, kept: bool
+) -> None:
+    trials = [trial(bench, case="stated"), trial(bench, truth="0" * 64, case="true")]
+    found = provenance_of(trials, perturbs_bench=perturbs, described=described() if kept else None)
+    assert found.why_altered({"case": "true"}) == "its samples are of another bench, the truth"
+    assert found.why_altered({"case": "stated"}) == ""
+
+
+def test_a_declared_study_of_perturbations_counts_by_its_reference() -> None:
+    perturbed = [
+        trial(with_value("friction.load.static_torque", v), change=v) for v in (10.0, 30.0)
+    ]
+    assert provenance_of(perturbed).why_altered({}), "an experiment that does not declare it"
+    declared = provenance_of(perturbed, perturbs_bench=True, described=described())
+    assert declared.why_altered({}) == ""
+    altered = with_value("axis.inertia", 60.0)
+    found = provenance_of(perturbed, perturbs_bench=True, described=altered)
+    assert found.why_altered({})
+
+
+def test_a_matrix_beneath_a_study_of_perturbations_still_alters() -> None:
+    path = "bench.axis.inertia"
+    trials = [trial(with_value(path, 60.0), **{path: 60.0})]
+    assert provenance_of(trials, perturbs_bench=True, described=described()).why_altered({})
+
+
+def test_without_the_reference_one_unperturbed_trial_stands_for_it() -> None:
+    """Of an archive that did not keep the protocol's benches."""
+    perturbed = trial(with_value("friction.load.static_torque", 30.0))
+    both = provenance_of([trial(described()), perturbed], perturbs_bench=True)
+    assert both.why_altered({}) == ""
+    assert provenance_of([perturbed], perturbs_bench=True).why_altered({})
+
+
+def test_a_swept_table_goes_by_a_name_that_may_be_any_of_them() -> None:
+    path = "bench.friction.load"
+    table = described()["friction"]["load"]
+    found = provenance_of([trial(described(), **{path: table})])
+    assert found.why_altered({path: "lugre"}) == ""
+
+
+@pytest.mark.parametrize(
+    ("bench", "told"),
+    [
+        ({"name": "x"}, "cannot be read"),
+        (with_value("known", {"fitted": ["5.3"]}), "states no fingerprint"),
+        (with_value("known", {}), ""),
+    ],
+)
+def test_benches_of_all_ages(bench: Tree, told: str) -> None:
+    why = provenance_of([trial(bench)]).why_altered({})
+    assert told in why
+    assert bool(why) is bool(told)
+
+
+def test_an_archive_of_an_older_program_has_the_former_places() -> None:
+    """It was calibrated, and nobody can tell whether it still is that bench."""
+    old = {key: value for key, value in described().items() if key != "known"}
+    plain = trial({**old, "given": [], "fitted": []})
+    assert provenance_of([plain]).why_altered({}) == ""
+    fitted = trial({**old, "given": ["4.3"], "fitted": ["5.3"]})
+    assert "states no fingerprint" in provenance_of([fitted]).why_altered({})
