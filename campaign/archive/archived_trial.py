@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -40,6 +40,7 @@ class ArchivedTrial:
         entry: its group there.
         windows: parts that its analysis uses, where they are not the one in `trial`.
         estimates: what was found while it was executed.
+        measured_by: which code found that, with its version.
     """
 
     trial: Trial
@@ -51,6 +52,7 @@ class ArchivedTrial:
     samples: Samples = field(repr=False)
     windows: tuple[Window, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    measured_by: str = ""
 
     @property
     def not_kept(self) -> str:
@@ -71,6 +73,10 @@ class ArchivedTrial:
     def channel_names(self) -> frozenset[str]:
         """The names of `channels`."""
         return frozenset(channel.name for channel in self.channels())
+
+    def unmeasured(self) -> ArchivedTrial:
+        """The same trial as if nothing had been measured while it was executed."""
+        return replace(self, estimates=(), measured_by="")
 
     def problems(self) -> Iterator[str]:
         """Reads every sample in flat memory; what is damaged, by trial and channel."""

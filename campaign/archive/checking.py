@@ -351,10 +351,12 @@ class _Check:
         broken = {damage.place.split(":")[0] for damage in self.problems.found}
         if not any(place.startswith(journal) for place in broken) or story.damaged:
             consistency.check_journal(story, run.header, journal, self.problems)
+            consistency.check_stages(story, run.header, journal, self.problems)
             consistency.check_trials(story, self.trials, self.unreadable, self.problems)
         if not any(place.startswith(plan) for place in broken):
             executed = self.trials.values()
-            consistency.check_plan(run.plan, run.header, executed, plan, self.problems)
+            followed = len(run.plan) - len(run.first_stage)
+            consistency.check_plan(run.plan, run.header, executed, plan, self.problems, followed)
             with self.problems.noting():
                 consistency.check_full_plan(
                     run.full_plan, run.plan, f"{plan} in full", self.problems

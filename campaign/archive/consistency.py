@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import DamageList
 from campaign.archive.entries import entry_names
+from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import FullPlan
 from campaign.archive.header import PlannedTrial, RunHeader
 from campaign.archive.journal import RunStarted
@@ -70,6 +72,18 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
         found.add(place, f"tells of {started[0].trials} trials; {header.trials} are planned")
 
 
+def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
+    """The trials that followed are numbered on after the plan's, and no stage was asked twice."""
+    stages = stages_in(story.entries)
+    numbers = [trial.number for trial in planned_in(stages)]
+    if numbers != list(range(header.trials + 1, header.trials + 1 + len(numbers))):
+        found.add(place, "tells of trials that followed, and does not number them after the plan's")
+    asked = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
+    for text, count in asked.items():
+        if count > 1:
+            found.add(place, f"tells {count} times which trials follow at {text}")
+
+
 def check_trials(
     story: Lines, there: Mapping[str, Executed], unreadable: Iterable[str], found: DamageList
 ) -> None:
@@ -94,10 +108,12 @@ def check_plan(
     there: Iterable[Executed],
     place: str,
     found: DamageList,
+    followed: int = 0,
 ) -> None:
-    """Each executed trial is the one that was planned."""
-    if len(plan) != header.trials:
-        found.add(place, f"has {len(plan)} trials, and the header says {header.trials}")
+    """Each executed trial is the one that was planned; `followed` of them are not in the header."""
+    if len(plan) - followed != header.trials:
+        what = f"has {len(plan) - followed} trials, and the header says {header.trials}"
+        found.add(place, what)
     planned = {trial.number: trial for trial in plan}
     for trial in there:
         wanted = planned.get(trial.number)

@@ -8,8 +8,9 @@ from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.damage import DamageList
 from campaign.archive.entries import ENTRY, entry_name, entry_names
 from campaign.archive.files import why
+from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
-from campaign.archive.header import PARTIAL, RunStatus
+from campaign.archive.header import PARTIAL, PlannedTrial, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted, TrialFinished
 from campaign.archive.run_folder import (
     PLAN,
@@ -43,6 +44,10 @@ def open_folder(folder: Path) -> RunReader:
             else:
                 trials.append(archived)
     ended = story.ended
+    planned: tuple[PlannedTrial, ...] = damaged.read(
+        lambda: parse_plan(folder / PLAN, read_plan_text(folder)), ()
+    )
+    stages = stages_in(story.entries)
     return RunReader(
         path=folder,
         header=header,
@@ -50,12 +55,13 @@ def open_folder(folder: Path) -> RunReader:
         reason=ended.reason if ended else "the run is in progress or was killed",
         safe_state=ended.safe_state if ended else SafeState.NOT_CONFIRMED,
         ended=ended.at if ended else "",
-        plan=damaged.read(lambda: parse_plan(folder / PLAN, read_plan_text(folder)), ()),
+        plan=planned + planned_in(stages),
         trials=tuple(trials),
         journal=story.text,
-        full_plan=FullPlan(folder, lambda: _plan_texts(folder)),
+        full_plan=FullPlan(folder, lambda: _plan_texts(folder), stages),
         damaged=tuple(damaged.found),
         earlier_attempts={number: tuple(found) for number, found in earlier.items()},
+        stages=stages,
     )
 
 

@@ -13,6 +13,8 @@ from functools import cached_property
 from pathlib import Path
 
 from campaign.archive.files import write_lines_atomically
+from campaign.archive.followed import trials_in
+from campaign.archive.journal import JOURNAL, TrialsFollowed
 from campaign.archive.record import parse_trees, restored_trial, shared_trees, trees_text
 from campaign.archive.run_folder import first_line
 from campaign.errors import ArchiveError
@@ -43,10 +45,12 @@ class FullPlan:
     Attributes:
         path: of the run, for messages.
         texts: reads the two files; empty texts in an archive of format 1. Raises ArchiveError.
+        stages: of the journal; their trials come after those of the two files.
     """
 
     path: Path
     texts: Callable[[], tuple[str, str]] = field(repr=False)
+    stages: tuple[TrialsFollowed, ...] = field(default=(), repr=False)
 
     @cached_property
     def _both(self) -> tuple[str, str]:
@@ -63,11 +67,20 @@ class FullPlan:
         except ValueError as error:
             raise ArchiveError(f"{self.path}: {PLAN_TREES}: {error}") from None
 
+    @cached_property
+    def _followed(self) -> dict[int, Trial]:
+        try:
+            return {trial.number: trial for trial in trials_in(self.stages)}
+        except (ValueError, TypeError) as error:
+            raise ArchiveError(f"{self.path}: {JOURNAL}: {first_line(error)}") from None
+
     def __len__(self) -> int:
-        return len(self._lines)
+        return len(self._lines) + sum(len(stage.trials) for stage in self.stages)
 
     def trial(self, number: int) -> Trial:
         """The planned trial `number`, from 1. Raises ArchiveError when it cannot be rebuilt."""
+        if self.stages and number > len(self._lines) and number in self._followed:
+            return self._followed[number]
         if not 1 <= number <= len(self._lines):
             raise ArchiveError(f"{self.path}: the plan has no trial {number}")
         try:

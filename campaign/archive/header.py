@@ -49,6 +49,18 @@ class _Record(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, use_attribute_docstrings=True)
 
 
+class Truth(_Record):
+    """What was simulated in place of the stated benches; nothing that an analysis is given."""
+
+    option: str = ""
+    """The file that `--truth` named, absolute; empty where tests name theirs."""
+    sources: dict[str, str] = {}
+    """Verbatim text of every truth, by its name as written."""
+    plants: dict[str, Tree] = {}
+    """What a trial's samples were simulated with, by the digest that is the trial's `truth`: a
+    bench without controller, compensation and limits, SI."""
+
+
 class RunHeader(_Record):
     """What is known about a run before its first trial. All of it is archived."""
 
@@ -64,6 +76,8 @@ class RunHeader(_Record):
     """The protocol's file, absolute: from there a resume makes the plan again."""
     sources: dict[str, str] = {}
     """Protocol, included protocols and benches, verbatim, by the path the protocol names them."""
+    truth: Truth = Truth()
+    """What was simulated in place of the stated benches, where that is something else."""
     normalised: Tree = {}
     """The protocol after validation: SI, defaults filled in, includes and benches resolved."""
     tests: tuple[Tree, ...] = ()
@@ -82,6 +96,8 @@ class RunHeader(_Record):
     notes: str = ""
     tags: tuple[str, ...] = ()
     backend: str = ""
+    source: str = ""
+    """Where the backend's samples come from: `simulation`, `hardware` or `recording`."""
     backend_options: Tree = {}
     overrides: dict[str, str] = {}
     """What `--set` changed, dotted path to value as written."""

@@ -17,9 +17,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from campaign.archive.files import why
-from campaign.archive.header import RunStatus
+from campaign.archive.header import PlannedTrial, RunStatus
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome, SafeState, canonical_json
+from campaign.trial import Outcome, SafeState, Tree, canonical_json
 
 JOURNAL = "journal.jsonl"
 
@@ -72,6 +72,47 @@ class Decision(_Line):
     reason: str
 
 
+class FollowedTrial(PlannedTrial):
+    """A trial of a stage: its line of the plan, and all of it as in `plan-trials.jsonl`."""
+
+    trial: Tree
+
+
+class TrialRefused(_Line):
+    """A trial of a stage that may not be executed, and why."""
+
+    label: str
+    why: str
+
+
+class TrialsFollowed(_Line):
+    """A stage of a test was asked, at one point of its matrix, which trials follow.
+
+    Attributes:
+        stage: its number; 1 are the planned trials.
+        trials: those that are executed, numbered after all that were known before.
+        trees: benches and options that they name, by digest.
+        reason: why there are none, where the stage itself failed.
+    """
+
+    event: Literal["trials followed"] = "trials followed"
+    at: str
+    test: str
+    stage: int = Field(ge=2)
+    name: str
+    point: Tree = {}
+    reason: str = ""
+    trials: tuple[FollowedTrial, ...] = ()
+    trees: dict[str, Tree] = {}
+    refused: tuple[TrialRefused, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """For people: `sweep at compensation = none, stage 2 (refinement)`."""
+        point = ", ".join(f"{path} = {value}" for path, value in self.point.items())
+        return f"{self.test}{f' at {point}' if point else ''}, stage {self.stage} ({self.name})"
+
+
 class TrialFinished(_Line):
     """A trial ended, however it ended, and its file is on the disk under its real name.
 
@@ -111,7 +152,14 @@ class RunEnded(_Line):
 
 
 Entry = Annotated[
-    RunStarted | RunResumed | OperatorStep | Decision | TrialFinished | TrialAbandoned | RunEnded,
+    RunStarted
+    | RunResumed
+    | OperatorStep
+    | Decision
+    | TrialsFollowed
+    | TrialFinished
+    | TrialAbandoned
+    | RunEnded,
     Field(discriminator="event"),
 ]
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)

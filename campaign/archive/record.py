@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
 
 from campaign.archive.checksums import text_digest
 from campaign.estimate import Estimate, Window
@@ -39,6 +39,7 @@ SHARED = ("bench", "options")
 Trees = Mapping[str, Tree]
 """Benches and options by the SHA-256 of their canonical JSON."""
 
+_ESTIMATE = TypeAdapter(Estimate)
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
 _DETERMINING = ("bench", "task", "seed")
 
@@ -100,6 +101,7 @@ class TrialRecord(_Part):
         time: digest of the time base.
         windows: parts that an analysis uses, where they are not the one in `trial`.
         estimates: numbers that were found while it ran, each with its interval.
+        measured_by: which code found them, with its version.
     """
 
     trial: Tree
@@ -120,6 +122,7 @@ class TrialRecord(_Part):
     events: tuple[EventRecord, ...] = ()
     windows: tuple[Window, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    measured_by: str = ""
 
     @property
     def mode(self) -> str:
@@ -156,7 +159,8 @@ class TrialRecord(_Part):
         field, with a default that old archives do not have.
         """
         tree = {**self.trial, **{name: trees[str(self.trial[name])] for name in SHARED}}
-        return text_digest(canonical_json({name: tree[name] for name in _DETERMINING}))
+        truth = {"truth": tree["truth"]} if tree.get("truth") else {}
+        return text_digest(canonical_json({name: tree[name] for name in _DETERMINING} | truth))
 
     @cached_property
     def text(self) -> str:
@@ -221,6 +225,7 @@ def make_record(
     preview: PreviewRecord | None = None,
     windows: Iterable[Window] = (),
     estimates: Iterable[Estimate] = (),
+    measured_by: str = "",
 ) -> TrialRecord:
     """The record of a trial that has ended.
 
@@ -231,7 +236,7 @@ def make_record(
         times: when it started and ended, ISO 8601.
         events: what happened meanwhile.
         series: length of the recording, digest of its time base, and its channels.
-        preview, windows, estimates: see `TrialRecord`.
+        preview, windows, estimates, measured_by: see `TrialRecord`.
     """
     samples, time, channels = series or (None, "", ())
     return TrialRecord(
@@ -252,7 +257,8 @@ def make_record(
         preview=preview,
         events=tuple(EventRecord(time=float(e.time), text=e.text) for e in events),
         windows=tuple(windows),
-        estimates=tuple(Estimate(**plain(asdict(estimate))) for estimate in estimates),
+        estimates=tuple(_ESTIMATE.validate_python(plain(asdict(e))) for e in estimates),
+        measured_by=measured_by,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
+from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, ValuesView
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,7 +48,9 @@ class RecordedSamples:
             raise ArchiveError(
                 f"{self.path}: /{self.entry}: its samples were not kept: {self.not_kept}"
             )
-        return Recording(self._time(), _Channels(self), events, ending)
+        return Recording(
+            self._time(), LazyChannels(self.record.channels, self.read), events, ending
+        )
 
     def channels(self) -> tuple[ChannelInfo, ...]:
         return self.record.series
@@ -93,17 +95,21 @@ class RecordedSamples:
         return self.path, self.entry
 
 
-class _Channels(Mapping[str, Channel]):
+Read = Callable[[Iterable[SeriesRecord]], Iterator[Channel]]
+"""Reads channels, one after another. Raises ArchiveError."""
+
+
+class LazyChannels(Mapping[str, Channel]):
     """Channels by name; the samples of each are read once, when it is first asked for."""
 
-    def __init__(self, samples: RecordedSamples) -> None:
-        self._samples = samples
-        self._told = {channel.name: channel for channel in samples.record.channels}
+    def __init__(self, told: Iterable[SeriesRecord], read: Read) -> None:
+        self._read_from = read
+        self._told = {channel.name: channel for channel in told}
         self._read: dict[str, Channel] = {}
 
     def __getitem__(self, name: str) -> Channel:
         if name not in self._read:
-            (self._read[name],) = self._samples.read([self._told[name]])
+            (self._read[name],) = self._read_from([self._told[name]])
         return self._read[name]
 
     def values(self) -> ValuesView[Channel]:
@@ -118,7 +124,7 @@ class _Channels(Mapping[str, Channel]):
         """Whatever is left, the file being opened once."""
         left = [told for name, told in self._told.items() if name not in self._read]
         if left:
-            self._read |= {channel.name: channel for channel in self._samples.read(left)}
+            self._read |= {channel.name: channel for channel in self._read_from(left)}
 
     def __contains__(self, name: object) -> bool:
         return name in self._told
@@ -155,6 +161,7 @@ def archived_trial(
         samples=RecordedSamples(path, entry, record, not_kept, sealed_as),
         windows=record.windows,
         estimates=record.estimates,
+        measured_by=record.measured_by,
     )
 
 

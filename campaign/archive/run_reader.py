@@ -12,16 +12,19 @@ from campaign.archive.damage import Damage
 from campaign.archive.files import sha256_of
 from campaign.archive.full_plan import FullPlan
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
-from campaign.archive.journal import JOURNAL
+from campaign.archive.journal import JOURNAL, TrialsFollowed
 from campaign.errors import ArchiveError
 from campaign.trial import SafeState, Tree, Trial
 
 
 @dataclass(frozen=True)
 class Glance:
-    """What `campaign list` tells of a sealed run; `finished` and `failed` count trials."""
+    """What `campaign list` tells of a sealed run; `planned`, `finished` and `failed` count trials,
+    those that followed included.
+    """
 
     header: RunHeader
+    planned: int
     status: RunStatus
     ended: str
     finished: int
@@ -38,7 +41,7 @@ class RunReader:
         status, reason, safe_state: how the run ended. An `incomplete` run has no word of its end,
             and its bench is not known to be safe.
         ended: ISO 8601; empty when incomplete.
-        plan: every planned trial, executed or not.
+        plan: every planned trial, executed or not; those that followed come last.
         trials: the executed ones, in plan order, failed ones included.
         journal: verbatim.
         full_plan: every planned trial, whole; empty in an archive of format 1.
@@ -47,6 +50,8 @@ class RunReader:
             given. Samples are looked at only when they are read, and by `problems`.
         earlier_attempts: by trial number, the attempts that a later one replaced; no analysis sees
             them.
+        stages: trials that followed from what others found, as the journal tells; empty before
+            there were stages. The header counts the trials of the plan without them.
         root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
             is in progress, and in archives of formats 1 and 2.
     """
@@ -64,10 +69,16 @@ class RunReader:
     damaged: tuple[Damage, ...] = ()
     earlier_attempts: Mapping[int, tuple[ArchivedTrial, ...]] = field(default_factory=dict)
     root: str = ""
+    stages: tuple[TrialsFollowed, ...] = ()
 
     @property
     def name(self) -> str:
         return self.header.name
+
+    @property
+    def first_stage(self) -> tuple[PlannedTrial, ...]:
+        """The trials that were planned before the run began."""
+        return self.plan[: len(self.plan) - sum(len(stage.trials) for stage in self.stages)]
 
     @property
     def tests(self) -> tuple[Tree, ...]:

@@ -14,6 +14,7 @@ from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.checksums import text_digest
 from campaign.archive.damage import DamageList
 from campaign.archive.entries import ENTRY, entry_names, file_name
+from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import FullPlan
 from campaign.archive.hdf5 import storable
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
@@ -47,6 +48,7 @@ def read_sealed(path: Path) -> RunReader:
             lambda: parse_plan(path, texts.text("plan/data")), ()
         )
         _note_contradictions(texts, header, story, len(plan), damaged)
+        stages = stages_in(story.entries)
         return RunReader(
             path=path,
             header=header,
@@ -54,13 +56,14 @@ def read_sealed(path: Path) -> RunReader:
             reason=texts.text("outcome/reason"),
             safe_state=SafeState(texts.text("outcome/safe_state")),
             ended=damaged.read(lambda: texts.text("end_time"), ""),
-            plan=plan,
+            plan=plan + planned_in(stages),
             trials=trials,
             journal=story.text,
-            full_plan=FullPlan(path, lambda: _plan_texts(path)),
+            full_plan=FullPlan(path, lambda: _plan_texts(path), stages),
             damaged=tuple(damaged.found),
             earlier_attempts=earlier,
             root=texts.root,
+            stages=stages,
         )
 
 
@@ -69,13 +72,23 @@ def read_glance(path: Path) -> Glance:
     damaged = DamageList(path)
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
+        header = _header(texts, damaged)
         return Glance(
-            header=_header(texts, damaged),
+            header=header,
+            planned=header.trials + _followed(texts, header),
             status=RunStatus(texts.text("outcome/status")),
             ended=texts.text("end_time"),
             finished=texts.integer("outcome/trials_finished"),
             failed=texts.integer("outcome/trials_failed"),
         )
+
+
+def _followed(texts: SealedTexts, header: RunHeader) -> int:
+    """How many trials followed; the journal is looked into only where some may have."""
+    if not any(test.get("stages") for test in header.tests):
+        return 0
+    story = read_lines(texts.text("journal/data").encode())
+    return len(planned_in(stages_in(story.entries)))
 
 
 def _header(texts: SealedTexts, damaged: DamageList) -> RunHeader:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted
 from campaign.archive.run_folder import read_header
@@ -80,7 +81,7 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
         backend=header.backend,
         benches=_benches(header),
         tags=header.tags,
-        planned=header.trials,
+        planned=header.trials + len(planned_in(stages_in(story.entries))),
         trials=len(finished),
         failed=sum(f.outcome is not Outcome.COMPLETED for f in finished),
     )
@@ -101,7 +102,7 @@ def _summarise_file(path: Path, size: int) -> RunSummary:
         backend=run.header.backend,
         benches=_benches(run.header),
         tags=run.header.tags,
-        planned=run.header.trials,
+        planned=run.planned,
         trials=run.finished,
         failed=run.failed,
     )

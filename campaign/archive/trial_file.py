@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.archive import hdf5
+from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.entries import entry_name, file_name
 from campaign.archive.files import PART, publish, sha256_of, why
+from campaign.archive.measured import Measure, Measured
 from campaign.archive.preview import PREVIEW_POINTS, Preview
 from campaign.archive.record import (
     PreviewRecord,
@@ -31,6 +33,7 @@ from campaign.archive.record import (
     shared_trees,
     trees_text,
 )
+from campaign.archive.written import WrittenSamples
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, RELATIVE_RATE
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
@@ -53,6 +56,10 @@ def shown_of(mode: str, names: Sequence[str]) -> str:
     """Of the channels that a trial recorded, the one that the default plot shows."""
     telling = TELLING.get(mode, "")
     return telling if telling in names else names[0]
+
+
+Written = tuple[int, str, list[SeriesRecord]]
+"""Length of every series, digest of the time base, and the channels."""
 
 
 @dataclass(frozen=True)
@@ -125,11 +132,17 @@ class TrialFile:
         ended: str,
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
+        measure: Measure | None = None,
     ) -> FinishedFile:
-        """Write the rest, put it on the disk and give the file its real name."""
+        """Write the rest, put it on the disk and give the file its real name.
+
+        `measure` is handed the trial once its samples are written; what it finds is kept, too.
+        """
+        with self._writing():
+            series, preview = self._finish_samples()
+        measured = self._measured(measure, ending, started, ended, series)
         with self._writing():
             trial, trees = shared_trees(self._trial)
-            series, preview = self._finish_samples()
             record = make_record(
                 trial,
                 self._trial.label,
@@ -141,7 +154,8 @@ class TrialFile:
                 series=series,
                 preview=preview,
                 windows=windows,
-                estimates=estimates,
+                estimates=(*estimates, *measured.estimates),
+                measured_by=measured.by,
             )
             write_record(self._entry, record, record.text, trees, self._not_kept)
             write_root(self._file, started, self._entry)
@@ -157,9 +171,24 @@ class TrialFile:
         with contextlib.suppress(OSError):
             self._part.unlink(missing_ok=True)
 
-    def _finish_samples(
+    def _measured(
         self,
-    ) -> tuple[tuple[int, str, list[SeriesRecord]] | None, PreviewRecord | None]:
+        measure: Measure | None,
+        ending: Ending,
+        started: str,
+        ended: str,
+        series: Written | None,
+    ) -> Measured:
+        """What is found in the samples that were written, if any were and somebody looks."""
+        if measure is None or series is None or self._not_kept:
+            return Measured()
+        length, time, channels = series
+        events = tuple(self._events)
+        samples = WrittenSamples(self._entry["data"], length, time, tuple(channels), events)
+        place = self._part, self._entry.name.lstrip("/")
+        return measure(ArchivedTrial(self._trial, ending, started, ended, *place, samples))
+
+    def _finish_samples(self) -> tuple[Written | None, PreviewRecord | None]:
         """What the record says of the samples, and of their preview where one was written."""
         if self._columns is None:
             return None, None

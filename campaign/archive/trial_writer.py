@@ -14,6 +14,7 @@ from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import ChannelInfo, Ending, Event, Trial
 
 if TYPE_CHECKING:
+    from campaign.archive.measured import Measure
     from campaign.archive.trial_file import TrialFile
 
 Array = NDArray[np.float64]
@@ -69,6 +70,7 @@ class TrialWriter:
         *,
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
+        measure: Measure | None = None,
     ) -> None:
         """Keep the trial. When this returns, no crash can lose it.
 
@@ -76,13 +78,14 @@ class TrialWriter:
             ending: however it ended: a failed trial is kept too.
             started, ended: ISO 8601 with a time zone.
             windows, estimates: what was found of it meanwhile; kept with it.
+            measure: looks at its samples once they are written; what it finds is kept as well.
 
         Raises:
             ArchiveError: it could not be written; nothing of it remains.
         """
         self._open = False
         with self._timing.span(Work.TRIAL_FILES):
-            file = self._file.close(ending, started, ended, windows, estimates)
+            file = self._file.close(ending, started, ended, windows, estimates, measure)
             self._note(
                 TrialFinished(
                     at=ended,

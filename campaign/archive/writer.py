@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
+from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.beginning import make_folder
 from campaign.archive.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.journal import (
@@ -18,6 +19,7 @@ from campaign.archive.journal import (
     RunEnded,
     RunResumed,
     TrialFinished,
+    TrialsFollowed,
 )
 from campaign.archive.resuming import reopen
 from campaign.archive.run_lock import RunLock
@@ -165,6 +167,21 @@ class RunWriter:
     ) -> None:
         """Note what the run does besides its plan; `at` is now unless it is given."""
         self._note(Decision(at=at or _now(), trial=trial, decision=decision, reason=reason))
+
+    def trials_followed(self, followed: TrialsFollowed) -> None:
+        """Note which trials follow from others, before the first of them is begun."""
+        self._note(followed)
+
+    def archived(self, number: int) -> ArchivedTrial:
+        """The last finished attempt at a trial of this run, read from its file.
+
+        Raises ArchiveError when it cannot be read, LookupError when there is none.
+        """
+        from campaign.archive.folder import read_trial_file
+
+        with self._lock:
+            finished = self._last[number]
+        return read_trial_file(self._folder / finished.file, finished)
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
         """Note what a person was asked to do before `trial`, and the answer."""

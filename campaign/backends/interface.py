@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 from campaign.archive import RunReader
 from campaign.options import Options
 from campaign.stopwatch import Timing
-from campaign.trial import Ending, PanicStop, Recorder, SafeState, Trial
+from campaign.trial import Ending, PanicStop, Recorder, SafeState, Tree, Trial
 
 
 class Source(StrEnum):
@@ -131,6 +131,17 @@ class KnowsCost(Protocol):
 
     def cost(self, trial: Trial) -> TrialCost:
         """Asked of trials that are not refused."""
+
+
+@runtime_checkable
+class SimulatesTruth(Protocol):
+    """What a backend does besides when it can simulate another bench than the stated one."""
+
+    def simulate_instead(self, truths: Mapping[str, Tree]) -> None:
+        """Told, before it is asked anything, what `Trial.truth` stands for: plants, by digest.
+
+        See `campaign.physics.truth`.
+        """
 
 
 @runtime_checkable

@@ -234,12 +234,13 @@ def _lost(run: RunReader) -> Iterator[_Lost]:
 
 
 def _asked_of_bench(trial: Trial) -> dict[str, Any]:
-    """What determines a recording but for chance: the bench, and the task without its window.
+    """What determines a recording but for chance: bench, truth, and the task without its window.
 
     Through today's classes, so that an option which is younger than the archive has its default.
     """
     task = Task.model_dump(trial.task, mode="json", exclude=_NOT_ASKED)
-    return {"bench": _normalised(canonical_json(trial.bench)), "task": task}
+    asked: dict[str, Any] = {"bench": _normalised(canonical_json(trial.bench)), "task": task}
+    return asked | ({"truth": trial.truth} if trial.truth else {})
 
 
 @lru_cache(maxsize=256)

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import Field
 
 from campaign.backends.interface import BackendKind, Source, StopFlag, TrialCost
-from campaign.backends.simulated_trial import CHANNELS, COMMANDS, OUTPUTS, SimulatedTrial
+from campaign.backends.simulated_trial import (
+    CHANNELS,
+    COMMANDS,
+    MEASURED,
+    OUTPUTS,
+    SimulatedTrial,
+)
 from campaign.backends.step_check import StepCheck
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.truth import simulated
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Array, Ending, Recorder, SafeState, Tree, Trial
 from campaign.units import Time
@@ -58,6 +65,8 @@ class SimBackend:
     def __init__(self, options: SimOptions) -> None:
         self._options = options
         self._benches: dict[int, tuple[Tree, Bench]] = {}
+        self._truths: dict[str, Tree] = {}
+        self._simulated: dict[tuple[int, str], Bench] = {}
         self._known: dict[str, _Known] = {}
         self._groups: dict[Hashable, Hashable] = {}
         self.timing: Timing = UNTIMED
@@ -75,8 +84,14 @@ class SimBackend:
 
         return LANES
 
+    def simulate_instead(self, truths: Mapping[str, Tree]) -> None:
+        """Told the plants of truths, by the digest that trials have of theirs."""
+        self._truths.update(truths)
+
     def refuses(self, trial: Trial) -> str | None:
         """Why this backend cannot execute `trial`, or None."""
+        if trial.truth and trial.truth not in self._truths:
+            return f"its truth {trial.truth[:12]} is not here; it is archived with the run"
         bench, name = self._bench(trial), trial.task.compensation
         if name != "none" and name not in bench.compensation:
             return f"bench {bench.name!r} has no compensation {name!r}"
@@ -87,8 +102,8 @@ class SimBackend:
         return None
 
     def channels(self, trial: Trial) -> frozenset[str]:
-        """All that the simulation knows."""
-        return _NAMES
+        """All that the simulation knows; where it has a truth of its own, what a rig could tell."""
+        return _MEASURED if trial.truth else _NAMES
 
     def group(self, trial: Trial) -> Hashable:
         """Trials of one structure: the same models, inputs, sensors, sample rates and step."""
@@ -120,25 +135,28 @@ class SimBackend:
             stretch = samples_at_a_time(half[0].grid, alone=len(half) == 1)
             halves = self.timing.each(Work.ENGINE, simulate_together(half, stretch))
         going = {
-            place: self._begun(lane, recorder, stop)
-            for place, (lane, recorder, stop) in enumerate(
-                zip(lanes, recorders, stops, strict=True)
+            place: self._begun(lane, recorder, stop, told=not trial.truth)
+            for place, (trial, lane, recorder, stop) in enumerate(
+                zip(trials, lanes, recorders, stops, strict=True)
             )
         }
         whole = self.timing.each(Work.ENGINE, simulate_together(lanes, stretch))
         for (times, outs), (_, outs_of_half) in zip(whole, halves, strict=False):
-            for place, trial in tuple(going.items()):
+            for place, begun in tuple(going.items()):
                 out = outs[place]
-                ending = trial.take(times[: out.shape[1]], out, outs_of_half[place])
+                ending = begun.take(times[: out.shape[1]], out, outs_of_half[place])
                 if ending is not None:
                     del going[place]
                     yield place, ending
             if not going:
                 return
 
-    def _begun(self, lane: Lane, recorder: Recorder, stop: StopFlag) -> SimulatedTrial:
+    def _begun(
+        self, lane: Lane, recorder: Recorder, stop: StopFlag, *, told: bool
+    ) -> SimulatedTrial:
         check = StepCheck(lane.grid.step, OUTPUTS) if self._options.check_step else None
-        return SimulatedTrial(lane.bench, lane.task, lane.grid.samples, recorder, stop, check)
+        samples = lane.grid.samples
+        return SimulatedTrial(lane.stated, lane.task, samples, recorder, stop, check, told=told)
 
     def make_safe(self) -> SafeState:
         """A simulation has nothing that moves."""
@@ -162,7 +180,17 @@ class SimBackend:
 
         longest_step = longest_step or self._options.longest_step
         with self.timing.span(Work.SETTING_UP):
-            return Lane.of(self._bench(trial), trial.task, trial.seed, longest_step)
+            stated = self._bench(trial)
+            bench = self._simulated_instead(trial, stated) if trial.truth else stated
+            return Lane.of(bench, trial.task, trial.seed, longest_step, stated)
+
+    def _simulated_instead(self, trial: Trial, stated: Bench) -> Bench:
+        """The truth under the software of the stated bench."""
+        key = (id(trial.bench), trial.truth)  # the tree is kept as long as this is
+        bench = self._simulated.get(key)
+        if bench is None:
+            bench = self._simulated[key] = simulated(self._truths[trial.truth], stated)
+        return bench
 
     def _bench(self, trial: Trial) -> Bench:
         kept = self._benches.get(id(trial.bench))  # it is kept, and so is its id
@@ -170,11 +198,13 @@ class SimBackend:
             kept = trial.bench, Bench.model_validate(trial.bench, context={"si": True})
             if len(self._benches) >= MOST_BENCHES:
                 self._benches.clear()
+                self._simulated.clear()
             self._benches[id(trial.bench)] = kept
         return kept[1]
 
 
 _NAMES = frozenset(channel.name for channel in CHANNELS)
+_MEASURED = frozenset(channel.name for channel in MEASURED)
 
 
 def _open(options: Options) -> SimBackend:

@@ -45,6 +45,9 @@ CHANNELS = tuple(
 )
 """In the order of a block; what the command is depends on the task."""
 
+MEASURED = tuple(channel for channel in CHANNELS if channel.measured)
+"""What a rig would have, too."""
+
 COMMANDS = {mode: info(COMMAND, mode) for mode in ("rate", "torque", "prescribed", "spring")}
 """What the command channel holds, by the mode of the task."""
 
@@ -72,17 +75,26 @@ class SimulatedTrial:
         recorder: Recorder,
         stop: StopFlag,
         check: StepCheck | None = None,
+        *,
+        told: bool = True,
     ) -> None:
-        """`samples`: how many there are when nothing ends the trial before."""
+        """A trial of `bench`, as far as those know it who move it.
+
+        Args:
+            samples: how many there are when nothing ends the trial before.
+            told: whether what only a simulator can know is recorded, too.
+        """
         self._bench = bench
         self._task = task
         self._left = samples
         self._check = check
         self._recorder = recorder
         self._stop = stop
-        names = [channel.name for channel in CHANNELS]
+        channels = CHANNELS if told else MEASURED
+        self._rows = [CHANNELS.index(channel) for channel in channels]
+        names = [channel.name for channel in channels]
         self._watch = LimitWatch(bench.limits, task.sample_rate, names)
-        recorder.start((COMMANDS[task.mode], *CHANNELS[1:]))
+        recorder.start((COMMANDS[task.mode], *channels[1:]))
 
     def take(self, time: Array, out: Array, half: Array | None = None) -> Ending | None:
         """The next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); None: it goes on.
@@ -117,7 +129,7 @@ class SimulatedTrial:
         return None if self._left > 0 else Ending(Outcome.COMPLETED)
 
     def _block(self, time: Array, out: Array) -> Array:
-        """All channels, shape (11, n)."""
+        """The recorded channels, shape (11, n); fewer where the truth is not told."""
         bench, task = self._bench, self._task
         block = np.empty((len(CHANNELS), len(time)))
         gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
@@ -129,7 +141,7 @@ class SimulatedTrial:
         else:
             block[6] = current * bench.torque_per_current
         block[7], block[8], block[9], block[10] = pointing, compensation, friction, load_rate
-        return block
+        return block if len(self._rows) == len(block) else block[self._rows]
 
 
 def _first_beyond(samples: Array, bound: float | None) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from campaign.calibration.space import Parameter, Space
 from campaign.calibration.targets import Target, shortest
 from campaign.calibration.uncertainty import strong
 from campaign.errors import CampaignError
-from campaign.physics.bench import Bench
+from campaign.protocol.bench_edit import with_known
 from campaign.protocol.files import Source
 from campaign.units import convert, split_quantity
 
@@ -67,10 +67,13 @@ def interruption(outcome: CalibrationOutcome) -> str:
     return "interrupted: the fit is whole, the leave-one-out error is not"
 
 
-def bench_text(source: Source, space: Space, values: Sequence[float], fitted: Iterable[str]) -> str:
-    """The bench's own text with the values in their places and `fitted` set; comments stay.
+def bench_text(
+    source: Source, space: Space, values: Sequence[float], known: Mapping[str, Any]
+) -> str:
+    """The bench's own text with the values in their places; comments stay.
 
-    A value keeps the unit that the file writes it in.
+    A value keeps the unit that the file writes it in. `known`: entries of the bench's table of that
+    name; its fingerprint is stated anew.
     """
     content = source.text.encode()
     edits: list[tuple[int, int, str]] = []
@@ -81,22 +84,9 @@ def bench_text(source: Source, space: Space, values: Sequence[float], fitted: It
             if span is None:
                 raise CampaignError(f"{source.file}: nothing is written at {path!r}")
             edits.append((*span, _as_written(source.tree, keys, parameter, factor * value)))
-    cells = _toml(list(fitted))
-    there = source.positions.span(("fitted",))
-    if there is not None:
-        edits.append((*there, cells))
-    else:  # a top-level key must stand before the first table; `name` does
-        end = (source.positions.span(("name",)) or (0, 0))[1]
-        line_end = content.find(b"\n", end)
-        at = len(content) if line_end < 0 else line_end
-        at -= content[:at].endswith(b"\r")
-        newline = "\r\n" if b"\r\n" in content else "\n"
-        edits.append((at, at, f"{newline}fitted = {cells}"))
     for first, last, text in sorted(edits, reverse=True):
         content = content[:first] + text.encode() + content[last:]
-    changed = content.decode()
-    Bench.model_validate(tomllib.loads(changed))  # what is written can be read back
-    return changed
+    return with_known(content.decode(), known, str(source.file))
 
 
 def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: float) -> str:

@@ -15,6 +15,7 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import residuals, restricted
 from campaign.errors import CampaignError, ProtocolError, UsageError
+from campaign.estimate import Estimate
 from campaign.experiments.interface import (
     Experiment,
     TestData,
@@ -38,6 +39,7 @@ class FinishedTrial:
 
     trial: Trial
     record: Recording
+    estimates: tuple[Estimate, ...] = ()
 
     @property
     def ending(self) -> Ending:
@@ -157,9 +159,13 @@ class Simulation:
         before = 0
         for test in self._problem.tests:
             seed = seed_of(test, self._problem.options.seed)
-            trials = expand(replace(test, bench=bench), seed, before, allow_large=False).trials
-            before += len(trials)
-            yield test, trials
+            expanded = expand(replace(test, bench=bench), seed, before, allow_large=False)
+            if expanded.stages:
+                name = expanded.stages[0].name
+                message = f"a calibration executes planned trials only; leave out the {name}"
+                raise PointError([test.origin.problem((), "value", message)])
+            before += len(expanded.trials)
+            yield test, expanded.trials
 
     def _batches(self, trials: Iterable[Trial]) -> Iterator[tuple[Trial, ...]]:
         """Trials that are simulated together, as far as there are enough of a kind."""

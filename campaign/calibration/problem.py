@@ -60,6 +60,10 @@ def make_problem(protocol: Protocol, published: Published) -> CalibrationProblem
         raise UsageError(
             f"{protocol.path} has no [calibration]; docs/calibration.md says what it holds"
         )
+    if any(test.truth is not None for test in protocol.tests):
+        raise UsageError(
+            f"{protocol.path}: a calibration simulates the bench that it fits: no truth"
+        )
     reader = _Reader(protocol, calibration, published)
     targets = reader.targets()
     parameters = reader.parameters()
@@ -100,7 +104,7 @@ class _Reader:
         wanted = self._chosen("cells", self._options.cells)
         left_out = self._chosen("without", self._options.without)
         for name in self._options.weights if not self.problems else ():
-            if name.count("/") > 2 or not any(covers(name, cell) for cell in wanted.values()):
+            if not any(covers(name, cell) for cell in wanted.values()):
                 message = f"{shown(name)} is none of the calibration's cells"
                 self._report(("weights", name), message, aim_key=True)
         stood_for = {name for test in self._protocol.tests for name in test.entry.reproduces}
@@ -161,7 +165,7 @@ class _Reader:
                 cell
                 for table in self._published.values()
                 for cell in table.cells
-                if pattern.count("/") <= 2 and covers(pattern, cell)
+                if covers(pattern, cell)
             ]
             if not cells:
                 table = self._published.get(pattern.split("/")[0])

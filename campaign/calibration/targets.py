@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.published import patterns
 from campaign.published.values import Cell, Published
 from campaign.units import convert, split_quantity
 
@@ -74,10 +75,7 @@ def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> NDArray[
 
 def covers(pattern: str, cell: Cell) -> bool:
     """Whether `table`, `table/row` or `table/row/column` means the cell; * stands for any name."""
-    parts = (cell.table, cell.row, cell.column)
-    return all(
-        wanted in ("*", part) for wanted, part in zip(pattern.split("/"), parts, strict=False)
-    )
+    return patterns.covers(pattern, cell.path)
 
 
 def restricted(published: Published, targets: Sequence[Target]) -> Published:
@@ -93,7 +91,7 @@ def restricted(published: Published, targets: Sequence[Target]) -> Published:
 
 def weight_of(cell: Cell, weights: Mapping[str, str | float]) -> str | None:
     """The name among `weights` that means the cell most closely; None when none does."""
-    matching = [name for name in weights if name.count("/") <= 2 and covers(name, cell)]
+    matching = [name for name in weights if covers(name, cell)]
     return max(matching, key=_closeness, default=None)
 
 

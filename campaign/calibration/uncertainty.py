@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.calibration.loss import weights
+from campaign.identification.intervals import student
+from campaign.identification.least_squares import covariance
 
 Array = NDArray[np.float64]
-LEVEL = 0.95
 AT_BOUND = 1e-3
 """Share of its range within which a parameter is at its bound."""
 NEGLIGIBLE = 1e-6
@@ -61,18 +62,19 @@ def uncertainty(jacobian: Array, residuals: Array, shares: Array, loss: str) -> 
     if freedom <= 0 or not free.any():
         return Uncertainty(nothing, bound, (False,) * n, np.full((n, n), np.nan), 1.0)
     scatter = max(1.0, float(np.sqrt(np.sum(rho * residuals**2) / freedom)))
-    covariance, undetermined = _covariance(np.sqrt(rho)[:, None] * jacobian[:, free])
+    weighted = np.sqrt(rho)[:, None] * jacobian[:, free]
+    inverse, undetermined = covariance(weighted, NEGLIGIBLE, NEGLIGIBLE)
     half = nothing.copy()
-    half[free] = _student(freedom) * scatter * np.sqrt(np.diag(covariance))
+    half[free] = student(freedom) * scatter * np.sqrt(np.diag(inverse))
     unknown = np.zeros(n, dtype=bool)
     unknown[free] = undetermined
     half[unknown] = np.nan
     unknown |= 2 * np.nan_to_num(half) > 1.0
     correlation = np.full((n, n), np.nan)
-    sigma = np.sqrt(np.diag(covariance))
+    sigma = np.sqrt(np.diag(inverse))
     known = np.flatnonzero(free)
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlation[np.ix_(known, known)] = covariance / np.outer(sigma, sigma)
+        correlation[np.ix_(known, known)] = inverse / np.outer(sigma, sigma)
     return Uncertainty(half, bound, tuple(bool(u) for u in unknown), correlation, scatter)
 
 
@@ -88,25 +90,6 @@ def strong(
         if abs(correlation[i, j]) >= least  # false for NaN
     ]
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
-
-
-def _covariance(jacobian: Array) -> tuple[Array, Array]:
-    """(JᵀJ)⁻¹ without its null directions, and the parameters that these involve."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    flat = scale <= NEGLIGIBLE * max(float(scale.max()), 1e-300)
-    safe = np.where(flat, 1.0, scale)
-    _, singular, vt = np.linalg.svd(np.where(flat, 0.0, jacobian / safe), full_matrices=False)
-    null = singular <= NEGLIGIBLE * max(float(singular.max()), 1e-300)
-    involved = np.abs(vt[null]).max(axis=0, initial=0.0) > 0.1
-    inverse = np.where(null, 0.0, 1.0 / np.where(null, 1.0, singular))
-    scaled = (vt.T * inverse**2) @ vt
-    return scaled / np.outer(safe, safe), np.asarray(flat | involved)
-
-
-def _student(freedom: int) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, 0.5 + LEVEL / 2))
 
 
 def _bound(share: float) -> Literal["", "lower", "upper"]:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
+from campaign.archive.archived_trial import ArchivedTrial
+from campaign.archive.measured import Measure, Measured
 from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder
@@ -25,12 +27,14 @@ class Executed:
         bug: an exception that no backend should raise.
         gave_up: whether the backend cannot execute any other trial.
         unwatched: limits of the bench that no recorded channel tells of.
+        unmeasured: why nothing was measured in its recording, where something should have been.
     """
 
     ending: Ending
     bug: Exception | None = None
     gave_up: bool = False
     unwatched: tuple[str, ...] = ()
+    unmeasured: str = ""
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,14 @@ class Conditions:
 
     Attributes:
         halted: whether the run is to end.
+        measure: what a recording says by itself; None: nobody looks.
     """
 
     backend: Backend
     writer: PlanWriter
     halted: Callable[[], bool]
     supervision: Supervision
+    measure: Measure | None = None
 
 
 def execute_once(trial: Trial, conditions: Conditions) -> Executed:
@@ -119,10 +125,12 @@ class _Attempt:
         file: TrialWriter,
         recorder: SupervisingRecorder,
         stop: TrialStop,
+        measure: Measure | None,
     ) -> None:
         self.trial, self.backend, self.recorder, self.stop = trial, backend, recorder, stop
         self.over = threading.Event()
         self._file = file
+        self._measure = measure
         self._started = utc_now()
         self._executed: Executed | None = None
         self._error: BaseException | None = None
@@ -132,7 +140,7 @@ class _Attempt:
         """Open the trial's file."""
         file, stop = conditions.writer.begin(trial), TrialStop(conditions.halted)
         recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
-        return cls(trial, conditions.backend, file, recorder, stop)
+        return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
 
     def run(self) -> None:
         """Execute; raises nothing."""
@@ -158,8 +166,19 @@ class _Attempt:
 
     def archive(self, executed: Executed) -> Executed:
         """Keep the trial. Raises what the archive raises."""
-        self._file.finish(executed.ending, self._started, utc_now())
-        return replace(executed, unwatched=self.recorder.unwatched)
+        executed = replace(executed, unwatched=self.recorder.unwatched)
+        if self._measure is None:
+            self._file.finish(executed.ending, self._started, utc_now())
+            return executed
+        measured: list[Measured] = []
+
+        def measure(data: ArchivedTrial) -> Measured:
+            measured.append(look(data))
+            return measured[-1]
+
+        look = self._measure
+        self._file.finish(executed.ending, self._started, utc_now(), measure=measure)
+        return replace(executed, unmeasured="".join(found.problem for found in measured))
 
     def abandoned(self, safe_state: SafeState) -> Executed:
         """It did not come back, although the bench was made safe over its head."""
@@ -212,6 +231,10 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
             return attempt.abandoned(safe_state)
     executed = attempt.concluded(forced=forced is not None)
     if recorder.verdict is None:
+        if executed.ending.safe_state is not SafeState.CONFIRMED:
+            # Measuring and archiving take their time. The ending stays as the backend told it:
+            # the runner asks once more, and keeps the answer in the journal.
+            _made_safe(attempt.backend)
         return executed
     safe_state = _made_safe(attempt.backend)
     return replace(executed, ending=replace(executed.ending, safe_state=safe_state))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from itertools import islice
 
 from campaign.backends.interface import Backend, ExecutesTogether
@@ -38,6 +38,10 @@ class Batches:
     def again(self, trial: Trial) -> None:
         """It is the next one once more."""
         self._waiting.appendleft(trial)
+
+    def insert(self, trials: Sequence[Trial]) -> None:
+        """They are the next ones, in that order."""
+        self._waiting.extendleft(reversed(trials))
 
     def take(self, seconds: float, stays: Callable[[Trial], bool]) -> tuple[Trial, ...]:
         """The next trial, and those that are executed together with it, in plan order.

@@ -100,6 +100,7 @@ class LiveDisplay:
         self._live.update(
             self._task,
             description=CLOSING if progress.closing else current_test(progress),
+            total=progress.total,
             completed=progress.total - progress.left + progress.under_way,
             counts=counts(progress),
             time_left=time_left(progress),

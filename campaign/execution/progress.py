@@ -15,7 +15,7 @@ class Progress:
     """The state of a run at one moment.
 
     Attributes:
-        total: trials of the plan.
+        total: trials that are known by now: those of the plan, and what has followed from them.
         done, failed: trials that completed, and that ended in any other way.
         running: trials being executed, in plan order.
         started: when the run began, on `time.monotonic` (s).
@@ -86,6 +86,11 @@ class Ledger:
     def left(self) -> int:
         """Trials that have not ended."""
         return self._total - sum(self._outcomes.values())
+
+    def add(self, trials: Sequence[Trial]) -> None:
+        """Further trials follow from what was found."""
+        self._total += len(trials)
+        self._bench_time_left += sum(trial.task.duration for trial in trials)
 
     def begin(self, trial: Trial) -> None:
         """A trial is about to be executed."""

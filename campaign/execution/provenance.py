@@ -63,10 +63,12 @@ def versions() -> dict[str, str]:
     return found
 
 
-def plug_ins(trials: Iterable[Trial], backend: str) -> tuple[Tree, ...]:
+def plug_ins(
+    trials: Iterable[Trial], backend: str, truths: Iterable[Tree] = ()
+) -> tuple[Tree, ...]:
     """Every kind of an installed package that trials and backend name, with its sources' hash.
 
-    The friction models and compensation methods are all those of the trials' benches.
+    The friction models and compensation methods are all those of the trials' benches and `truths`.
     """
     friction, compensation = friction_models(), compensation_methods()
     benches = bool(friction.plug_ins or compensation.plug_ins)
@@ -77,6 +79,8 @@ def plug_ins(trials: Iterable[Trial], backend: str) -> tuple[Tree, ...]:
         if benches:
             named |= set(_words(trial.bench.get("friction")))
             named |= set(_words(trial.bench.get("compensation")))
+    for plant in truths:
+        named |= set(_words(plant.get("friction")))
     rooms: tuple[tuple[Kinds[Any], set[str]], ...] = (
         (experiments(), experiment_names),
         (friction, {word for key, word in named if key == "model"}),

@@ -7,11 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from campaign.archive import PlannedTrial, RunReader
+from campaign.archive import PlannedTrial, RunHeader, RunReader
 from campaign.archive.journal import Decision, TrialFinished, parse_journal
 from campaign.archive.resuming import RESUMABLE
 from campaign.errors import UsageError
 from campaign.execution.provenance import shaping
+from campaign.protocol import PlannedStage
+from campaign.protocol.plan_tree import planned_stage
 from campaign.trial import Outcome, Tree, Trial, canonical_json
 
 SHOWN = 20
@@ -123,6 +125,38 @@ def trial_differences(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) 
         for was, trial in zip(planned, trials, strict=True)
         if was.fingerprint != trial.fingerprint
     ]
+
+
+def followed(
+    run: RunReader, trials: Sequence[Trial], finished: Mapping[int, Outcome]
+) -> tuple[Trial, ...]:
+    """The trials that followed from what others found, as the journal has them.
+
+    `trials` are the planned ones as they are today. UsageError when one that is left follows from
+    trials that are others today: what was found on one bench may not move another.
+    """
+    changed = {
+        trial.test
+        for was, trial in zip(run.first_stage, trials, strict=True)
+        if was.fingerprint != trial.fingerprint
+    }
+    found = tuple(run.full_plan.trial(each.number) for stage in run.stages for each in stage.trials)
+    for trial in found:
+        if trial.number not in finished and trial.test in changed:
+            raise UsageError(
+                f"{run.name}: {trial.name} ({trial.label}) follows from what was found before "
+                f"{trial.test} was changed; undo the change, or start a new run"
+            )
+    return found
+
+
+def stages_of(header: RunHeader) -> tuple[PlannedStage, ...]:
+    """The stages that were planned, from the header of a run whose protocol is gone."""
+    return tuple(
+        planned_stage(str(test["name"]), stage)  # type: ignore[arg-type]
+        for test in header.tests
+        for stage in test.get("stages", ())  # type: ignore[union-attr]
+    )
 
 
 def same_list(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> bool:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from campaign.archive.header import RunStatus
+from campaign.archive.measured import Measure
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import utc_now
 from campaign.execution.attendance import UNATTENDED, Attendance
@@ -22,6 +23,7 @@ from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
 from campaign.execution.sequence import TrialSequence
+from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
@@ -44,19 +46,23 @@ def run_plan(
     policy: Policy | None = None,
     attendance: Attendance = UNATTENDED,
     supervision: Supervision = SIMULATED,
+    measure: Measure | None = None,
     finished: Mapping[int, Outcome] = _NOTHING,
+    stages: Stages | None = None,
 ) -> RunOutcome:
     """Execute `trials` in order on a connected backend and seal the archive.
 
     Args:
-        trials: the whole plan.
+        trials: the whole plan, and what has followed from it in an earlier session.
         workers: trials executed at once; more than one only where the backend is parallel.
         display: told whenever a trial begins or ends and now and then, from this thread.
         stop: asked before every trial, and by the backend during one.
         policy: what to do about trials that fail, and when to rest; absent: skip, and never.
         attendance: who is asked, and whether pauses are waited for.
         supervision: how each trial is watched, and by whom besides.
+        measure: what a recording says by itself, to be archived with it; absent: nothing is.
         finished: trials of the plan that are not to be executed again, by number.
+        stages: what may follow from the trials.
 
     Raises:
         NotSafeError: in place of any of the others, when the bench was not seen safe either.
@@ -66,7 +72,8 @@ def run_plan(
     """
     ledger = Ledger(trials, display, finished)
     ended = Ended(kept=writer.folder)
-    waiting = [trial for trial in trials if trial.number not in finished]
+    stages = stages or no_stages()
+    waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(
         waiting,
@@ -79,6 +86,8 @@ def run_plan(
         policy or Policy(),
         attendance,
         supervision,
+        stages,
+        measure,
     )
     with unsafe_first(ended):
         with (
@@ -89,7 +98,7 @@ def run_plan(
             sequence.execute(executor)
         sequence.outside.look()  # it may have come after the last trial
         outside = sequence.outside.stop
-        status, reason = _verdict(ledger, ended, stop, outside)
+        status, reason = _verdict(ledger, ended, stop, outside, stages)
         ledger.close()
         ended.kept = writer.seal(status, reason, ended.safe_state, ended=utc_now())
         if ended.bug:
@@ -110,19 +119,19 @@ def _threads(workers: int) -> Iterator[Executor]:
 
 
 def _verdict(
-    ledger: Ledger, ended: Ended, stop: StopSwitch, outside: PanicStop | None
+    ledger: Ledger, ended: Ended, stop: StopSwitch, outside: PanicStop | None, stages: Stages
 ) -> tuple[RunStatus, str]:
     """How the run stands, and every reason there is for it."""
-    cut = stop() and (ledger.left or Outcome.INTERRUPTED in ledger.outcomes)
+    cut = stop() and (ledger.left or stages.left or Outcome.INTERRUPTED in ledger.outcomes)
     interrupted = cut or outside is not None
     if interrupted:
         status = RunStatus.INTERRUPTED
     elif ended.fault:
         status = RunStatus.FAULT
-    elif ledger.outcomes.keys() - {Outcome.COMPLETED}:
+    elif ledger.outcomes.keys() - {Outcome.COMPLETED} or stages.failed:
         status = RunStatus.FAILED_TRIALS
     else:
         status = RunStatus.COMPLETE
     by_stop = str(outside) if outside is not None else f"stopped by {stop.reason}"
-    reasons = (by_stop if interrupted else "", ended.fault, ended.unsafe)
+    reasons = (by_stop if interrupted else "", ended.fault, ended.unsafe, stages.failed)
     return status, "; ".join(dict.fromkeys(filter(None, reasons)))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from queue import Empty, SimpleQueue
 
+from campaign.archive.measured import Measure
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
 from campaign.execution.attendance import Attendance, SetUp
@@ -18,6 +19,7 @@ from campaign.execution.decisions import Responses, Rests
 from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
+from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
@@ -48,7 +50,10 @@ class TrialSequence:
         policy: Policy,
         attendance: Attendance,
         supervision: Supervision,
+        stages: Stages,
+        measure: Measure | None = None,
     ) -> None:
+        self._stages = stages
         self._batches = Batches(trials, backend, workers, live=supervision.live)
         self._workers = workers
         self._running: set[Future[None]] = set()
@@ -64,7 +69,7 @@ class TrialSequence:
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
-        self._conditions = Conditions(backend, writer, self._halted, supervision)
+        self._conditions = Conditions(backend, writer, self._halted, supervision, measure)
         self._unwatched: set[str] = set()
 
     def execute(self, executor: Executor) -> None:
@@ -120,6 +125,7 @@ class TrialSequence:
 
     def _next(self) -> Sequence[Trial]:
         """The trials to begin now; empty when there are none, or not before others have ended."""
+        self._follow()
         trial = self._batches.first
         if trial is None or self._is_over():
             return ()
@@ -134,6 +140,18 @@ class TrialSequence:
             return ()
         under_way = sum(trial.task.duration for trial in self._under_way.values())
         return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
+
+    def _follow(self) -> None:
+        """Ask every stage whose trials have ended which ones follow; they come next.
+
+        Nobody is asked when the run is over: a resume may execute some of those trials again.
+        """
+        while self._stages.is_due and not self._is_over():
+            trials, remarks = self._stages.ask()
+            self._batches.insert(trials)
+            self._ledger.add(trials)
+            for remark in remarks:
+                self._ledger.remark(remark)
 
     def _is_over(self) -> bool:
         """As `_halted`, between trials, when the bench can be asked as well."""
@@ -159,6 +177,7 @@ class TrialSequence:
         self._under_way.pop(trial.number, None)
         self._rests.worked(trial.task.duration)
         self._say_unwatched(trial, executed)
+        self._say_unmeasured(trial, executed)
         if executed.gave_up:
             self._ended.bug = self._ended.bug or executed.bug
             self._fail(ending.reason)
@@ -169,12 +188,18 @@ class TrialSequence:
             self._make_safe(trial)
         if self._is_final(trial, ending):
             self._ledger.end(trial, ending)
+            self._stages.ended(trial)
 
     def _say_unwatched(self, trial: Trial, executed: Executed) -> None:
         if executed.unwatched and trial.test not in self._unwatched:
             self._unwatched.add(trial.test)
             limits = ", ".join(executed.unwatched)
             self._ledger.remark(f"{trial.test}: no channel tells of these limits: {limits}")
+
+    def _say_unmeasured(self, trial: Trial, executed: Executed) -> None:
+        if executed.unmeasured:
+            self._writer.decision("no metrics", executed.unmeasured, trial.number)
+            self._ledger.remark(f"{trial.name}: no metrics are archived: {executed.unmeasured}")
 
     def _make_safe(self, trial: Trial) -> None:
         """Nothing moves again after an unconfirmed trial before the bench was seen at rest."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from campaign.archive.header import RunStatus
+from campaign.archive.measured import Measure
 from campaign.trial import Array, ChannelInfo, Ending, Event, SafeState, Trial
 
 
@@ -21,8 +22,13 @@ class TrialWriter(Protocol):
 
     def event(self, event: Event) -> None: ...
 
-    def finish(self, ending: Ending, started: str, ended: str) -> None:
-        """Keep the trial, whole. Raises ArchiveError when it cannot be written."""
+    def finish(
+        self, ending: Ending, started: str, ended: str, *, measure: Measure | None = None
+    ) -> None:
+        """Keep the trial, whole, and what `measure` finds in its samples.
+
+        Raises ArchiveError when it cannot be written.
+        """
 
 
 class PlanWriter(Protocol):

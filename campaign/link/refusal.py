@@ -9,7 +9,7 @@ from campaign.trial import Tree, Trial
 
 COMMANDED = ("controller", "compensation", "limits")
 """The tables of a bench that its controller is told; the others describe the plant."""
-WORDS = ("name", "description", "given", "fitted")
+WORDS = ("name", "description", "known")
 """What a bench says about itself."""
 _ABSENT = "absent"
 

@@ -8,11 +8,13 @@ from campaign.protocol.loop_check import check_loops, low_margins
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest, make_plan
 from campaign.protocol.plan_tree import as_tree
 from campaign.protocol.schema import ExperimentKind, Protocol, ProtocolFile, TestEntry
+from campaign.protocol.stages import PlannedStage
 
 __all__ = [
     "ExperimentKind",
     "LimitUse",
     "Plan",
+    "PlannedStage",
     "PlannedTest",
     "Protocol",
     "ProtocolFile",

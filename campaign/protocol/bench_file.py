@@ -8,6 +8,7 @@ from pathlib import Path
 from campaign.errors import ProtocolError, UsageError
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
+from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.problems import validate
 from campaign.protocol.schema import BENCH_SCHEMA
 from campaign.resources import protocols_folder
@@ -18,6 +19,11 @@ def load_bench(written: str) -> Bench:
 
     Raises UsageError when there is none, ProtocolError with everything that is wrong with it.
     """
+    return checked(bench_source(written))
+
+
+def bench_source(written: str) -> Source:
+    """The text of that bench. Raises UsageError when there is none, ProtocolError when no TOML."""
     file = _find(written)
     try:
         source = read_source(file, written, BENCH_SCHEMA)
@@ -25,14 +31,28 @@ def load_bench(written: str) -> Bench:
         raise UsageError(f"{written}: {error}") from None
     if not isinstance(source, Source):
         raise ProtocolError(source)
+    return source
+
+
+def checked(source: Source) -> Bench:
+    """The bench in a file. Raises ProtocolError with everything that is wrong with it."""
     bench = validate(Bench, source.tree, Within(source))
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)
+    origin, folder = Within(source), source.file.parent
+    problems = list(cell_problems(bench.known, source.tree, origin, folder, must_be_there=True))
+    if problems:
+        raise ProtocolError(problems)
     return bench
 
 
+def names_file(written: str) -> bool:
+    """Whether it is the path of a file, and no shipped bench's name."""
+    return "/" in written or "\\" in written or written.endswith(".toml")
+
+
 def _find(written: str) -> Path:
-    if "/" in written or "\\" in written or written.endswith(".toml"):
+    if names_file(written):
         return Path(written)
     shipped = {file.stem: file for file in (protocols_folder() / "benches").glob("*.toml")}
     if written in shipped:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from campaign.errors import Problem
@@ -41,7 +42,7 @@ def with_checks(tests: Sequence[Expanded], named: int, check: Check, seed: int) 
                 )
                 pairs[named].append((again, bench))
     return [
-        Expanded(tuple(t for t, _ in own), tuple(b for _, b in own), test.first_measurement)
+        replace(test, trials=tuple(t for t, _ in own), benches=tuple(b for _, b in own))
         for test, own in zip(tests, pairs, strict=True)
     ]
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
+from campaign.physics.truth import digest, is_setting, settings, simulated, value_at, with_settings
 from campaign.protocol import memory
 from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
 from campaign.protocol.points import Point, PointError, points_of
 from campaign.protocol.schema import ExperimentKind, Test
+from campaign.protocol.stages import PlannedStage, most_of, planned_stages
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 Names = tuple[str, ...]
@@ -32,13 +34,16 @@ class Expanded:
     """The trials of one test in order of execution, each with its bench as an object.
 
     `first_measurement` is the index of the first as written, whatever the order; None without one.
-    `memory` is what all of it takes (bytes).
+    `stages` are those that may follow, by point in the order of the matrix. `memory` is what all of
+    it takes (bytes), the trials that follow included. `truths` are the plants that its trials name.
     """
 
     trials: tuple[Trial, ...]
     benches: tuple[Bench, ...]
     first_measurement: int | None
+    stages: tuple[PlannedStage, ...] = ()
     memory: int = 0
+    truths: Mapping[str, Tree] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,7 @@ class _Place:
     repeat: int
     bench: Bench
     bench_tree: Tree
+    truth: str = ""
 
 
 def expand(
@@ -61,23 +67,33 @@ def expand(
     if memory.least(test) > left:
         raise PointError([memory_problem(test, memory.least(test))])
     points = list(points_of(test))
+    stages = [stage for point in points for stage in _stages(test, point, seed)]
+    later = memory.TRIAL * most_of(stages).trials
+    left -= later
+    if left < 0:
+        raise PointError([memory_problem(test, later)])
     own_benches: dict[str, tuple[Bench, Tree]] = {}
+    truths = _Truths(test)
     benches = memory.BENCH * len({id(point.bench) for point in points})
     whole = len(points) * test.entry.repeat
     asked = 0
     for done, (repeat, point) in enumerate(
         itertools.product(range(1, test.entry.repeat + 1), points), start=1
     ):
-        for index, (request, bench, tree) in enumerate(_requests(test, point, own_benches)):
-            places.append(_Place(point, request, index, repeat, bench, tree))
+        requests = _requests(test, point, own_benches, truths)
+        for index, (request, bench, tree, truth) in enumerate(requests):
+            places.append(_Place(point, request, index, repeat, bench, tree, truth))
             asked += memory.of_task(request.task)
             if len(places) + before > LARGEST_PLAN and not allow_large:
                 raise PointError([size_problem(test, "the plan has")])
-            if asked + benches + len(own_benches) * memory.BENCH > left:
+            if asked + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH > left:
                 raise PointError([memory_problem(test, asked * whole // done + benches)])
         if asked * whole // done > memory.SURELY * left:
             raise PointError([memory_problem(test, asked * whole // done + benches)])
-    spent = asked + benches + len(own_benches) * memory.BENCH
+    spent = asked + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH
+    if stages and (reason := _no_stages(places)):
+        message = f"a test whose trials {reason} can have no stages"
+        raise PointError([test.origin.problem((), "value", message)])
     ordered = _shuffled(places, seed) if test.entry.order == "shuffled" else places
     numbers = itertools.count(before + 1)
     set_by_hand = set_by_operator(test)
@@ -89,7 +105,8 @@ def expand(
     measured = (place for place in places if place.request.role is Role.MEASUREMENT)
     first = next(measured, None)
     at = next((i for i, place in enumerate(ordered) if place is first), None)
-    return Expanded(trials, tuple(place.bench for place in ordered), at, spent)
+    of_places = tuple(place.bench for place in ordered)
+    return Expanded(trials, of_places, at, tuple(stages), spent + later, truths.plants)
 
 
 def _setup(test: Test, point: Point) -> tuple[str, ...]:
@@ -101,10 +118,30 @@ def _setup(test: Test, point: Point) -> tuple[str, ...]:
         raise PointError([test.origin.problem(("operator",), "key", message)]) from None
 
 
+def _no_stages(places: Sequence[_Place]) -> str:
+    """Why nobody could tell to which point of the matrix, or to which bench, a trial belongs."""
+    for place in places:
+        if place.request.bench is not None:
+            return "have benches of their own"
+        if swept := place.request.point.keys() & place.point.values.keys():
+            return f"choose {', '.join(sorted(swept))}, which is swept, themselves"
+    return ""
+
+
+def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
+    """The stages that may follow at a point. Raises PointError."""
+    try:
+        return list(planned_stages(test, point, seed))
+    except (ValueError, ArithmeticError) as error:
+        where = f" at {point.label}" if point.values else ""
+        message = f"test '{test.entry.name}'{where}: {first_line(error)}"
+        raise PointError([test.origin.problem((), "value", message)]) from None
+
+
 def _requests(
-    test: Test, point: Point, own_benches: dict[str, tuple[Bench, Tree]]
-) -> Iterator[tuple[TrialRequest, Bench, Tree]]:
-    """What the experiment asks for at a point and on which bench, checked as only a plan can."""
+    test: Test, point: Point, own_benches: dict[str, tuple[Bench, Tree]], truths: _Truths
+) -> Iterator[tuple[TrialRequest, Bench, Tree, str]]:
+    """What the experiment asks for at a point, with bench and truth, checked as only a plan can."""
     where = f" at {point.label}" if point.values else ""
     try:
         for request in test.experiment.trials(point.options, point.bench):
@@ -112,14 +149,10 @@ def _requests(
             name, names = request.task.compensation, ["none", *bench.compensation]
             if name not in names:
                 raise ValueError(unknown_compensation(name, names, test))
-            if samples_of(request.task) > LARGEST_RECORDING:
-                raise ValueError(
-                    f"a trial of {samples_of(request.task):.3g} samples; at most "
-                    f"{LARGEST_RECORDING:.3g} are allowed: lower sample_rate or the duration"
-                )
-            yield request, bench, tree
+            check_recording(request.task)
+            yield request, bench, tree, truths.of(point, bench, tree)
     except (ValueError, ArithmeticError) as error:
-        message = f"test '{test.entry.name}'{where}: {_first_line(error)}"
+        message = f"test '{test.entry.name}'{where}: {first_line(error)}"
         raise PointError([test.origin.problem((), "value", message)]) from None
 
 
@@ -134,6 +167,34 @@ def _bench_for(
         valid = Bench.model_validate(request.bench, context={"si": True})
         own_benches[key] = valid, valid.model_dump(mode="json")
     return own_benches[key]
+
+
+@dataclass
+class _Truths:
+    """The plants that a test's trials are simulated with, by their digest.
+
+    The experiment is not told of them. What a matrix or an experiment changes of the bench is
+    turned at the rig, and so at the truth, too: to the same value.
+    """
+
+    test: Test
+    plants: dict[str, Tree] = field(default_factory=dict)
+    known: dict[tuple[int, int], str] = field(default_factory=dict)
+
+    def of(self, point: Point, bench: Bench, tree: Tree) -> str:
+        """Digest of the truth of a trial on `bench`; empty when the bench is what is simulated."""
+        if self.test.truth is None:
+            return ""
+        key = (id(point.bench_tree), id(tree))  # both are kept with the points and requests
+        if key not in self.known:
+            axes = (axis.keys for axis in self.test.axes if axis.of_bench)
+            turned = {keys: value_at(tree, keys) for keys in axes if is_setting(keys)}
+            turned |= settings(point.bench_tree, tree)
+            plant = with_settings(self.test.truth, turned)
+            simulated(plant, bench)  # or it is said here that it cannot be
+            self.known[key] = name = digest(plant)
+            self.plants.setdefault(name, plant)
+        return self.known[key]
 
 
 def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
@@ -183,6 +244,8 @@ def _trial(
         set_by_operator=set_by_hand,
         requires=requires,
         can_use=can_use,
+        windows=request.windows,
+        truth=place.truth,
     )
 
 
@@ -230,7 +293,17 @@ def samples_of(task: Task) -> int:
     return max(1, int(task.duration * task.sample_rate))
 
 
-def _first_line(error: Exception) -> str:
+def check_recording(task: Task) -> None:
+    """ValueError for a recording that must be a slip of units."""
+    if samples_of(task) > LARGEST_RECORDING:
+        raise ValueError(
+            f"a trial of {samples_of(task):.3g} samples; at most {LARGEST_RECORDING:.3g} are "
+            "allowed: lower sample_rate or the duration"
+        )
+
+
+def first_line(error: Exception) -> str:
+    """What went wrong, in a line."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
     # pydantic's messages have a headline, a field and a sentence; all three are needed.
     return " ".join(line.strip() for line in lines[:3])

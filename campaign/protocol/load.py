@@ -32,6 +32,7 @@ from campaign.protocol.files import (
     read_source,
     read_text,
 )
+from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.matrix import Axis
 from campaign.protocol.operator import operator_problems
 from campaign.protocol.overrides import Override, parse_overrides
@@ -50,6 +51,7 @@ from campaign.protocol.schema import (
     replaced,
     split_entry,
 )
+from campaign.protocol.truth_file import Truths
 
 
 def load_protocol(
@@ -58,6 +60,7 @@ def load_protocol(
     *,
     overrides: Sequence[str] = (),
     shipped: Path,
+    truth: str = "",
 ) -> Protocol:
     """The protocol at `path` with everything it includes and every bench it names.
 
@@ -65,6 +68,7 @@ def load_protocol(
         experiments: the kinds of test there are, by name.
         overrides: `dotted.path=value` as given to `--set`.
         shipped: folder whose `benches/` holds the benches that go by a bare name.
+        truth: a bench that is simulated in place of each test's, as given to `--truth`.
 
     Raises ProtocolError with every mistake found in any of the files.
     """
@@ -74,7 +78,7 @@ def load_protocol(
     if source is None:
         raise _failed(collected)
     apply_overrides(settings, collected)
-    loader = _Loader(collected, experiments, shipped)
+    loader = _Loader(collected, experiments, Truths(shipped, collected.problems, truth))
     tests = loader.tests()
     tree, origin = top_level(source, settings)
     top = validate(ProtocolFile, tree, origin)
@@ -103,6 +107,7 @@ def load_protocol(
         calibration=calibration,
         policy=Policy(faults=top.faults, rest=top.rest),
         check=check,
+        truth_sources=loader.truths.texts,
     )
 
 
@@ -116,7 +121,11 @@ class _Loader:
 
     collected: Collected
     experiments: Mapping[str, ExperimentKind]
-    shipped: Path
+    truths: Truths
+
+    @property
+    def shipped(self) -> Path:
+        return self.truths.shipped
 
     def tests(self) -> list[Test]:
         first: dict[str, Draft] = {}
@@ -189,12 +198,20 @@ class _Loader:
         if isinstance(valid, list):
             self._report(*valid)
         known = valid.model_dump(mode="json") if isinstance(valid, Bench) else None
+        if isinstance(valid, Bench) and bench is not None:
+            folder = bench.file.parent
+            self._report(*cell_problems(valid.known, bench.tree, bench_origin, folder))
         options = self._attached(draft, experiment, options)
         axes = self._axes(draft, experiment, options, known)
         self._options(draft, experiment, options, axes)
         if isinstance(entry, list) or known is None or tree is None or bench is None:
             return None
-        test = Test(entry, experiment, options, tree, bench.name, axes, draft.origin, bench_origin)
+        truth = None
+        if isinstance(valid, Bench):
+            truth = self.truths.of(draft, entry.truth, valid, axes)
+        test = Test(
+            entry, experiment, options, tree, bench.name, axes, draft.origin, bench_origin, truth
+        )
         self._compensation(test, known)
         if not is_large(axes, entry.repeat):
             self._report(*value_problems(test))

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequenc
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from campaign.physics.known import FORMER as FORMER_KNOWN
 from campaign.physics.preload import FORMER as FORMER_PRELOAD
 from campaign.physics.scatter import CLASSIC
 from campaign.physics.scatter import FORMER as FORMER_VARIATION
@@ -101,6 +102,23 @@ def _shares(preload: Document) -> Iterator[Change]:
         preload["shares"] = shares
 
 
+def _bench_known(bench: Document) -> Iterator[Change]:
+    """2 to 3: the published cells that a bench was made from stand under `known`."""
+    for name in FORMER_KNOWN:
+        if name not in bench:
+            continue
+        there = bench.get("known", {})
+        if not isinstance(there, MutableMapping) or name in there:
+            what = f"is given as known.{name}, too; remove one of them"
+            yield Change(name, what, by_hand=True)
+            continue
+        cells = bench.pop(name)
+        if "known" not in bench:
+            bench["known"] = {}
+        bench["known"][name] = cells
+        yield Change(name, f"is known.{name} now; `campaign fingerprint` states of which bench")
+
+
 def _paths(table: str, former: Mapping[str, Sequence[Any]]) -> dict[str, str]:
     """Former paths of the bench in that table, and the present ones."""
     return {f"{table}.{old}": ".".join((table, *map(str, now))) for old, now in former.items()}
@@ -179,7 +197,7 @@ def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
 
 
 MIGRATIONS: Mapping[Kind, Sequence[Migration]] = {
-    "bench": (_bench_by_path,),
+    "bench": (_bench_by_path, _bench_known),
     "protocol": (_protocol_by_path,),
 }
 """By the schema they start from, minus one."""

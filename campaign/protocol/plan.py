@@ -12,6 +12,7 @@ from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.limits import Margin, margins
 from campaign.physics.loops_used import LoopUse, loops_used
 from campaign.physics.resolution import CLOSE, resolution_margins
+from campaign.physics.truth import digest
 from campaign.policy import Policy
 from campaign.protocol import memory
 from campaign.protocol.axes import is_large, value_problems
@@ -25,14 +26,18 @@ from campaign.protocol.expand import (
     seed_of,
     size_problem,
 )
-from campaign.protocol.matrix import count_points
+from campaign.protocol.matrix import LARGEST_PLAN, count_points
 from campaign.protocol.points import PointError, points_of
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import Protocol, Test
-from campaign.trial import Task, Tree, Trial, canonical_json
+from campaign.protocol.stages import PlannedStage, most_of
+from campaign.trial import Most, Task, Tree, Trial, canonical_json
 
 STRUCTURE = 32_000
 """Bytes that a trial's archive takes at most besides its samples, preview and description."""
+
+BYTES = 8 * (CHANNELS + 1)
+"""of a sample of every channel and its time."""
 
 PREVIEW = 20_000
 """Samples beyond which a recording has a preview, of at most so many points."""
@@ -61,6 +66,9 @@ class PlannedTest:
         seeks_instability: whether its experiment goes to where a loop is unstable.
         coarse: for each limit of which one count of a sensor is a large part, such a trial.
         duration: bench time (s).
+        chosen: options that the test does not write and its experiment chose for the bench, with
+            the reason; as they are at the first point of the matrix.
+        stages: trials that follow from what these find, by point; they are not among `numbers`.
     """
 
     name: str
@@ -80,11 +88,15 @@ class PlannedTest:
     seeks_instability: bool
     duration: float
     coarse: tuple[LimitUse, ...] = ()
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    stages: tuple[PlannedStage, ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
     """The ordered trials of a protocol, and everything needed to make the same plan again.
+
+    Its trials are those of the first stage; what may follow them is in `stages`.
 
     Attributes:
         name: of the protocol's file.
@@ -96,6 +108,8 @@ class Plan:
         seed: from which tests without a seed of their own got theirs.
         breaches: every limit that a trial would break.
         policy: what to do about faults, and when to rest; not part of `normalised`.
+        truths: plants that `sim` simulates in place of the benches, by the digest that trials
+            have; `truth_sources` their files. Nothing but `sim` and the archive takes them.
     """
 
     name: str
@@ -115,11 +129,23 @@ class Plan:
     seed: int
     breaches: tuple[LimitUse, ...]
     policy: Policy = field(default_factory=Policy)
+    truths: Mapping[str, Tree] = field(default_factory=dict)
+    truth_sources: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
-        """Bench time of all trials (s)."""
+        """Bench time of all trials (s), without those of later stages."""
         return sum(test.duration for test in self.tests)
+
+    @property
+    def stages(self) -> tuple[PlannedStage, ...]:
+        """What may follow from the trials of all tests."""
+        return tuple(stage for test in self.tests for stage in test.stages)
+
+    @property
+    def following(self) -> Most:
+        """What the trials of later stages take at most."""
+        return most_of(self.stages)
 
     @property
     def samples(self) -> int:
@@ -128,8 +154,11 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Bytes of all recordings before compression, an upper estimate of what is written."""
-        return sum(map(_size, self.trials)) + sum(len(text) for text in self.sources.values())
+        """Bytes of all recordings before compression, an upper estimate of what is written; those
+        of later stages included.
+        """
+        planned = sum(map(_size, self.trials)) + sum(len(text) for text in self.sources.values())
+        return planned + _size_of_stages(self)
 
 
 def make_plan(
@@ -158,6 +187,8 @@ def make_plan(
     planned: list[PlannedTest] = []
     uses: list[LimitUse] = []
     expansions = _expanded(protocol, chosen, master, allow_large)
+    if problems := _too_many(chosen, expansions, allow_large):
+        raise ProtocolError(problems)
     for test, expanded in zip(chosen, expansions, strict=True):
         own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
         planned.append(_planned(test, expanded, own, master))
@@ -185,6 +216,8 @@ def make_plan(
         seed=master,
         breaches=tuple(use for use in uses if use.margin.broken),
         policy=protocol.policy,
+        truths={name: tree for expanded in expansions for name, tree in expanded.truths.items()},
+        truth_sources=protocol.truth_sources,
     )
 
 
@@ -215,10 +248,30 @@ def _expanded(
     return with_checks(expansions, named, check, seed_of(chosen[named], master))
 
 
+def _too_many(tests: Sequence[Test], expansions: Sequence[Expanded], allow: bool) -> list[Problem]:
+    """Problems of a plan that its later stages make too large."""
+    following = [most_of(expanded.stages).trials for expanded in expansions]
+    total = sum(following) + sum(len(expanded.trials) for expanded in expansions)
+    if allow or total <= LARGEST_PLAN or not any(following):
+        return []
+    largest = max(range(len(tests)), key=following.__getitem__)
+    return [size_problem(tests[largest], "with the trials that may follow, the plan has")]
+
+
 def _size(trial: Trial) -> int:
     samples = samples_of(trial.task)
     preview = 2 * 8 * PREVIEW if samples > PREVIEW else 0
-    return samples * (CHANNELS + 1) * 8 + preview + STRUCTURE + len(trial.model_dump_json())
+    return samples * BYTES + preview + STRUCTURE + len(trial.model_dump_json())
+
+
+def _size_of_stages(plan: Plan) -> int:
+    """Bytes of the trials that may follow, each described like the longest planned one."""
+    most = plan.following
+    if not most.trials:
+        return 0
+    described = max(len(trial.model_dump_json()) for trial in plan.trials)
+    each = 2 * 8 * PREVIEW + STRUCTURE + described
+    return most.samples * BYTES + most.trials * each
 
 
 def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
@@ -260,6 +313,8 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         seeks_instability=test.experiment.seeks_instability,
         duration=sum(trial.task.duration for trial in expanded.trials),
         coarse=coarse,
+        chosen=first.chosen,
+        stages=expanded.stages,
     )
 
 
@@ -279,6 +334,8 @@ def _normalised(test: Test, master: int) -> Tree:
     swept: dict[str, Any] = {axis.path: axis.describe() for axis in test.axes}
     by_hand: list[Any] = [entry.model_dump(mode="json") for entry in test.entry.operator]
     more: Tree = {"operator": by_hand} if by_hand else {}
+    if test.truth is not None:
+        more["truth"] = digest(test.truth)
     return {
         **more,
         "name": test.entry.name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import JsonValue
@@ -11,7 +12,8 @@ from campaign.physics.limits import Margin
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import LoopUse
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest
-from campaign.trial import Trial
+from campaign.protocol.stages import PlannedStage
+from campaign.trial import Most, Trial
 
 POLES = 8
 """of each loop that are told, the fastest growing first."""
@@ -34,6 +36,7 @@ def as_tree(plan: Plan) -> dict[str, Any]:
         "sources": sorted(plan.sources),
         "policy": plan.policy.model_dump(mode="json"),
         "duration_s": plan.duration,
+        "following": _most(plan.following),
         "samples": plan.samples,
         "bytes": plan.size,
         "tests": [_test(test) for test in plan.tests],
@@ -51,6 +54,7 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "reproduces": list(test.reproduces),
         "bench": test.bench,
         "options": test.options,
+        "chosen": dict(test.chosen),
         "matrix": {path: list(values) for path, values in test.matrix.items()},
         "order": test.order,
         "seed": test.seed,
@@ -61,7 +65,38 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "loops": [{"trial": use.trial, **loop_tree(use)} for use in test.loops],
         "seeks_instability": test.seeks_instability,
         "coarse": [_use(use) for use in test.coarse],
+        "stages": [stage_tree(stage) for stage in test.stages],
     }
+
+
+def stage_tree(stage: PlannedStage) -> dict[str, Any]:
+    """A stage as `planned_stage` reads it back."""
+    return {
+        "number": stage.number,
+        "name": stage.name,
+        "why": stage.why,
+        "point": dict(stage.point),
+        "seed": stage.seed,
+        "most": _most(stage.most),
+    }
+
+
+def planned_stage(test: str, tree: Mapping[str, Any]) -> PlannedStage:
+    """A stage from its tree. Raises LookupError, TypeError or ValueError."""
+    most = tree["most"]
+    return PlannedStage(
+        test=test,
+        number=int(tree["number"]),
+        name=str(tree["name"]),
+        why=str(tree["why"]),
+        point=dict(tree["point"]),
+        seed=int(tree["seed"]),
+        most=Most(int(most["trials"]), float(most["duration_s"]), int(most["samples"])),
+    )
+
+
+def _most(most: Most) -> dict[str, JsonValue]:
+    return {"trials": most.trials, "duration_s": most.duration, "samples": most.samples}
 
 
 def _trial(trial: Trial) -> dict[str, Any]:
@@ -81,6 +116,7 @@ def _trial(trial: Trial) -> dict[str, Any]:
         "requires": list(trial.requires),
         "can_use": list(trial.can_use),
         "fingerprint": trial.fingerprint,
+        "truth": trial.truth,
     }
 
 

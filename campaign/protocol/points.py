@@ -16,7 +16,7 @@ from campaign.protocol.matrix import Axis, points
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import validate
 from campaign.protocol.schema import Test, replaced
-from campaign.trial import Tree
+from campaign.trial import Tree, canonical_json
 
 
 class PointError(Exception):
@@ -29,13 +29,17 @@ class PointError(Exception):
 
 @dataclass(frozen=True)
 class Point:
-    """One point: swept path to SI value, and what a trial there has; objects beside their trees."""
+    """One point: swept path to SI value, and what a trial there has; objects beside their trees.
+
+    `chosen`: why the experiment took its value, for each option that the test does not write.
+    """
 
     values: Mapping[str, JsonValue]
     options: Options
     options_tree: Tree
     bench: Bench
     bench_tree: Tree
+    chosen: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -46,13 +50,13 @@ def points_of(test: Test) -> Iterator[Point]:
     """Every point of the matrix, first axis slowest. Raises PointError at one that is invalid."""
     cache = _Cache(test)
     for indices in points(test.axes):
-        options, options_tree = cache.options(indices)
         bench, bench_tree = cache.bench(indices)
+        options, options_tree, chosen = cache.fitted(indices)
         values = {
             axis.path: _at(bench_tree if axis.of_bench else options_tree, axis.keys)
             for axis in test.axes
         }
-        yield Point(values, options, options_tree, bench, bench_tree)
+        yield Point(values, options, options_tree, bench, bench_tree, chosen)
 
 
 @dataclass
@@ -62,6 +66,9 @@ class _Cache:
     test: Test
     known_options: dict[tuple[int, ...], tuple[Options, Tree]] = field(default_factory=dict)
     known_benches: dict[tuple[int, ...], tuple[Bench, Tree]] = field(default_factory=dict)
+    known_fits: dict[tuple[int, str], tuple[Options, Tree, Mapping[str, str]]] = field(
+        default_factory=dict
+    )
     plain_bench: Tree = field(default_factory=dict)
 
     def options(self, indices: tuple[int, ...]) -> tuple[Options, Tree]:
@@ -78,6 +85,29 @@ class _Cache:
                 raise PointError(valid)
             self.known_options[key] = (valid, valid.model_dump(mode="json"))
         return self.known_options[key]
+
+    def fitted(self, indices: tuple[int, ...]) -> tuple[Options, Tree, Mapping[str, str]]:
+        """Options with what the experiment chooses for this bench, and why; `options` without."""
+        options, tree = self.options(indices)
+        fit = self.test.experiment.fit
+        if fit is None:
+            return options, tree, {}
+        try:
+            chosen = fit(options, self.bench(indices)[0])
+        except (ValueError, ArithmeticError) as error:
+            message = f"test '{self.test.entry.name}': {error}"
+            raise PointError([self.test.origin.problem((), "value", message)]) from None
+        if not chosen:
+            return options, tree, {}
+        key = (id(options), canonical_json({name: c.value for name, c in chosen.items()}))
+        if key not in self.known_fits:
+            values = {name: choice.value for name, choice in chosen.items()}
+            fitted = options.model_copy(update=values)
+            # Who asks later which options were written must not be told of these.
+            fitted.__pydantic_fields_set__.difference_update(values)
+            reasons = {name: choice.reason for name, choice in chosen.items()}
+            self.known_fits[key] = fitted, fitted.model_dump(mode="json"), reasons
+        return self.known_fits[key]
 
     def bench(self, indices: tuple[int, ...]) -> tuple[Bench, Tree]:
         swept = self._swept(indices, of_bench=True)

@@ -47,6 +47,8 @@ class Positions:
         self._entries: dict[Keys, _Entry] = {}
         self._lengths: dict[Keys, int] = {}
         self._spans: dict[Keys, tuple[int, int]] = {}
+        self.first_table: int | None = None
+        """First byte of the first header of a table, in UTF-8; None without one."""
         self._read_document(_parse(encoded))
 
     def find(self, keys: Keys, aim: Aim = "value") -> Position:
@@ -64,6 +66,8 @@ class Positions:
 
     def _read_document(self, root: Any) -> None:
         for node in root.children:
+            if node.type in ("table", "table_array_element") and self.first_table is None:
+                self.first_table = node.start_byte
             match node.type:
                 case "pair":
                     self._read_pair(node, ())

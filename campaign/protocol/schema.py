@@ -7,7 +7,7 @@ here by exclusion: every key of a test that is not a field of `TestEntry`.
 from __future__ import annotations
 
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,13 +21,36 @@ from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
-from campaign.trial import TrialRequest
+from campaign.trial import Most, Tree, TrialRequest
 
 PROTOCOL_SCHEMA = 2
-BENCH_SCHEMA = 2
+BENCH_SCHEMA = 3
 """Raised when a key is renamed, removed or means something else; `migrations` has how to follow."""
 
 Slug = Annotated[str, Field(pattern=r"^[a-z0-9]+([-_][a-z0-9]+)*$", max_length=60)]
+
+
+class ChosenValue(typing.Protocol):
+    """A value (SI) for an option that a test does not write, and why that one."""
+
+    @property
+    def value(self) -> Any: ...
+
+    @property
+    def reason(self) -> str: ...
+
+
+class StageKind(typing.Protocol):
+    """What this room needs of a stage; see `campaign.experiments.interface`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def why(self) -> str: ...
+
+    @property
+    def most(self) -> Callable[[Any, Bench], Most]: ...
 
 
 class ExperimentKind(typing.Protocol):
@@ -43,6 +66,9 @@ class ExperimentKind(typing.Protocol):
     def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
 
     @property
+    def fit(self) -> Callable[[Any, Bench], Mapping[str, ChosenValue]] | None: ...
+
+    @property
     def requires(self) -> Mapping[str, str]: ...
 
     @property
@@ -50,6 +76,9 @@ class ExperimentKind(typing.Protocol):
 
     @property
     def seeks_instability(self) -> bool: ...
+
+    @property
+    def stages(self) -> Sequence[StageKind]: ...
 
 
 class OperatorEntry(Options):
@@ -82,6 +111,8 @@ class TestEntry(Options):
     """The experiment, one of `campaign kinds`."""
     bench: str
     """Path of a bench, relative to this file, or the bare name of a shipped one."""
+    truth: str = ""
+    """A bench that `sim` simulates in place of `bench`, which plan and analysis are not told of."""
     title: str = ""
     """Heading of the test in the report."""
     description: str = ""
@@ -140,6 +171,8 @@ class Test:
         bench_name: of its source.
         axes: the matrix, first key slowest.
         origin, bench_origin: where they stand, for problems found later.
+        truth: what is simulated in place of the bench, see `physics.truth.plant_of`; None: nothing
+            else.
     """
 
     __test__ = False
@@ -152,6 +185,7 @@ class Test:
     axes: tuple[Axis, ...]
     origin: Origin
     bench_origin: Origin
+    truth: Tree | None = None
 
 
 @dataclass(frozen=True)
@@ -180,6 +214,7 @@ class Protocol:
         overrides: what `--set` was given.
         calibration: what may be fitted, None when the protocol does not say.
         policy, check: of this file; those of included protocols do not apply.
+        truth_sources: verbatim text of every truth, by its name as written; not among `sources`.
     """
 
     path: Path
@@ -195,6 +230,7 @@ class Protocol:
     calibration: Calibration | None = None
     policy: Policy = field(default_factory=Policy)
     check: Check | None = None
+    truth_sources: Mapping[str, str] = field(default_factory=dict)
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import RunStatus
+from campaign.archive.measured import Measure
 from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision
@@ -179,7 +180,9 @@ class _File(MemoryRecorder):
         super().__init__()
         self._archive = archive
 
-    def finish(self, ending: Ending, started: str, ended: str) -> None:
+    def finish(
+        self, ending: Ending, started: str, ended: str, *, measure: Measure | None = None
+    ) -> None:
         self._archive.ending = ending
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from campaign.calibration.objective import Simulation
 from campaign.errors import ProtocolError, UsageError
 from campaign.experiments import experiments
+from campaign.experiments.interface import Stage
 from campaign.protocol import load_protocol, make_plan
+from campaign.trial import Most
 
 from .laboratory import BENCH, PROTOCOL, problem, write
 
@@ -100,3 +104,14 @@ def test_many_parameters_are_a_warning(tmp_path: Path) -> None:
     assert made.warnings == ()
     few = PROTOCOL.replace('cells = ["A.1"]', 'cells = ["A.1/1.0", "A.1/3.0"]')
     assert "no intervals" in problem(write(tmp_path, few)).warnings[0]
+
+
+def test_a_test_with_later_stages_is_refused(tmp_path: Path) -> None:
+    """What follows depends on what was found, so a cell's value would jump while it is fitted."""
+    found = problem(write(tmp_path, PROTOCOL))
+    (test,) = found.tests
+    stage = Stage("more", "", lambda options, bench: Most(1, 1.0, 1), lambda o, b, data: ())
+    staged = replace(test, experiment=replace(experiments()[test.entry.kind], stages=(stage,)))
+    simulation = Simulation(replace(found, tests=(staged,)), experiments(), 1)
+    with pytest.raises(ProtocolError, match="executes planned trials only; leave out the more"):
+        simulation.check()

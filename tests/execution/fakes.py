@@ -10,6 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from campaign.archive.journal import TrialsFollowed
+from campaign.archive.measured import Measure
+from campaign.estimate import Estimate
 from campaign.trial import (
     ChannelInfo,
     Ending,
@@ -98,13 +101,34 @@ class MemoryTrial(MemoryRecorder):
         super().__init__()
         self.archive, self.trial = archive, trial
 
-    def finish(self, ending: Ending, started: str, ended: str) -> None:
+    def finish(
+        self, ending: Ending, started: str, ended: str, *, measure: Measure | None = None
+    ) -> None:
         assert datetime.fromisoformat(started) <= datetime.fromisoformat(ended)
         with self.archive.lock:
+            self.archive.trials[self.trial.number] = self.trial
             self.archive.endings[self.trial.number] = ending
             self.archive.attempts.append((self.trial.number, ending.outcome))
             self.archive.recordings[self.trial.number] = self.recording(ending)
             self.archive.samples[self.trial.number] = len(self.recording(ending).time)
+        if measure is not None:
+            measure(self.archive.archived(self.trial.number))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class MemoryTrialData:
+    """An archived trial, as an experiment sees it."""
+
+    trial: Trial
+    ending: Ending
+    samples: Recording
+    estimates: tuple[Estimate, ...] = ()
+
+    def recording(self) -> Recording:
+        return self.samples
+
+    def channel_names(self) -> frozenset[str]:
+        return frozenset(self.samples.channels)
 
 
 @dataclass
@@ -118,6 +142,17 @@ class MemoryArchive:
     attempts: list[tuple[int, Outcome]] = field(default_factory=list)
     sealed: tuple[str, str, SafeState] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
+    trials: dict[int, Trial] = field(default_factory=dict)
+    stages: list[TrialsFollowed] = field(default_factory=list)
+
+    def archived(self, number: int) -> MemoryTrialData:
+        with self.lock:
+            ended, samples = self.endings[number], self.recordings[number]
+            return MemoryTrialData(self.trials[number], ended, samples)
+
+    def trials_followed(self, followed: TrialsFollowed) -> None:
+        assert self.sealed is None
+        self.stages.append(followed)
 
     @property
     def folder(self) -> Path:

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.header import RunStatus
+from campaign.archive.measured import Measure, Measured
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
@@ -86,7 +88,9 @@ class Lab:
         self.progress: list[Progress] = []
         self.trials = [t.model_copy(update={"bench": LIMITS}) for t in make_trials(trials)]
 
-    def run(self, patience: Patience = PATIENT, *, live: bool = True) -> RunOutcome:
+    def run(
+        self, patience: Patience = PATIENT, *, live: bool = True, measure: Measure | None = None
+    ) -> RunOutcome:
         return run_plan(
             self.trials,
             self.backend,  # type: ignore[arg-type]
@@ -95,6 +99,7 @@ class Lab:
             display=self.progress.append,
             stop=self.stop,
             supervision=Supervision(Source.HARDWARE, live, patience),
+            measure=measure,
         )
 
 
@@ -130,6 +135,26 @@ def test_a_good_live_trial_is_left_alone(lab: Callable[..., Lab]) -> None:
     assert bench.run().status is RunStatus.COMPLETE
     assert bench.backend.log == ["begins", "returns", "made safe"]
     assert bench.archive.endings[1].telemetry["longest_gap_s"] == 0.0
+
+
+@pytest.mark.parametrize("breaks", [False, True])
+def test_a_bench_that_was_not_seen_safe_is_made_safe_before_its_recording_is_measured(
+    lab: Callable[..., Lab], breaks: bool
+) -> None:
+    def unsafe(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 20)
+        if breaks:
+            raise BackendError("the port is gone")
+        return Ending(Outcome.COMPLETED, safe_state=SafeState.NOT_CONFIRMED)
+
+    def measure(data: ArchivedTrial) -> Measured:
+        bench.backend.log.append("measured")
+        return Measured()
+
+    bench = lab(unsafe, 1)
+    bench.run(measure=measure)
+    assert bench.backend.log[:4] == ["begins", "returns", "made safe", "measured"]
+    assert bench.archive.endings[1].safe_state is SafeState.NOT_CONFIRMED, "as the backend said"
 
 
 def test_a_bench_that_falls_silent_is_made_safe_while_its_backend_hangs(

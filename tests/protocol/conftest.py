@@ -91,6 +91,8 @@ class Kind:
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
     seeks_instability: bool = False
+    fit: Callable[[Any, Bench], Mapping[str, Any]] | None = None
+    stages: tuple[Any, ...] = ()
 
 
 KINDS = {

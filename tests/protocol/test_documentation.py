@@ -9,7 +9,9 @@ import pytest
 
 from campaign.errors import ProtocolError
 from campaign.experiments import experiments
+from campaign.physics.known import KnownOptions
 from campaign.protocol import ProtocolFile, TestEntry, check_limits, load_protocol, make_plan
+from campaign.protocol.bench_file import load_bench
 
 from .conftest import SHIPPED
 
@@ -68,8 +70,19 @@ def test_scatter_and_preload_of_the_page(tmp_path: Path) -> None:
     assert len(make_plan(load_protocol(path, experiments(), shipped=SHIPPED)).trials) == 2
 
 
+def test_what_is_known_of_the_page(tmp_path: Path) -> None:
+    (block,) = blocks("toml known")
+    simulink = (SHIPPED / "benches" / "simulink.toml").read_text()
+    plain = re.sub(r"\[known\]\n(?:[a-z]+ = .*\n)+", "", simulink)
+    (tmp_path / "own.toml").write_text(plain + block)
+    bench = load_bench(str(tmp_path / "own.toml"))
+    assert bench.known_uncertainty("motor.torque_constant") == pytest.approx(0.008 / 3.919928)
+    assert bench.known_uncertainty("axis.inertia") == pytest.approx(0.05 * 35)
+
+
 def test_every_key_is_documented() -> None:
-    for key in [*ProtocolFile.model_fields, *TestEntry.model_fields]:
+    keys = [*ProtocolFile.model_fields, *TestEntry.model_fields, *KnownOptions.model_fields]
+    for key in keys:
         assert f"`{key}`" in PAGE or f"`[{key}]`" in PAGE or f"`[[{key}]]`" in PAGE
 
 

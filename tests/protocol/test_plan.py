@@ -344,3 +344,28 @@ def test_a_swept_gain_is_found_at_the_trial_that_has_it(desk) -> None:
     (test,) = shipped_plan(desk, text).tests
     assert test.loops[0].trial == 2
     assert not test.loops[0].margins.stable
+
+
+def test_values_that_are_not_written_follow_from_the_bench(desk) -> None:
+    """In options, trials and JSON, with the reason; at each point of the matrix for its bench."""
+    text = """
+        [[test]]
+        name = "ramp"
+        kind = "breakaway"
+        bench = "platform.toml"
+        positions = ["0 deg"]
+        directions = ["positive"]
+        torque_rate = "2 N m/s"
+        seed = 1
+        [test.matrix]
+        "bench.limits.torque" = ["1000 N m", "50 N m"]
+    """
+    plan = shipped_plan(desk, text)
+    (test,) = plan.tests
+    assert test.chosen["peak_torque"] == "1.8 times the static torque"
+    assert "torque_rate" not in test.chosen
+    assert as_tree(plan)["tests"][0]["chosen"] == dict(test.chosen)
+    peaks = [trial.options["peak_torque"] for trial in plan.trials]
+    assert peaks == [test.options["peak_torque"], pytest.approx(0.9 * 50.0)]
+    ends = [trial.task.command.values[-1] for trial in plan.trials]
+    assert ends == peaks

@@ -54,8 +54,10 @@ def read_glance(path: Path) -> Glance:
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         run = guarded.group_at(file, "run", "NXentry")
         outcome = guarded.group_at(run, "outcome", "NXcollection")
+        header = read_header(run, DamageList(path))
         return Glance(
-            header=read_header(run, DamageList(path)),
+            header=header,
+            planned=header.trials,
             status=RunStatus(guarded.text_at(outcome, "status")),
             ended=guarded.text_at(run, "end_time"),
             finished=guarded.integer_at(outcome, "trials_finished"),

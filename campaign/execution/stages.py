@@ -1,0 +1,219 @@
+"""Later stages of a run: when they are asked which trials follow, and what becomes of the answer.
+
+A stage is asked once all trials of its point have ended for good; its answer is in the journal
+before the first of its trials begins. Stages are asked in one order, that of their points' last
+planned trials, whatever the workers were busy with: so a trial has the same number in every run,
+and a run that is gone on with knows from the journal which of them were asked.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from campaign.archive.followed import trials_followed
+from campaign.archive.journal import TrialsFollowed
+from campaign.backends.interface import Backend
+from campaign.channels import missing
+from campaign.errors import CampaignError, UsageError
+from campaign.execution.attempt import utc_now
+from campaign.execution.safety import describe
+from campaign.experiments.interface import (
+    Experiment,
+    TestData,
+    TrialData,
+    bench_of,
+    options_of,
+)
+from campaign.protocol.follow import Followed, Refusal, TooMuchError, follow
+from campaign.protocol.stages import PlannedStage, place_of
+from campaign.trial import Role, Trial, canonical_json
+
+TOLD = 3
+"""Refused trials of a stage that are told one by one; the journal has them all."""
+
+
+class StageArchive(Protocol):
+    """What stages need of the run's archive (`campaign.archive.RunWriter`)."""
+
+    def archived(self, number: int) -> TrialData:
+        """A trial of this run that has ended. Raises ArchiveError, LookupError."""
+
+    def trials_followed(self, followed: TrialsFollowed) -> None:
+        """Note a stage's trials. Raises ArchiveError."""
+
+
+class Stages:
+    """The stages of a run that have not been asked yet. Used from one thread."""
+
+    def __init__(
+        self,
+        planned: Iterable[PlannedStage],
+        trials: Sequence[Trial],
+        archive: StageArchive,
+        experiments: Mapping[str, Experiment],
+        refusal: Refusal,
+        *,
+        finished: Iterable[int] = (),
+        asked: Sequence[TrialsFollowed] = (),
+    ) -> None:
+        """Begin, or go on where an earlier session ended.
+
+        Args:
+            planned: all stages of the plan.
+            trials: all that are known: those of the plan, and those of `asked`.
+            refusal: what the backend says of a trial; empty when it can be executed.
+            finished: numbers of the trials that have ended for good.
+            asked: the stages of which the journal tells.
+        """
+        known = {(place_of(each.test, each.point), each.stage) for each in asked}
+        places = {stage.place: stage for stage in planned}
+        paths = {stage.test: tuple(stage.point) for stage in places.values()}
+        self._trials: dict[str, list[Trial]] = {}
+        for trial in trials:
+            if trial.test in paths and trial.role is not Role.CHECK:
+                point = {path: trial.point[path] for path in paths[trial.test]}
+                self._trials.setdefault(place_of(trial.test, point), []).append(trial)
+        followed = {each.number for stage in asked for each in stage.trials}
+        last = {
+            place: max(trial.number for trial in own if trial.number not in followed)
+            for place, own in self._trials.items()
+        }
+        waiting = [stage for stage in planned if (stage.place, stage.number) not in known]
+        waiting.sort(key=lambda stage: (last[stage.place], stage.number))
+        self._waiting = deque(waiting)
+        self._followed = followed
+        self._ended = set(finished)
+        self._next = max((trial.number for trial in trials), default=0) + 1
+        self._archive = archive
+        self._experiments = experiments
+        self._refusal = refusal
+        self._failures = [text for stage in asked if (text := _failure(stage))]
+
+    @property
+    def left(self) -> bool:
+        """Whether a stage has not been asked yet."""
+        return bool(self._waiting)
+
+    @property
+    def failed(self) -> str:
+        """Why trials of a stage are missing; empty when none is."""
+        more = len(self._failures) - 1
+        return f"{self._failures[0]}{f', and {more} more' if more > 0 else ''}" if more >= 0 else ""
+
+    def in_order(self, trials: Iterable[Trial]) -> list[Trial]:
+        """The trials that are to be executed: what had followed before a run was resumed first,
+        as it would have been without that.
+        """
+        return sorted(trials, key=lambda trial: trial.number not in self._followed)
+
+    def ended(self, trial: Trial) -> None:
+        """A trial has ended for good, and is archived."""
+        self._ended.add(trial.number)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether everything has ended from which the next stage follows."""
+        if not self._waiting:
+            return False
+        own = self._trials[self._waiting[0].place]
+        return all(trial.number in self._ended for trial in own)
+
+    def ask(self) -> tuple[Sequence[Trial], Sequence[str]]:
+        """The trials of the stage that is due, journalled; also what there is to say.
+
+        Whatever goes wrong in it costs the stage only. Raises ArchiveError when it cannot be kept.
+        """
+        stage = self._waiting[0]
+        found, reason = Followed(()), ""
+        try:
+            found = self._follow(stage)
+        except (TooMuchError, CampaignError) as error:
+            reason = str(error)
+        except Exception as error:  # noqa: BLE001 - a bug in an experiment must not cost the run
+            reason = describe(error)
+        what = (stage.test, stage.number, stage.name, stage.point)
+        entry = trials_followed(utc_now(), *what, found.trials, found.refused, reason)
+        self._archive.trials_followed(entry)
+        self._waiting.popleft()
+        self._trials[stage.place] += found.trials
+        self._next += len(found.trials)
+        if text := _failure(entry):
+            self._failures.append(text)
+        return found.trials, _remarks(entry)
+
+    def _follow(self, stage: PlannedStage) -> Followed:
+        trials = self._trials[stage.place]
+        first = trials[0]
+        experiment = self._experiments[first.kind]
+        (declared,) = (each for each in experiment.stages if each.name == stage.name)
+        archived = tuple(self._archive.archived(trial.number) for trial in trials)
+        if not _on_benches_of(trials, archived):
+            raise UsageError("its trials were executed on different benches")
+        data = TestData(first.test, first.kind, first.options, archived)
+        requests = declared.trials(options_of(experiment, first.options), bench_of(first), data)
+        return follow(stage, experiment, requests, first, self._next, self._refusal)
+
+
+def _on_benches_of(trials: Sequence[Trial], archived: Sequence[TrialData]) -> bool:
+    """Whether each was executed on the bench that it has now.
+
+    A run may be gone on with on a changed bench. What was found on the one before, or on both, may
+    not decide how the changed one moves.
+    """
+    return all(
+        canonical_json(then.trial.bench) == canonical_json(now.bench)
+        for then, now in zip(archived, trials, strict=True)
+    )
+
+
+def refusal_of(backend: Backend) -> Refusal:
+    """Why `backend`, once it is connected, does not execute a trial."""
+
+    def why(trial: Trial) -> str:
+        if reason := backend.refuses(trial):
+            return reason
+        known = backend.channels(trial) if trial.requires else None
+        lacking = () if known is None else missing(trial.requires, known)
+        return f"it requires {', '.join(lacking)}, and that is not recorded" if lacking else ""
+
+    return why
+
+
+def _failure(entry: TrialsFollowed) -> str:
+    """That trials of a stage are missing, and why; empty when none is."""
+    if entry.reason:
+        return f"{entry.title} failed: {entry.reason}"
+    if entry.refused:
+        count = len(entry.refused)
+        what = "a trial was" if count == 1 else f"{count} trials were"
+        return f"{entry.title}: {what} refused: {entry.refused[0].why}"
+    return ""
+
+
+def _remarks(entry: TrialsFollowed) -> list[str]:
+    """What a person wants to know of a stage that was asked."""
+    if entry.reason:
+        return [_failure(entry)]
+    count = len(entry.trials)
+    remarks = [f"{entry.title}: {'1 trial follows' if count == 1 else f'{count} trials follow'}"]
+    remarks += [f"refused: {each.label}: {each.why}" for each in entry.refused[:TOLD]]
+    if len(entry.refused) > TOLD:
+        remarks.append(f"and {len(entry.refused) - TOLD} more trials are refused")
+    return remarks
+
+
+class _Nothing:
+    """The archive of a run without stages."""
+
+    def archived(self, number: int) -> TrialData:
+        raise LookupError(number)
+
+    def trials_followed(self, followed: TrialsFollowed) -> None:
+        return None
+
+
+def no_stages() -> Stages:
+    """Of a run all of whose trials are planned."""
+    return Stages((), (), _Nothing(), {}, lambda trial: "")

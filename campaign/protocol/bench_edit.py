@@ -1,0 +1,110 @@
+"""Writing into a bench's file what is known of it; comments and all else stay as they are."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from campaign.errors import UsageError
+from campaign.physics.bench import Bench
+from campaign.physics.bench_fingerprint import fingerprint
+from campaign.physics.known import FORMER as FORMER_KNOWN
+from campaign.protocol.positions import Positions
+
+_HEADER = re.compile(r"^[ \t]*\[[ \t]*known[ \t]*[\].]", re.M)
+"""Of the table `known`, or of one within it."""
+
+
+def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
+    """The text of a bench with `entries` in its table `known`, and the fingerprint it then has.
+
+    Args:
+        entries: plain values, tables and lists; a table is merged into the one that is there.
+        name: of the file, for messages.
+
+    Raises UsageError when the keys of the file are written in a form that cannot be edited.
+    """
+    from tomlkit.exceptions import TOMLKitError
+
+    try:
+        changed = _edited(text, entries)
+        bench = Bench.model_validate(tomllib.loads(changed))
+        stated = fingerprint(bench).model_dump(mode="json")
+        changed = _edited(changed, {"fingerprint": stated})
+        again = Bench.model_validate(tomllib.loads(changed))
+    except (TOMLKitError, LookupError, ValueError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"{name}: its keys are written in a form that cannot be edited; write [known] as a "
+            "table of its own"
+        ) from error
+    if again.known.fingerprint != fingerprint(bench):
+        raise UsageError(f"{name}: its fingerprint cannot be written; write it by hand: {stated}")
+    return changed
+
+
+def _edited(text: str, entries: Mapping[str, Any]) -> str:
+    """`text` with entries of `known`, each where it is written already, or else in its table."""
+    import tomlkit
+
+    newline = "\r\n" if "\r\n" in text else "\n"
+    document = tomlkit.parse(text.replace("\r\n", "\n"))
+    left = dict(entries)
+    for key in FORMER_KNOWN:
+        if key in left and key in document:
+            document[key] = left.pop(key)
+    if "known" in document:
+        _put(document["known"], left, in_line=_HEADER.search(text) is None)
+        return document.as_string().replace("\n", newline)
+    return _with_table(document.as_string(), left).replace("\n", newline)
+
+
+def _put(known: Any, entries: Mapping[str, Any], *, in_line: bool = False) -> None:
+    """`in_line`: the table has no header of its own, and tables within it can have none."""
+    import tomlkit
+
+    for key, value in entries.items():
+        if key == "correlations":
+            known[key] = tomlkit.array()
+            known[key].extend(value)
+            known[key].multiline(not in_line)
+            continue
+        if key != "values":
+            known[key] = _inline(value)
+            continue
+        if key not in known:
+            known[key] = tomlkit.inline_table() if in_line else tomlkit.table()
+        for path, one in value.items():
+            known[key][path] = _inline(one)
+
+
+def _inline(value: Any) -> Any:
+    """A table as TOML keeps it on one line; anything else as it is."""
+    import tomlkit
+
+    if not isinstance(value, Mapping):
+        return value
+    table = tomlkit.inline_table()
+    for key, item in value.items():
+        table[key] = _inline(item)
+    return table
+
+
+def _with_table(text: str, entries: Mapping[str, Any]) -> str:
+    """`text` with a table `known` before its first one and the comment above that."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document["known"] = tomlkit.table()
+    _put(document["known"], entries)
+    first = Positions(text).first_table
+    content = text.encode()
+    before, after = content[:first].decode(), "" if first is None else content[first:].decode()
+    lines = before.splitlines(keepends=True)
+    place = len(lines)
+    while place and lines[place - 1].startswith("#"):
+        place -= 1
+    gap = "" if not place or lines[place - 1].strip() == "" else "\n"
+    block = document.as_string().strip("\n")
+    return f"{''.join(lines[:place])}{gap}{block}\n\n{''.join(lines[place:])}{after}"

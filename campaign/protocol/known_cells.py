@@ -1,0 +1,70 @@
+"""Whether the published cells that a bench says it was made from are there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from campaign.errors import Problem, UsageError
+from campaign.physics.known import FORMER as FORMER_KNOWN
+from campaign.physics.known import KnownOptions
+from campaign.protocol.files import Origin, UnreadableError, looked_for, read_text
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import nearest, shown
+from campaign.published.patterns import covers
+from campaign.published.values import Published, read_published, thesis
+
+THESIS = "thesis"
+
+
+def cell_problems(
+    known: KnownOptions,
+    written: Mapping[str, Any],
+    origin: Origin,
+    folder: Path,
+    *,
+    must_be_there: bool = False,
+) -> Iterator[Problem]:
+    """A problem for each pattern that covers no cell of the document that the bench names.
+
+    Nothing is wrong with one that names no document: then nobody can tell. Nor, to whoever only
+    uses the bench, where its file is not at hand: a bench travels without it.
+
+    Args:
+        written: the bench as written, where the patterns may stand at the top level.
+        folder: of the bench's file.
+        must_be_there: whether a document that is not is a problem, too.
+    """
+    if not known.document:
+        return
+    try:
+        published = _published(known.document, folder)
+    except UnreadableError as error:
+        if must_be_there:
+            message = f"{shown(known.document)}: {error} {looked_for(folder / known.document)}"
+            yield origin.problem(("known", "document"), "value", message)
+        return
+    except UsageError as error:
+        yield origin.problem(("known", "document"), "value", str(error))
+        return
+    paths = [cell.path for table in published.values() for cell in table.cells]
+    for name in ("given", "fitted", "seen"):
+        at: Keys = (name,) if name in FORMER_KNOWN and written.get(name) else ("known", name)
+        for index, pattern in enumerate(getattr(known, name)):
+            if not any(covers(pattern, path) for path in paths):
+                message = f"{shown(pattern)} is no cell of {shown(known.document)}"
+                table = [path for path in paths if path.startswith(f"{pattern.split('/')[0]}/")]
+                names = table or [*published, *paths]
+                yield origin.problem((*at, index), "value", message + nearest(pattern, names))
+
+
+def _published(document: str, folder: Path) -> Published:
+    """The cells that a comparison with the document has.
+
+    A laboratory's own file stands beside the thesis, as in a report. Raises UsageError when it is
+    wrong, UnreadableError when it is not there.
+    """
+    if document == THESIS:
+        return thesis()
+    return {**thesis(), **read_published(read_text(folder / document), document)}

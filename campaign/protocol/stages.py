@@ -1,0 +1,77 @@
+"""The stages of a plan: trials that will follow from what others find, as far as it is known now.
+
+A plan's own trials are the first stage of every test. What an experiment declares beyond them
+(`Experiment.stages`) is planned by point of the matrix: how many trials follow at most, how long
+they take, how much they record. Which they are, `protocol.follow` says once there is data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from pydantic import JsonValue
+
+from campaign.protocol.points import Point
+from campaign.protocol.schema import Test
+from campaign.trial import NONE_MORE, Most, Role, Trial, canonical_json
+
+FIRST = 2
+"""Number of the stage that follows first; the planned trials are stage 1."""
+
+
+@dataclass(frozen=True)
+class PlannedStage:
+    """A stage of one test at one point of its matrix.
+
+    Attributes:
+        number: from `FIRST`: its place among the experiment's stages.
+        name, why: as the experiment declares them.
+        point: swept path to value (SI).
+        seed: of the test; those of the trials follow from it.
+        most: what its trials take at most.
+    """
+
+    test: str
+    number: int
+    name: str
+    why: str
+    point: Mapping[str, JsonValue]
+    seed: int
+    most: Most
+
+    def is_of(self, trial: Trial) -> bool:
+        """Whether it follows from `trial`, among others: one of the same point, and no check."""
+        return (
+            trial.test == self.test
+            and trial.role is not Role.CHECK
+            and all(trial.point.get(path) == value for path, value in self.point.items())
+        )
+
+    @property
+    def place(self) -> str:
+        """The test and the point, for whoever groups by them."""
+        return place_of(self.test, self.point)
+
+
+def place_of(test: str, point: Mapping[str, JsonValue]) -> str:
+    """A test's point as one text."""
+    return canonical_json([test, dict(point)])
+
+
+def planned_stages(test: Test, point: Point, seed: int) -> Iterator[PlannedStage]:
+    """The stages for which the options of a point ask. Raises what the experiment raises."""
+    for number, stage in enumerate(test.experiment.stages, start=FIRST):
+        most = stage.most(point.options, point.bench)
+        if most.trials <= 0:
+            continue
+        if not math.isfinite(most.duration):
+            raise ValueError(f"the stage '{stage.name}' has no bound of its duration")
+        values = dict(point.values)
+        yield PlannedStage(test.entry.name, number, stage.name, stage.why, values, seed, most)
+
+
+def most_of(stages: Iterable[PlannedStage]) -> Most:
+    """What all of them take at most."""
+    return sum((stage.most for stage in stages), NONE_MORE)
