@@ -7,41 +7,30 @@ an *assumed* damping ratio gives sigma1, which the ramp itself does not show.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate, Origin, Window
+from campaign.experiments import fitting
+from campaign.experiments.breakaway_figures import position_figure, ramp_figure
+from campaign.experiments.breakaway_means import Ramps, means_of, with_comparisons
+from campaign.experiments.breakaway_remarks import remarks
+from campaign.experiments.breakaway_tables import findings_of, table_of, window_table
 from campaign.experiments.common import conditions, failures_note, grouped
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.identification.presliding import (
-    Presliding,
-    breakaway_torque,
-    damping_by_ratio,
-    fine_angle,
-    fit_presliding,
-    presliding_curve,
-)
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
-from campaign.result import (
-    Array,
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-    Value,
-)
+from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
-from campaign.trial import Task, TrialRequest
+from campaign.trial import Array, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
     AngularRate,
@@ -55,6 +44,9 @@ from campaign.units import (
 
 STOP_FACTOR = 4.0
 """Rate that ends the trial, over the rate that counts as sliding: enough to see it slide."""
+WAYS = {"positive": 1.0, "negative": -1.0}
+OWN = ("measurement", "position", "direction")
+"""What distinguishes the ramps of one group."""
 
 
 def default_positions() -> tuple[float, ...]:
@@ -67,12 +59,16 @@ class BreakawayOptions(Options):
 
     positions: tuple[Angle, ...] = Field(default_factory=default_positions, min_length=1)
     """Angles of the load relative to the hull at which the ramp is run."""
+    directions: tuple[Literal["positive", "negative"], ...] = Field(
+        default=("positive", "negative"), min_length=1, max_length=2
+    )
+    """Ways to which the load is turned, one after the other; friction may differ by direction."""
     torque_rate: TorqueRate = Field(default=1.0, gt=0)
-    """Slope of the ramp, at the load."""
+    """Slope of the ramp, at the load. Swept, it shows what the ramp's rate does to the results."""
     peak_torque: Torque = Field(default=60.0, gt=0)
     """Where the ramp ends if the load has not moved; above the breakaway torque expected."""
     rest: Time = Field(default=0.5, ge=0)
-    """Standstill before the ramp."""
+    """Standstill before the ramp: it says what the gyro's bias is."""
     sliding_rate: AngularRate = Field(default=0.005, gt=0)
     """Rate at which the load counts as sliding; the trial ends when it is four times this fast."""
     fit_share: float = Field(default=0.8, gt=0.1, lt=1.0)
@@ -88,279 +84,156 @@ class BreakawayOptions(Options):
 
 
 def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
-    ramp = options.peak_torque / options.torque_rate
+    windows = windows_of(options)
+    _, ramp = windows
     stop_rate = STOP_FACTOR * options.sliding_rate
-    for number, position in enumerate(options.positions, start=1):
+    places = [(way, position) for way in options.directions for position in options.positions]
+    for number, (direction, position) in enumerate(places, start=1):
+        peak = WAYS[direction] * options.peak_torque
         yield TrialRequest(
             Task(
                 mode="torque",
-                command=Polyline(
-                    times=(0.0, options.rest, options.rest + ramp),
-                    values=(0.0, 0.0, options.peak_torque),
-                ),
-                duration=options.rest + ramp,
-                window=(options.rest, options.rest + ramp),
+                command=Polyline(times=(0.0, ramp.start, ramp.stop), values=(0.0, 0.0, peak)),
+                duration=ramp.stop,
+                window=(ramp.start, ramp.stop),
                 sample_rate=options.sample_rate,
                 start_angle=position,
                 stop_rate=stop_rate,
             ),
-            point={"measurement": number, "position": position},
+            point={"measurement": number, "position": position, "direction": direction},
             note=f"ends early, once the load slides at {np.rad2deg(stop_rate):.3g} deg/s",
+            windows=windows,
         )
 
 
-@dataclass(frozen=True)
-class Ramp:
-    """One ramp and what it says: time, angle from its start, and torque, shape (n,), SI."""
-
-    place: dict[str, Value]
-    time: Array
-    angle: Array
-    torque: Array
-    rate: Array
-    found: Presliding
-    damping: float
+def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
+    """Standstill and ramp, for the plan and for recordings of a plan that did not name them."""
+    stop = options.rest + options.peak_torque / options.torque_rate
+    return Window("rest", 0.0, options.rest), Window("ramp", options.rest, stop)
 
 
-def _evaluate(data: TrialData) -> Ramp:
-    options = BreakawayOptions.model_validate(data.trial.options, context={"si": True})
-    bench = bench_of(data.trial)
-    recording = data.recording()
-    torque, rate = recording[DRIVE_TORQUE], recording[GYRO_RATE]
-    before = recording.time <= options.rest
-    angle = fine_angle(recording.time, rate, recording[RELATIVE_ANGLE])
-    angle = angle - float(np.mean(angle[before]))
-    sign = 1.0 if options.peak_torque > 0 else -1.0
-    breakaway, at = breakaway_torque(
-        recording.time, rate, torque, bench.axis.inertia, options.sliding_rate
+def _windows(trial: Trial, options: BreakawayOptions) -> dict[str, Window]:
+    return {window.name: window for window in trial.windows or windows_of(options)}
+
+
+def _options(trial: Trial) -> BreakawayOptions:
+    return BreakawayOptions.model_validate(trial.options, context={"si": True})
+
+
+def direction_of(trial: Trial) -> str:
+    """Which way the load was turned; before it was an option it was the positive."""
+    return str(trial.point.get("direction", "positive"))
+
+
+def _samples(data: TrialData) -> tuple[Array, Array, Array]:
+    """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,)."""
+    recording, way = data.recording(), WAYS[direction_of(data.trial)]
+    return recording.time, way * recording[GYRO_RATE], way * recording[DRIVE_TORQUE]
+
+
+def _presliding(data: TrialData, breakaway: float) -> Presliding:
+    options = _options(data.trial)
+    start = _windows(data.trial, options)["ramp"].start
+    return fit_presliding(*_samples(data), start, breakaway, options.fit_share)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """Breakaway torque; where the curve of bristles shows, stiffness and what follows from it."""
+    options, bench = _options(data.trial), bench_of(data.trial)
+    inertia = bench.axis.inertia
+    found = breakaway_torque(*_samples(data), inertia, options.sliding_rate)
+    torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
+    torque = _by_torque_constant(torque, bench)
+    acceleration = Estimate.without_interval(
+        "peak_acceleration", found.acceleration, "rad/s^2", "it serves the inertia's part alone"
     )
-    ramp = (recording.time >= options.rest) & (np.arange(len(angle)) <= at)
-    found = fit_presliding(sign * angle[ramp], sign * torque[ramp], breakaway, options.fit_share)
+    try:
+        curve = _presliding(data, found.torque.value)
+    except ValueError:
+        return torque, acceleration
+    return torque, acceleration, *_of_curve(curve, options, bench)
+
+
+def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Iterator[Estimate]:
     viscous = options.viscous_friction
     if viscous is None:
         models = friction_models()
-        viscous = sum(
-            models[f.model].viscous(f) for f in bench.friction.values() if f.side == "load"
-        )
+        load = (each for each in bench.friction.values() if each.side == "load")
+        viscous = sum(models[each.model].viscous(each) for each in load)
     inertia = options.inertia or bench.axis.inertia
-    damping = damping_by_ratio(found.stiffness, inertia, viscous, options.damping_ratio)
-    return Ramp(conditions(data), recording.time, angle, torque, rate, found, damping)
+    stiffness = curve.stiffness.value
+    damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
+    curve = curve.with_damping(damping)
+    yield _by_torque_constant(curve.stiffness, bench)
+    yield _by_torque_constant(curve.stiffness_at_rest, bench)
+    yield Estimate.without_interval(
+        "bristle_damping",
+        damping,
+        "N m s/rad",
+        "it follows from an assumed damping ratio; a ramp carries no information on it",
+        origin=Origin.ASSUMED,
+        method="Equation 4.12",
+    )
+    chord = "a chord through a curve: too low by far more than any scatter"
+    yield Estimate.without_interval("chord", curve.chord, "N m/rad", chord)
+    span = curve.interfaces[0].torque / curve.interfaces[0].stiffness
+    told = "torque over stiffness of the strongest interface, for orientation"
+    yield Estimate.without_interval("presliding_span", span, "rad", told)
+    chosen = "chosen by the Bayesian information criterion"
+    count = float(len(curve.interfaces))
+    yield Estimate.without_interval("interfaces", count, "", chosen, kind="count")
+    for share, own in curve.by_window.items():
+        yield Estimate(**{**vars(own), "name": f"bristle_stiffness_to_{share:g}"})
+
+
+def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
+    """Torque and stiffness are as wrong as the torque constant is."""
+    return with_systematic(estimate, bench, TORQUE_CONSTANT, estimate.value)
 
 
 def _analyse(data: TestData) -> Result:
+    notes: list[str] = list(failures_note(data))
+    groups = [_ramps(group, notes) for group in grouped(data.completed(), own=OWN).values()]
+    groups = with_comparisons([ramps for ramps in groups if ramps.found])
     tables: list[Table] = []
     figures: list[Figure] = []
     findings: list[Finding] = []
-    notes: list[str] = list(failures_note(data))
-    groups = grouped(data.completed(), own=("measurement", "position"))
-    for number, group in enumerate(groups.values(), start=1):
-        ramps = []
-        for item in group:
-            try:
-                ramps.append(_evaluate(item))
-            except ValueError as error:
-                notes.append(f"{item.trial.label}: {error}.")
-        if not ramps:
-            continue
+    for number, ramps in enumerate(groups, start=1):
         suffix = f"-{number}" if len(groups) > 1 else ""
-        tables += [_table(ramps, suffix), _window_table(ramps, suffix)]
-        figures.append(_figure(ramps[0], suffix))
-        if len(ramps) > 2:
-            figures.append(_position_figure(ramps, suffix))
-        findings += _findings(ramps)
-        notes += _remarks(ramps)
+        means = means_of(ramps)
+        tables += [table_of(ramps, means, suffix), *window_table(ramps, suffix)]
+        figures += _figures(ramps, suffix)
+        findings += findings_of(ramps, means)
+        notes += remarks(ramps)
     return Result(tuple(tables), tuple(figures), tuple(findings), tuple(dict.fromkeys(notes)))
 
 
-def _means(ramps: list[Ramp]) -> dict[str, float]:
-    return {
-        "breakaway_torque": float(np.mean([r.found.breakaway for r in ramps])),
-        "bristle_stiffness": float(np.mean([r.found.stiffness for r in ramps])),
-        "stiffness_at_rest": float(np.mean([r.found.stiffness_at_rest for r in ramps])),
-        "bristle_damping": float(np.mean([r.damping for r in ramps])),
-    }
-
-
-UNITS = {
-    "breakaway_torque": "N m",
-    "bristle_stiffness": "N m/rad",
-    "stiffness_at_rest": "N m/rad",
-    "bristle_damping": "N m s/rad",
-}
-
-
-def _findings(ramps: list[Ramp]) -> Iterator[Finding]:
-    for ramp in ramps:
-        yield from _of_means([ramp], ramp.place)
-    shared = {k: v for k, v in ramps[0].place.items() if k not in ("measurement", "position")}
-    yield from _of_means(ramps, {**shared, "statistic": "mean"})
-
-
-def _of_means(ramps: list[Ramp], place: dict[str, Value]) -> Iterator[Finding]:
-    for quantity, value in _means(ramps).items():
-        # sigma1 is a formula of sigma0 and of assumed numbers: no ramp measures it.
-        computed = quantity == "bristle_damping"
-        yield Finding(quantity, value, UNITS[quantity], place, recomputed=computed)
-
-
-def _table(ramps: list[Ramp], suffix: str) -> Table:
-    rows: list[dict[str, Value]] = [
-        {
-            "measurement": ramp.place.get("measurement"),
-            "position": ramp.place.get("position"),
-            **_means([ramp]),
-            "chord": ramp.found.chord,
-            "interfaces": len(ramp.found.interfaces),
-        }
-        for ramp in ramps
-    ]
-    mean: dict[str, Value] = {"measurement": "mean", "position": None, **_means(ramps)}
-    mean |= {"chord": float(np.mean([r.found.chord for r in ramps])), "interfaces": None}
-    return Table(
-        key=f"presliding{suffix}",
-        title="Breakaway torque and presliding parameters by position",
-        columns=(
-            Column("measurement", "Measurement"),
-            Column("position", "Position", "rad", "deg"),
-            Column("breakaway_torque", "Breakaway torque", "N m", "N m"),
-            Column("bristle_stiffness", "σ0 (after the first slip)", "N m/rad", "N m/rad"),
-            Column("stiffness_at_rest", "Stiffness at rest", "N m/rad", "N m/rad"),
-            Column("chord", "Straight chord", "N m/rad", "N m/rad"),
-            Column("bristle_damping", "σ1 (assumed)", "N m s/rad", "N m s/rad"),
-            Column("interfaces", "Interfaces seen"),
-        ),
-        rows=(*rows, mean),
-        thesis=("4.5",),
-        note="σ0 is the stiffness of the interface that carries the largest torque; stiffness at "
-        "rest is the slope before anything slips, the sum over all interfaces. σ1 is not "
-        "measured: it follows from an assumed damping ratio (Equation 4.12).",
-    )
-
-
-def _window_table(ramps: list[Ramp], suffix: str) -> Table:
-    shares = sorted({share for ramp in ramps for share in ramp.found.by_window})
-    rows: list[dict[str, Value]] = []
-    for share in shares:
-        values = [r.found.by_window[share] for r in ramps if share in r.found.by_window]
-        rows.append(
-            {
-                "share": share,
-                "mean": float(np.mean(values)),
-                "lowest": min(values),
-                "highest": max(values),
-            }
-        )
-    return Table(
-        key=f"window{suffix}",
-        title="How much the fitted window matters to σ0",
-        columns=(
-            Column("share", "Fitted up to (share of breakaway)"),
-            Column("mean", "σ0, mean", "N m/rad", "N m/rad"),
-            Column("lowest", "Lowest", "N m/rad", "N m/rad"),
-            Column("highest", "Highest", "N m/rad", "N m/rad"),
-        ),
-        rows=tuple(rows),
-    )
-
-
-def _remarks(ramps: list[Ramp]) -> Iterator[str]:
-    yield "σ1 is assumed from a damping ratio; a torque ramp carries no information on it."
-    if any(len(ramp.found.interfaces) > 1 for ramp in ramps):
-        yield (
-            "The presliding curve has two slopes: all interfaces stick at first, then the weaker "
-            "one slips and only the stronger goes on deflecting."
-        )
-    for ramp in ramps:
-        for doubt in ramp.found.doubts:
-            yield f"Measurement {ramp.place.get('measurement')}: {doubt}."
-
-
-def _figure(ramp: Ramp, suffix: str) -> Figure:
-    found = ramp.found
-    time, torque_axis = Axis("Time", "s", "s"), Axis("Drive torque", "N m", "N m")
-    angle_axis = Axis("Angle from the start", "rad", "mrad")
-    shown = np.abs(ramp.torque) <= 1.02 * found.breakaway
-    top = float(np.max(ramp.angle[shown])) if shown.any() else float(ramp.angle.max())
-    first = found.interfaces[0]
-    tail = sum(torque for _, _, torque in found.interfaces[1:])
-    fine = np.linspace(0.0, top, 400)
-    values = {
-        name: value
-        for k, (stiffness, _, torque) in enumerate(found.interfaces, start=1)
-        for name, value in ((f"stiffness_{k}", stiffness), (f"torque_{k}", torque))
-    }
-    reach = fine[fine <= found.breakaway / first[0]]
-    curves = [
-        Curve(ramp.angle[shown], ramp.torque[shown], "measured", "measured"),
-        Curve(fine, presliding_curve(fine, values), "fitted curve", "fit"),
-        Curve(reach, tail + first[0] * reach, f"σ0 = {first[0]:,.0f} N m/rad", "reference", "thin"),
-    ]
-    if len(found.interfaces) > 1:
-        steep = fine[fine <= 1.3 * (tail + first[0] * top * 0.02) / found.stiffness_at_rest]
-        curves.append(
-            Curve(
-                steep,
-                found.stiffness_at_rest * steep,
-                f"at rest: {found.stiffness_at_rest:,.0f} N m/rad",
-                "alternative",
+def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
+    trials, places, found = [], [], []
+    for item in group:
+        try:
+            own = metrics(item, _measure)
+        except ValueError as error:
+            notes.append(f"{item.trial.label}: {error}.")
+            continue
+        trials.append(item)
+        places.append({**conditions(item), "direction": direction_of(item.trial)})
+        found.append(own)
+        if "bristle_stiffness" not in own:
+            notes.append(
+                f"{item.trial.label}: its presliding is too short or too noisy for a stiffness; a "
+                "slower ramp shows more of it."
             )
-        )
-    return Figure(
-        key=f"ramp{suffix}",
-        title="Breakaway: torque ramp, motion, and the presliding curve",
-        caption="The torque rises until the load slides. Before that it already gives, "
-        "elastically: the lower curve begins with the stiffness of all interfaces together and "
-        "goes on, once the weaker ones slip, with that of the strongest.",
-        alt="Drive torque and rate over time, and drive torque over angle with the fitted "
-        "presliding curve and its initial slopes.",
-        panels=(
-            Panel(
-                time,
-                torque_axis,
-                [Curve(ramp.time, ramp.torque, "measured", "measured")],
-                marks=(Mark("breakaway", y=found.breakaway),),
-            ),
-            Panel(
-                time,
-                Axis("Rate", "rad/s", "deg/s"),
-                [Curve(ramp.time, ramp.rate, "measured", "measured")],
-            ),
-            Panel(
-                angle_axis,
-                torque_axis,
-                curves,
-                marks=(Mark("end of the fit", y=found.window[1]),),
-            ),
-        ),
-        thesis=("4.13",),
-    )
+    return Ramps(tuple(trials), tuple(places), tuple(found))
 
 
-def _position_figure(ramps: list[Ramp], suffix: str) -> Figure:
-    position = np.array([float(str(r.place["position"])) for r in ramps])
-    axis = Axis("Position", "rad", "deg")
-    stiffness = np.array([r.found.stiffness for r in ramps])
-    breakaway = np.array([r.found.breakaway for r in ramps])
-    return Figure(
-        key=f"positions{suffix}",
-        title="Breakaway torque and bristle stiffness over position",
-        caption="A real axis differs from place to place; a simulated one only as far as its bench "
-        "says so.",
-        alt="Breakaway torque and bristle stiffness, one dot per position.",
-        panels=(
-            Panel(
-                axis,
-                Axis("Breakaway torque", "N m", "N m"),
-                [Curve(position, breakaway, "measured", "measured", "points")],
-            ),
-            Panel(
-                axis,
-                Axis("σ0", "N m/rad", "N m/mrad"),
-                [Curve(position, stiffness, "measured", "measured", "points")],
-            ),
-        ),
-        across=2,
-    )
+def _figures(ramps: Ramps, suffix: str) -> Iterator[Figure]:
+    shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
+    if shown is not None:
+        data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
+        yield ramp_figure(_samples(data), _presliding(data, torque), torque, suffix)
+    if len(ramps.found) > 2:
+        yield position_figure(ramps, suffix)
 
 
 EXPERIMENT = Experiment(
@@ -369,9 +242,10 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
+    fit=fitting.breakaway,
+    measure=_measure,
     requires={
         DRIVE_TORQUE: "the torque at which the load slides",
-        GYRO_RATE: "the moment at which it slides",
-        RELATIVE_ANGLE: "the presliding curve",
+        GYRO_RATE: "the presliding curve, and the moment at which the load slides",
     },
 )

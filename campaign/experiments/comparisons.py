@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.experiments.interface import TrialData, bench_of
+from campaign.identification.stabilization_error import decrease, quotient
 from campaign.result import Finding, Value
 
 
@@ -28,11 +29,13 @@ def compared(errors: Sequence[Finding]) -> Iterator[Finding]:
             if _only_differ_in("compensation", one, other):
                 against = other.conditions["compensation"]
                 if against == "none":
-                    yield Finding("error_reduction", other.value / one.value, "", one.conditions)
-                told = {**one.conditions, "against": against}
-                yield Finding("error_decrease", 1.0 - one.value / other.value, "", told)
+                    reduction = quotient("error_reduction", other.known, one.known)
+                    yield Finding.of(reduction, one.conditions)
+                less = decrease("error_decrease", one.known, other.known)
+                yield Finding.of(less, {**one.conditions, "against": against})
             elif _only_differ_in("average_friction", one, other) and _lowest(other, errors):
-                yield Finding("error_growth", one.value / other.value, "", one.conditions)
+                growth = quotient("error_growth", one.known, other.known)
+                yield Finding.of(growth, one.conditions)
 
 
 def _only_differ_in(name: str, one: Finding, other: Finding) -> bool:

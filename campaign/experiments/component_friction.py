@@ -8,23 +8,44 @@ load as the gear reduces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate, Window
 from campaign.experiments.common import conditions, failures_note, grouped
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.identification.presliding import breakaway_torque
+from campaign.experiments.component_sums import load_share, total_of
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.intervals import shifted_by
+from campaign.identification.readings import (
+    RESOLUTION,
+    deviation_of_readings,
+    mean_of_readings,
+)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
-from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
+from campaign.result import (
+    Array,
+    Axis,
+    Cell,
+    Column,
+    Curve,
+    Figure,
+    Finding,
+    Panel,
+    Result,
+    Table,
+    Value,
+)
 from campaign.signals import Polyline
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate
@@ -95,6 +116,7 @@ def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRe
                 point={"component": component, "measurement": number},
                 bench=tree,
                 note=f"only {component}; ends early, once it turns",
+                windows=(Window("ramp", options.rest, stop),),
             )
 
 
@@ -123,37 +145,48 @@ def _alone(bench: Bench, component: str, scatter: float | None) -> Bench:
 
 @dataclass(frozen=True)
 class Reading:
-    """One measurement: torque at the load and at the sensor (N m), and its history, shape (n,)."""
+    """One measurement: what the torque sensor shows of it, seen at the load."""
 
+    data: TrialData
     place: dict[str, Value]
     component: str
     measurement: int
-    side: str
-    torque: float
-    at_sensor: float
-    history: tuple[Array, Array]
+    torque: Estimate
 
 
-def _read(data: TrialData) -> Reading:
+def _count(data: TrialData, component: str) -> float:
+    """One count of the torque sensor, seen at the load (N m)."""
     options = ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
     bench = bench_of(data.trial)
-    place = conditions(data)
-    component = str(place["component"])
-    side = bench.friction[component].side
-    ratio = bench.gear.ratio if side == "motor" else 1.0
+    motor = bench.friction[component].side == "motor"
+    return options.sensor_resolution * (bench.gear.ratio if motor else 1.0)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """The reading: the largest friction of the ramp, rounded to a count of the torque sensor."""
+    options = ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
-    true, _ = breakaway_torque(
+    found = breakaway_torque(
         recording.time,
         recording[GYRO_RATE],
         recording[DRIVE_TORQUE],
-        bench.axis.inertia,
+        bench_of(data.trial).axis.inertia,
         options.sliding_rate,
-    )
-    count = options.sensor_resolution
-    shown = round(true / ratio / count) * count if count > 0 else true / ratio
-    history = np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
+    ).torque
+    count = _count(data, str(data.trial.point["component"]))
+    if count == 0:
+        return (found,)
+    shift = round(found.value / count) * count - found.value
+    low, high = (None if end is None else end + shift for end in (found.low, found.high))
+    shown = replace(found, value=found.value + shift, low=low, high=high)
+    return (shifted_by(shown, RESOLUTION, count / math.sqrt(12.0)),)
+
+
+def _read(data: TrialData) -> Reading:
+    place = conditions(data)
+    (torque,) = metrics(data, _measure).values()
     number = int(str(place["measurement"]))
-    return Reading(place, component, number, side, shown * ratio, shown, history)
+    return Reading(data, place, str(place["component"]), number, torque)
 
 
 def _analyse(data: TestData) -> Result:
@@ -187,64 +220,77 @@ def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
     return components
 
 
-def _statistics(readings: list[Reading]) -> dict[str, float]:
-    """Mean and standard deviation (N m); of these very readings, so divided by their number."""
-    torques = np.array([reading.torque for reading in readings])
-    spread = float(np.std(torques - torques[0]))  # equal readings have none, not a rounding error
-    return {"mean": float(np.mean(torques)), "standard deviation": spread}
+def _open_ended(estimate: Estimate, reason: str) -> Estimate:
+    return replace(estimate, low=None, high=None, standard_error=None, reason=reason)
+
+
+def _statistics(readings: list[Reading]) -> dict[str, Estimate]:
+    """Mean and standard deviation (N m); the latter of these very readings."""
+    torques = [reading.torque.value for reading in readings]
+    count = _count(readings[0].data, readings[0].component)
+    mean = mean_of_readings("breakaway_torque", torques, "N m", count)
+    deviation = deviation_of_readings("breakaway_torque", torques, "N m", count)
+    if any(reading.torque.kind == "at least" for reading in readings):
+        reason = "friction still rose at the end of some readings"
+        mean = replace(_open_ended(mean, reason), kind="at least")
+        deviation = _open_ended(deviation, reason)
+    return {"mean": mean, "standard deviation": deviation}
 
 
 def _findings(readings: list[Reading], planned: set[str]) -> Iterator[Finding]:
     shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
     components = _by_component(readings)
     for reading in readings:
-        yield Finding("breakaway_torque", reading.torque, "N m", reading.place)
-    means: dict[str, float] = {}
+        yield Finding.of(reading.torque, reading.place)
+    means: dict[str, Estimate] = {}
     for component, own in components.items():
         statistics = _statistics(own)
         means[component] = statistics["mean"]
-        for statistic, value in statistics.items():
+        for statistic, estimate in statistics.items():
             place = {**shared, "component": component, "statistic": statistic}
-            yield Finding("breakaway_torque", value, "N m", place)
+            yield Finding.of(estimate, place)
     if len(means) > 1 and set(means) == planned:
-        total = sum(means.values())
-        load = sum(mean for name, mean in means.items() if components[name][0].side == "load")
+        sides = {name: _side(components[name][0]) for name in means}
         place = {**shared, "component": "sum", "statistic": "mean"}
-        yield Finding("breakaway_torque", total, "N m", place)
-        yield Finding("load_share", load / total, "", shared)
+        yield Finding.of(total_of(means), place)
+        yield Finding.of(load_share(means, sides), shared)
+
+
+def _side(reading: Reading) -> str:
+    return str(bench_of(reading.data.trial).friction[reading.component].side)
 
 
 def _table(readings: list[Reading], suffix: str) -> Table:
     components = _by_component(readings)
-    rows: list[dict[str, Value]] = []
+    rows: list[dict[str, Cell]] = []
     for number in sorted({reading.measurement for reading in readings}):
-        row: dict[str, Value] = {"measurement": number}
+        row: dict[str, Cell] = {"measurement": number}
         row |= {r.component: r.torque for r in readings if r.measurement == number}
         rows.append(row)
     statistics = {name: _statistics(own) for name, own in components.items()}
     for statistic in ("mean", "standard deviation"):
-        told: dict[str, Value] = {name: values[statistic] for name, values in statistics.items()}
+        told: dict[str, Cell] = {name: values[statistic] for name, values in statistics.items()}
         rows.append({"measurement": statistic, **told})
     if len(components) > 1:
-        total = sum(values["mean"] for values in statistics.values())
-        rows[-2]["sum"] = total
+        rows[-2]["sum"] = total_of({name: values["mean"] for name, values in statistics.items()})
     return Table(
         key=f"component-friction{suffix}",
         title="Breakaway torque of each component, seen at the load",
         columns=(
-            Column("measurement", "Measurement"),
+            Column("measurement", "Measurement", exact=True),
             *(Column(name, name.capitalize(), "N m", "N m") for name in components),
             *((Column("sum", "Sum", "N m", "N m"),) if len(components) > 1 else ()),
         ),
         rows=tuple(rows),
         thesis=("4.1",),
-        note="What was measured at the motor shaft is multiplied by the gear ratio.",
+        note="What was measured at the motor shaft is multiplied by the gear ratio. A deviation of "
+        "so few readings is itself one draw: its interval says of what.",
     )
 
 
 def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
     options = ComponentFrictionOptions.model_validate(first.trial.options, context={"si": True})
-    motor = [name for name, own in _by_component(readings).items() if own[0].side == "motor"]
+    motor = [name for name, own in _by_component(readings).items() if _side(own[0]) == "motor"]
     if motor and options.sensor_resolution > 0:
         step = options.sensor_resolution * bench_of(first.trial).gear.ratio
         yield (
@@ -254,8 +300,19 @@ def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
         )
     yield (
         "A single reading is one sample of a friction that scatters from trial to trial; only mean "
-        "and deviation can be compared."
+        "and deviation can be compared. Its own interval is that of this one reading."
     )
+
+
+def _history(data: TrialData) -> tuple[Array, Array]:
+    """Size of torque (N m) and rate (rad/s) of a ramp, each (n,)."""
+    recording = data.recording()
+    return np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
+
+
+def _end(estimate: Estimate, side: int) -> float:
+    end = estimate.combined[side]
+    return math.nan if end is None else end
 
 
 def _figure(readings: list[Reading], suffix: str) -> Figure:
@@ -263,14 +320,16 @@ def _figure(readings: list[Reading], suffix: str) -> Figure:
     dots = [
         Curve(
             np.array([float(r.measurement) for r in own]),
-            np.array([r.torque for r in own]),
+            np.array([r.torque.value for r in own]),
             name,
             name,
-            "line+points",
+            "points",
+            low=np.array([_end(r.torque, 0) for r in own]),
+            high=np.array([_end(r.torque, 1) for r in own]),
         )
         for name, own in components.items()
     ]
-    ramps = [Curve(*own[0].history, name, name) for name, own in components.items()]
+    ramps = [Curve(*_history(own[0].data), name, name) for name, own in components.items()]
     return Figure(
         key=f"component-friction{suffix}",
         title="Breakaway torque of the components",
@@ -303,6 +362,8 @@ EXPERIMENT = Experiment(
     options=ComponentFrictionOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
+    measure=_measure,
     requires={
         DRIVE_TORQUE: "the torque at which the component turns",
         GYRO_RATE: "the moment at which it turns",

@@ -9,17 +9,28 @@ et al. as Canudas de Wit et al. (1995) show it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
+from campaign.estimate import Estimate
 from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import Place, in_models, model_series, places
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.friction_models import (
+    OF_ONE,
+    Place,
+    combined,
+    in_models,
+    model_series,
+    places,
+    simulated,
+)
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.identification.sampled import at_sample, bracketed, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
+from campaign.result import Array, Axis, Cell, Column, Curve, Figure, Finding, Panel, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Torque, TorqueRate
@@ -69,71 +80,95 @@ def _trials(options: ForceRateOptions, bench: Bench) -> Iterator[TrialRequest]:
             )
 
 
-def _peak(data: TrialData) -> tuple[float, float]:
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
     """Largest friction before sliding (N m), and the torque applied at that moment (N m)."""
     options = ForceRateOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
     sliding = np.abs(recording[LOAD_RATE]) > options.sliding_rate
     if not sliding.any():
         raise ValueError("the load did not slide; raise peak_torque or lower sliding_rate")
-    friction = recording[FRICTION_TORQUE][: max(int(np.argmax(sliding)), 1)]
-    at = int(np.argmax(friction))
-    applied = data.trial.task.disturbance.sample(recording.time[at : at + 1])
-    return float(friction[at]), float(applied[0])
+    slides = max(int(np.argmax(sliding)), 1)
+    friction = recording[FRICTION_TORQUE]
+    applied = data.trial.task.disturbance.sample(recording.time)
+    at = int(np.argmax(friction[:slides]))
+    return simulated(
+        (_breakaway(friction, slides, at), at_sample("applied_torque", applied, at, "N m"))
+    )
 
 
-def _rows(place: Place, notes: list[str]) -> Iterator[dict[str, float]]:
-    for item in place.trials:
-        try:
-            peak, applied = _peak(item)
-        except ValueError as error:
-            notes.append(f"{item.trial.label}: {error}.")
-            continue
-        rate = float(str(item.trial.point["torque_rate"]))
-        yield {"torque_rate": rate, "breakaway": peak, "applied": applied}
+def _breakaway(friction: Array, slides: int, at: int) -> Estimate:
+    """The largest friction (N m) before sample `slides`, which is that at sample `at`.
+
+    A fast ramp has the load slide, by its rate, while friction still rises: between the last sample
+    before that and the first one after.
+    """
+    if at == slides - 1 and friction[slides] > friction[at]:
+        ends = float(friction[at]), float(friction[slides])
+        method = "friction as sliding begins, between two samples"
+        return bracketed("breakaway_torque", ends[0], "N m", ends, method)
+    return peak("breakaway_torque", friction[:slides], "N m")
+
+
+@dataclass(frozen=True)
+class _Breakaway:
+    """At one rate of the applied torque (N m/s), repeats together."""
+
+    torque_rate: float
+    breakaway: Estimate
+    applied: Estimate
+
+
+def _breakaways(place: Place, notes: list[str]) -> Iterator[_Breakaway]:
+    for rate, trials in place.by("torque_rate").items():
+        slid = []
+        for item in trials:
+            try:
+                metrics(item, _measure)
+            except ValueError as error:
+                notes.append(f"{item.trial.label}: {error}.")
+                continue
+            slid.append(item)
+        if slid:
+            found = combined(slid, _measure)
+            yield _Breakaway(rate, found["breakaway_torque"], found["applied_torque"])
 
 
 def _analyse(data: TestData) -> Result:
     notes = list(failures_note(data))
     found = places(data.completed(), OWN)
-    rows = {place.label: (place, list(_rows(place, notes))) for place in found}
+    rows = {place.label: (place, list(_breakaways(place, notes))) for place in found}
     findings = tuple(
-        Finding(
-            "breakaway_torque",
-            row["breakaway"],
-            "N m",
-            {**place.point, "torque_rate": row["torque_rate"]},
-        )
+        Finding.of(row.breakaway, {**place.point, "torque_rate": row.torque_rate})
         for place, own in rows.values()
         for row in own
     )
     if not findings:
         return Result(notes=tuple(notes))
-    listed: list[dict[str, Value]] = [
-        {**place.point, **row} for place, own in rows.values() for row in own
+    listed: list[dict[str, Cell]] = [
+        {**place.point, **vars(row)} for place, own in rows.values() for row in own
     ]
     table = Table(
         key="force-rate",
         title="Breakaway torque by rate of the applied torque",
         columns=(
             *found[0].columns,
-            Column("torque_rate", "Rate of the applied torque", "N m/s", "N m/s"),
+            Column("torque_rate", "Rate of the applied torque", "N m/s", "N m/s", exact=True),
             Column("breakaway", "Breakaway torque", "N m", "N m"),
             Column("applied", "Applied torque at that moment", "N m", "N m"),
         ),
         rows=tuple(listed),
-        note="The breakaway torque is the largest friction torque before the load slides.",
+        note="The breakaway torque is the largest friction torque before the load slides. "
+        + OF_ONE,
     )
     return Result((table,), (_figure(rows),), findings, tuple(notes))
 
 
-def _figure(rows: dict[str, tuple[Place, list[dict[str, float]]]]) -> Figure:
+def _figure(rows: dict[str, tuple[Place, list[_Breakaway]]]) -> Figure:
     peaks, histories = [], []
     for label, (place, own) in rows.items():
         series = model_series(str(place.point.get("model", label or "measured")))
-        points = np.array(sorted((row["torque_rate"], row["breakaway"]) for row in own))
-        if len(points):
-            peaks.append(Curve(points[:, 0], points[:, 1], label, series, "line+points"))
+        if own:
+            peaks.append(_peaks(own, label, series))
             histories += list(_histories(place, own, label, series))
     top = max(float(curve.y.max()) for curve in peaks)
     applied = Axis("Applied torque", "N m", "N m", limits=(0.0, 1.6 * top))
@@ -162,11 +197,14 @@ def _figure(rows: dict[str, tuple[Place, list[dict[str, float]]]]) -> Figure:
     )
 
 
-def _histories(
-    place: Place, rows: list[dict[str, float]], label: str, series: str
-) -> Iterator[Curve]:
+def _peaks(rows: list[_Breakaway], label: str, series: str) -> Curve:
+    rates = np.array([row.torque_rate for row in rows])
+    return Curve.of(rates, [row.breakaway for row in rows], label, series, "line+points")
+
+
+def _histories(place: Place, rows: list[_Breakaway], label: str, series: str) -> Iterator[Curve]:
     """Friction over applied torque of the slowest and the fastest ramp."""
-    rates = sorted(row["torque_rate"] for row in rows)
+    rates = [row.torque_rate for row in rows]
     for item in place.trials:
         if item.trial.point["torque_rate"] in (rates[0], rates[-1]):
             recording = item.recording()
@@ -180,8 +218,10 @@ EXPERIMENT = Experiment(
     options=ForceRateOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
     requires={
         FRICTION_TORQUE: "its peak, which is the breakaway torque",
         LOAD_RATE: "the moment at which the load slides",
     },
+    measure=_measure,
 )

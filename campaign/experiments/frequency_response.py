@@ -7,13 +7,17 @@ sine of the torque. The load starts where a swing around the middle begins, so t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate, Window
+from campaign.experiments import fitting
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
 from campaign.experiments.frequency_response_figures import closed_loop_figures, torque_figure
 from campaign.experiments.frequency_response_tables import (
@@ -26,20 +30,19 @@ from campaign.experiments.frequency_response_tables import (
     modes,
     quality_note,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.identification.frequency_response import (
-    Response,
-    SinePoint,
-    characteristics,
-    make_response,
-    sine_point,
-)
+from campaign.experiments.interface import Experiment, Stage, TestData, TrialData, metrics
+from campaign.identification.frequency_response import Response, make_response
+from campaign.identification.intervals import with_error
+from campaign.identification.refinement import MOST as MOST_REFINED
+from campaign.identification.refinement import PHASE_SHARE, refinement
+from campaign.identification.servo import characteristics
+from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.limits import worst_friction
 from campaign.result import Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Task, TrialRequest
+from campaign.trial import NONE_MORE, Most, Task, Trial, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time, Torque
 
 LIMIT_SHARE = 0.9
@@ -47,6 +50,8 @@ LIMIT_SHARE = 0.9
 NYQUIST_SHARE = 0.4
 """of the controller's sample rate: the highest frequency that can be told."""
 MOST_FREQUENCIES = 10_000
+STEADY = "steady"
+"""The window of the whole cycles that are measured."""
 
 
 class FrequencyResponseOptions(Options):
@@ -82,6 +87,9 @@ class FrequencyResponseOptions(Options):
     """of the recording, as far as a sampled controller has them."""
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
+    refine: bool = False
+    """Closed loop: when the sweep has ended, measure further frequencies around the -3 dB crossing
+    and, where it lies in the sweep, the phase crossover."""
 
 
 def swept_frequencies(options: FrequencyResponseOptions) -> tuple[float, ...]:
@@ -100,25 +108,71 @@ def swept_frequencies(options: FrequencyResponseOptions) -> tuple[float, ...]:
 
 def _trials(options: FrequencyResponseOptions, bench: Bench) -> Iterator[TrialRequest]:
     for frequency in swept_frequencies(options):
-        rate = _sample_rate(options, bench, frequency)
-        settle = max(options.settle_cycles, math.ceil(options.settle_time * frequency - 1e-9))
-        start, stop = settle / frequency, (settle + options.cycles) / frequency
-        closed = options.loop == "closed"
-        command, swing = (_rate_sine if closed else _torque_sine)(options, bench, frequency)
-        yield TrialRequest(
-            Task(
-                mode="rate" if closed else "torque",
-                command=command,
-                compensation=options.compensation,
-                duration=stop,
-                window=(start, stop),
-                sample_rate=rate,
-                start_angle=options.position - swing,
-            ),
-            point={"frequency": frequency},
-            note=f"{options.cycles} cycles after {settle} to settle; {_amplitude(command, closed)}",
-            requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
-        )
+        yield _request(options, bench, frequency)
+
+
+def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> TrialRequest:
+    """The trial at one frequency (Hz). Raises ValueError where the bench cannot do it."""
+    rate = _sample_rate(options, bench, frequency)
+    settle = max(options.settle_cycles, math.ceil(options.settle_time * frequency - 1e-9))
+    start, stop = settle / frequency, (settle + options.cycles) / frequency
+    closed = options.loop == "closed"
+    command, swing = (_rate_sine if closed else _torque_sine)(options, bench, frequency)
+    return TrialRequest(
+        Task(
+            mode="rate" if closed else "torque",
+            command=command,
+            compensation=options.compensation,
+            duration=stop,
+            window=(start, stop),
+            sample_rate=rate,
+            start_angle=options.position - swing,
+        ),
+        point={"frequency": frequency},
+        note=f"{options.cycles} cycles after {settle} to settle; {_amplitude(command, closed)}",
+        requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
+        windows=(Window(STEADY, start, stop),),
+    )
+
+
+def _refined_range(options: FrequencyResponseOptions, bench: Bench) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) of a refinement: those of the sweep, and a little beyond,
+    as far as the controller's sample rate shows them.
+    """
+    swept, control = swept_frequencies(options), bench.controller.sample_rate
+    highest = swept[-1] * (1.0 + PHASE_SHARE)
+    seen = highest if control is None else NYQUIST_SHARE * control
+    return swept[0] * (1.0 - PHASE_SHARE), min(highest, seen)
+
+
+def _most_refined(options: FrequencyResponseOptions, bench: Bench) -> Most:
+    """What a refinement takes at most: all of it at the lowest frequency that it may have."""
+    if not options.refine or options.loop != "closed":
+        return NONE_MORE
+    lowest, highest = _refined_range(options, bench)
+    settle = max(float(options.settle_cycles), options.settle_time * highest + 1.0)
+    longest = max(options.settle_cycles / lowest, options.settle_time + 1.0 / lowest)
+    # A whole share of the controller's rate is less than twice the rate that is asked for.
+    samples = 2 * options.samples_per_cycle * math.ceil(settle + options.cycles)
+    duration = longest + options.cycles / lowest
+    return Most(MOST_REFINED, MOST_REFINED * duration, MOST_REFINED * samples)
+
+
+def _refined(
+    options: FrequencyResponseOptions, bench: Bench, data: TestData
+) -> Iterator[TrialRequest]:
+    """The frequencies that `refinement` finds in the sweep, as far as the bench can show them."""
+    points = []
+    for item in data.completed():
+        with suppress(ValueError):  # the analysis says so
+            points.append(_point(item))
+    if not points:
+        return
+    lowest, highest = _refined_range(options, bench)
+    for frequency in refinement(make_response(points)):
+        if lowest <= frequency <= highest:
+            request = _request(options, bench, round(float(frequency), 9))
+            yield replace(request, note=f"refinement; {request.note}")
 
 
 def _excitation(mode: str) -> str:
@@ -180,12 +234,44 @@ def _torque_sine(
     return Sine(amplitude=options.torque, frequency=frequency, phase=0.5 * math.pi), swing
 
 
-def _point(data: TrialData) -> SinePoint:
+def _steady(trial: Trial) -> tuple[float, float]:
+    """The window that is measured (s): the one named so, or an older trial's only one."""
+    named = (window for window in trial.windows if window.name == STEADY)
+    return next(((window.start, window.stop) for window in named), trial.task.window)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """The response to one sine: its real and imaginary part, and the coherence."""
     task = data.trial.task
-    recording = data.recording().window(*task.window)
+    recording = data.recording().window(*_steady(data.trial))
     drive = recording[_excitation(task.mode)]
-    frequency = float(str(data.trial.point["frequency"]))
-    return sine_point(recording.time, drive, recording[GYRO_RATE], frequency)
+    point = sine_point(recording.time, drive, recording[GYRO_RATE], _frequency(data))
+    unit = "" if task.mode == "rate" else TORQUE_TO_RATE
+    method = "least squares over whole cycles"
+    parts = (("response_real", point.response.real), ("response_imag", point.response.imag))
+    return (
+        *(with_error(name, part, unit, point.error, math.inf, method) for name, part in parts),
+        Estimate("coherence", point.coherence, "", reason="it describes the recording at hand"),
+    )
+
+
+TORQUE_TO_RATE = "rad/s/(N m)"
+
+
+def _frequency(data: TrialData) -> float:
+    return float(str(data.trial.point["frequency"]))
+
+
+def _point(data: TrialData) -> SinePoint:
+    """The sine of a trial, from its metrics. Raises ValueError where there is none."""
+    found = metrics(data, _measure)
+    real, imaginary = found["response_real"], found["response_imag"]
+    return SinePoint(
+        _frequency(data),
+        complex(real.value, imaginary.value),
+        real.standard_error or 0.0,
+        found["coherence"].value,
+    )
 
 
 def _analyse(data: TestData) -> Result:
@@ -209,7 +295,8 @@ def _analyse(data: TestData) -> Result:
     findings: list[Finding] = []
     if closed:
         tables += closed_tables(closed, paths)
-        figures += closed_loop_figures([(s.label, method(s), s.response) for s in closed])
+        shown = [(s.label, method(s), s.response) for s in closed]
+        figures += closed_loop_figures(shown, [s.found for s in closed])
         findings += [finding for sweep in closed for finding in closed_findings(sweep)]
         findings += changes(closed)
         notes += closed_notes(closed)
@@ -262,9 +349,20 @@ EXPERIMENT = Experiment(
     options=FrequencyResponseOptions,
     trials=_trials,
     analyse=_analyse,
+    measure=_measure,
+    fit=fitting.frequency_response,
     requires={
         GYRO_RATE: "the response",
         COMMAND: "what a closed loop responds to",
         DRIVE_TORQUE: "what an open loop responds to",
     },
+    stages=(
+        Stage(
+            name="refinement",
+            why="bandwidth and gain margin are read between frequencies: more of them around "
+            "both crossings",
+            most=_most_refined,
+            trials=_refined,
+        ),
+    ),
 )

@@ -7,12 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from campaign.identification.frequency_response import (
-    Continuation,
-    Response,
-    margins,
-    open_loop,
-)
+from campaign.identification.continuation import DECIBEL, Continuation
+from campaign.identification.frequency_response import Response, open_loop
+from campaign.identification.servo import ServoCharacteristics
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
@@ -20,11 +17,17 @@ PHASE = Axis("Phase", "rad", "deg")
 SHOWN_BEYOND = 1.2
 """An extrapolated curve is drawn to this many times the crossover that it is for."""
 
+NOTICEABLE = 0.02
+"""Half-width, as a share of the response, from which on a point's interval is drawn: 0.2 dB, 1°."""
+TWO_SIDED = 1.96
+
 Named = tuple[str, str, Response]
 """Label, series and response of one curve."""
 
 
-def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
+def closed_loop_figures(
+    sweeps: Sequence[Named], found: Sequence[ServoCharacteristics | None]
+) -> Iterator[Figure]:
     """Figures 5.5 and 5.19 (closed loop), 5.6 and 5.20 (open loop from it)."""
     several = len(sweeps) != len({series for _, series, _ in sweeps})
     named = [(label, label if several else series, r) for label, series, r in sweeps]
@@ -47,7 +50,8 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
         "Open-loop response, rate error to gyro rate",
         "The distance of the phase from -180° where the gain is 0 dB is the phase margin; how far "
         "the gain is below 0 dB where the phase is -180° is the gain margin. What lies above the "
-        "sweep is extrapolated (thin).",
+        "sweep is extrapolated (thin), by one of the fits between which the margin may lie. Bands "
+        "are 95 % intervals, where they are wide enough to be seen.",
         "Gain and phase of the open loop over frequency, one curve per compensation, with the "
         "0 dB and -180° lines.",
         Axis("Gain", "dB"),
@@ -55,7 +59,7 @@ def closed_loop_figures(sweeps: Sequence[Named]) -> Iterator[Figure]:
         thesis=_chosen(("5.6", modelled), ("5.20", observed)),
         level_marks=(Mark("0 dB", y=0.0),),
         phase_marks=(Mark("-180°", y=-np.pi),),
-        more=list(_continued(loops)),
+        more=list(_continued(loops, found)),
     )
 
 
@@ -105,20 +109,39 @@ def _turned(response: Response) -> Array:
     return np.asarray(phase - 2.0 * np.pi * turns)
 
 
-def _continued(loops: Sequence[Named]) -> Iterator[tuple[Curve, Curve]]:
+def _continued(
+    loops: Sequence[Named], found: Sequence[ServoCharacteristics | None]
+) -> Iterator[tuple[Curve, Curve]]:
     """Gain and phase above the sweep, up to a crossover that lies there."""
-    for number, (_, series, loop) in enumerate(loops):
-        gain, _ = margins(loop)
-        beyond = Continuation.of(loop)
-        if beyond is None or not gain.extrapolated:
+    label = "extrapolated"
+    for (_, series, loop), read in zip(loops, found, strict=True):
+        gain = read.crossing(read.gain_margin) if read else None
+        phase = read.crossing(read.phase_margin) if read else None
+        if gain is None or phase is None or not gain.extrapolated:
             continue
-        at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency, 60)
-        shift = _turned(loop)[-1] - loop.phase[-1]
-        label = "extrapolated" if number == 0 else ""
+        told = loop.told
+        beyond = Continuation.of(told, phase.frequency.value)
+        if beyond is None:
+            continue
+        at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency.value, 60)
+        shift = _turned(loop)[0] - loop.phase[0]
         yield (
             Curve(at, beyond.level(at), label, series, "thin"),
             Curve(at, beyond.phase(at) + shift, label, series, "thin"),
         )
+        label = ""
+
+
+def _with_interval(
+    response: Response, values: Array, label: str, series: str, per_share: float
+) -> Curve:
+    """A curve with its band where that is noticeable; `per_share` turns shares into its unit."""
+    half = TWO_SIDED * response.relative_error
+    if not np.any(half > NOTICEABLE):
+        return Curve(response.frequency, values, label, series)
+    half = np.where(half > NOTICEABLE, half * per_share, np.nan)
+    low, high = values - half, values + half
+    return Curve(response.frequency, values, label, series, low=low, high=high)
 
 
 def _bode(
@@ -142,14 +165,14 @@ def _bode(
             Panel(
                 FREQUENCY,
                 gain,
-                [Curve(r.frequency, level, label, s) for label, s, r, level, _ in curves]
+                [_with_interval(r, level, label, s, DECIBEL) for label, s, r, level, _ in curves]
                 + [level for level, _ in more],
                 marks=level_marks,
             ),
             Panel(
                 FREQUENCY,
                 PHASE,
-                [Curve(r.frequency, phase, label, s) for label, s, r, _, phase in curves]
+                [_with_interval(r, phase, label, s, 1.0) for label, s, r, _, phase in curves]
                 + [phase for _, phase in more],
                 marks=phase_marks,
             ),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.estimate import Estimate
 from campaign.identification.elastic_mode import elastic_mode
-from campaign.identification.frequency_response import Response, ServoCharacteristics
-from campaign.result import Column, Finding, Table, Value
+from campaign.identification.frequency_response import Response
+from campaign.identification.servo import Crossing, ServoCharacteristics, change
+from campaign.result import Cell, Column, Finding, Table, Value
 
 
 @dataclass(frozen=True)
@@ -36,20 +38,21 @@ QUANTITIES = (
 )
 
 
-def _values(found: ServoCharacteristics) -> dict[str, float]:
+def _values(found: ServoCharacteristics) -> dict[str, Estimate]:
     return {
         "bandwidth": found.bandwidth,
-        "gain_margin": found.gain.margin,
-        "phase_margin": found.phase.margin,
+        "gain_margin": found.gain_margin,
+        "phase_margin": found.phase_margin,
     }
 
 
 def closed_findings(sweep: Sweep) -> Iterator[Finding]:
-    """Bandwidth and margins of one closed loop."""
+    """Bandwidth and margins of one closed loop; one beyond the sweep may be a bound."""
     if sweep.found is not None:
-        values = _values(sweep.found)
-        for name, _, unit, _ in QUANTITIES:
-            yield Finding(name, values[name], unit, sweep.place)
+        for found in _values(sweep.found).values():
+            # An upper bound speaks to no published cell: nothing says so but its kind.
+            if found.kind != "at most":
+                yield Finding.of(found, sweep.place)
 
 
 def _pairs(sweeps: list[Sweep]) -> Iterator[tuple[Sweep, Sweep]]:
@@ -64,97 +67,141 @@ def _pairs(sweeps: list[Sweep]) -> Iterator[tuple[Sweep, Sweep]]:
                 yield bare, sweep
 
 
+def _changes(bare: Sweep, sweep: Sweep) -> dict[str, Estimate]:
+    """By quantity; without those that one of the two sweeps only bounds."""
+    if bare.found is None or sweep.found is None:
+        return {}
+    before, after = _values(bare.found), _values(sweep.found)
+    told = {
+        name: change(f"{name}_change", unit, before[name], after[name])
+        for name, _, unit, _ in QUANTITIES
+    }
+    return {name: found for name, found in told.items() if found is not None}
+
+
 def changes(sweeps: list[Sweep]) -> Iterator[Finding]:
     """What compensation changes in them, in Hz, dB and rad."""
     for bare, sweep in _pairs(sweeps):
-        if bare.found is not None and sweep.found is not None:
-            before, after = _values(bare.found), _values(sweep.found)
-            for name, _, unit, _ in QUANTITIES:
-                yield Finding(f"{name}_change", after[name] - before[name], unit, sweep.place)
+        for found in _changes(bare, sweep).values():
+            yield Finding.of(found, sweep.place)
 
 
 def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
     """Tables 5.3 and 5.9, where the margins were read, and what compensation changes."""
     extra = [path for path in paths if path != "compensation"]
-    rows: list[dict[str, Value]] = []
-    for sweep in sweeps:
-        found = sweep.found
-        if found is None:
-            continue
-        row: dict[str, Value] = {**sweep.place, **_values(found)}
-        row |= {
-            "bandwidth_error": found.bandwidth_error,
-            "gain_margin_error": found.gain_margin_error,
-            "phase_margin_error": found.phase_margin_error,
-            "gain_crossover": found.phase.frequency,
-            "phase_crossover": found.gain.frequency,
-            "crossover": _read(found),
-        }
-        rows.append({key: _or_none(value) for key, value in row.items()})
+    named = (
+        Column("compensation", "Compensation"),
+        *(Column(path, path, exact=True) for path in extra),
+    )
+    read = [(sweep, sweep.found) for sweep in sweeps if sweep.found is not None]
+    yield _servo_table(named, [_servo_row(sweep, found) for sweep, found in read])
     yield Table(
+        key="crossovers",
+        title="Where the margins were read",
+        columns=(
+            *named,
+            Column("gain_crossover", "Gain crossover", "Hz", "Hz"),
+            Column("phase_crossover", "Phase crossover", "Hz", "Hz"),
+            Column("crossover", "Phase crossover is"),
+        ),
+        rows=tuple({**sweep.place, **_crossover_row(found)} for sweep, found in read),
+    )
+    yield _all_crossings(named, read)
+    rows = [
+        {**{k: sweep.place.get(k) for k in ("compensation", *extra)}, **_changes(bare, sweep)}
+        for bare, sweep in _pairs(sweeps)
+    ]
+    if rows:
+        yield Table(
+            key="compensation-effect",
+            title="What compensation changes",
+            columns=(
+                *named,
+                *(Column(name, f"{label}, change", u, d) for name, label, u, d in QUANTITIES),
+            ),
+            rows=tuple(rows),
+            note="Against the same loop without compensation. Where one of the two is only a "
+            "bound, their difference is not known.",
+        )
+
+
+ONE_SIGMA = "it is the standard error of the column before it, from noise alone"
+
+
+def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> Table:
+    return Table(
         key="servo-characteristics",
         title="Bandwidth and stability margins from the measured response",
         columns=(
-            Column("compensation", "Compensation"),
-            *(Column(path, path) for path in extra),
+            *named,
             Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column("bandwidth_error", "± (1σ)", "Hz", "Hz"),
+            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA),
             Column("gain_margin", "Gain margin", "dB"),
-            Column("gain_margin_error", "± (1σ)", "dB"),
+            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA),
             Column("phase_margin", "Phase margin", "rad", "deg"),
-            Column("phase_margin_error", "± (1σ)", "rad", "deg"),
+            Column("phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA),
+            Column("gain_margin_bound", "Gain margin at least", "dB"),
         ),
         rows=tuple(rows),
         thesis=("5.3", "5.9"),
         note="Bandwidth is where the gain of the closed loop falls to -3 dB of unity, which its "
         "integral action gives it at zero frequency. Margins are of the open loop T / (1 - T). "
-        "Deviations are those of the noise, not of friction from trial to trial.",
+        "Intervals hold noise and interpolation between the frequencies, not what friction does "
+        "from day to day. A gain margin beyond the sweep is the hull of several fits of an "
+        "integrator with a delay; what it is at least assumes only that the gain rises no more.",
     )
-    yield Table(
-        key="crossovers",
-        title="Where the margins were read",
+
+
+def _servo_row(sweep: Sweep, found: ServoCharacteristics) -> dict[str, Cell]:
+    values = _values(found)
+    errors = {f"{name}_error": value.standard_error for name, value in values.items()}
+    return {**sweep.place, **values, **errors, "gain_margin_bound": found.gain_margin_bound}
+
+
+def _crossover_row(found: ServoCharacteristics) -> dict[str, Cell]:
+    phase, gain = found.crossing(found.phase_margin), found.crossing(found.gain_margin)
+    return {
+        "gain_crossover": phase.frequency if phase else None,
+        "phase_crossover": gain.frequency if gain else None,
+        "crossover": _read(gain),
+    }
+
+
+def _read(crossing: Crossing | None) -> str | None:
+    if crossing is None:
+        return None
+    return "extrapolated" if crossing.extrapolated else "measured"
+
+
+def _all_crossings(
+    named: tuple[Column, ...], read: list[tuple[Sweep, ServoCharacteristics]]
+) -> Table:
+    rows: list[Mapping[str, Cell]] = [
+        {
+            **sweep.place,
+            "level": each.level,
+            "frequency": each.frequency,
+            "gain_margin": each.margin if each.level == "-180 deg" else None,
+            "phase_margin": each.margin if each.level == "0 dB" else None,
+            "crossing": _read(each),
+        }
+        for sweep, found in read
+        for each in found.crossings
+    ]
+    return Table(
+        key="all-crossings",
+        title="Every crossing that noise does not explain",
         columns=(
-            Column("compensation", "Compensation"),
-            *(Column(path, path) for path in extra),
-            Column("gain_crossover", "Gain crossover", "Hz", "Hz"),
-            Column("phase_crossover", "Phase crossover", "Hz", "Hz"),
-            Column("crossover", "Phase crossover is"),
+            *named,
+            Column("level", "Crosses"),
+            Column("frequency", "Frequency", "Hz", "Hz"),
+            Column("gain_margin", "Gain margin there", "dB"),
+            Column("phase_margin", "Phase margin there", "rad", "deg"),
+            Column("crossing", "Crossing is"),
         ),
         rows=tuple(rows),
+        note="-3 dB of the closed loop; 0 dB, and -180° above it, of the open loop.",
     )
-    changes = [
-        {**{k: sweep.place.get(k) for k in ("compensation", *extra)}, **_difference(bare, sweep)}
-        for bare, sweep in _pairs(sweeps)
-    ]
-    if changes:
-        yield Table(
-            key="compensation-effect",
-            title="What compensation changes",
-            columns=(
-                Column("compensation", "Compensation"),
-                *(Column(path, path) for path in extra),
-                *(Column(name, f"{label}, change", u, d) for name, label, u, d in QUANTITIES),
-            ),
-            rows=tuple(changes),
-            note="Against the same loop without compensation.",
-        )
-
-
-def _read(found: ServoCharacteristics) -> str | None:
-    if not math.isfinite(found.gain.margin):
-        return None
-    return "extrapolated" if found.gain.extrapolated else "measured"
-
-
-def _difference(bare: Sweep, sweep: Sweep) -> dict[str, Value]:
-    if bare.found is None or sweep.found is None:
-        return {}
-    before, after = _values(bare.found), _values(sweep.found)
-    return {name: _or_none(after[name] - before[name]) for name in after}
-
-
-def _or_none(value: Value) -> Value:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
@@ -163,17 +210,27 @@ def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
         found, highest = sweep.found, sweep.response.frequency[-1]
         if found is None:
             continue
-        if not math.isfinite(found.bandwidth):
+        gain = found.crossing(found.gain_margin)
+        width = found.bandwidth
+        if width.kind == "number" and math.isnan(width.value):
+            yield f"With {sweep.label} there is no bandwidth: {width.reason}."
+        elif width.kind != "number":
             yield f"With {sweep.label} the gain does not fall through -3 dB within the sweep."
-        if not math.isfinite(found.phase.margin):
+        if math.isnan(found.phase_margin.value):
             yield f"With {sweep.label} the open loop does not cross 0 dB in or near the sweep."
-        elif not math.isfinite(found.gain.margin):
+        elif math.isnan(found.gain_margin.value):
             yield f"With {sweep.label} the phase does not cross -180° in or near the sweep."
-        elif found.gain.extrapolated:
+        elif found.gain_margin.kind == "at least":
             yield (
-                f"With {sweep.label} the phase crosses -180° at {found.gain.frequency:.4g} Hz, "
-                f"above the sweep's {highest:.4g} Hz: the gain margin is extrapolated, from an "
-                "integrator and a delay fitted to the upper part of the sweep."
+                f"With {sweep.label} the phase does not surely cross -180° within the sweep's "
+                f"{highest:.4g} Hz: the gain margin is a bound ({found.gain_margin.method})."
+            )
+        elif gain is not None and gain.extrapolated:
+            yield (
+                f"With {sweep.label} the phase crosses -180° near {gain.frequency.value:.3g} Hz, "
+                f"above the sweep's {highest:.4g} Hz: the gain margin is extrapolated. Its "
+                "interval is the hull of several fits; a sweep that reaches the crossing tells "
+                "it to a tenth of a decibel."
             )
 
 
@@ -194,12 +251,12 @@ def modes(
     sweeps: list[Sweep], paths: list[str]
 ) -> tuple[Table, tuple[Finding, ...], tuple[str, ...]]:
     """The elastic modes of open loops: a table, findings, and a sentence where there is none."""
-    rows: list[dict[str, Value]] = []
+    rows: list[Mapping[str, Cell]] = []
     findings: list[Finding] = []
     notes: list[str] = []
     for sweep in sweeps:
         mode = elastic_mode(sweep.response)
-        row: dict[str, Value] = {**sweep.place}
+        row: dict[str, Cell] = {**sweep.place}
         if mode is None:
             notes.append(f"With {sweep.label} the open loop shows no elastic mode in the sweep.")
         else:
@@ -208,19 +265,20 @@ def modes(
                 "antiresonance": mode.antiresonance,
                 "damping_ratio": mode.damping_ratio,
             }
-            findings.append(Finding("elastic_mode_frequency", mode.frequency, "Hz", sweep.place))
+            findings.append(Finding.of(mode.frequency, sweep.place))
         rows.append(row)
     table = Table(
         key="elastic-mode",
         title="First elastic mode in the torque-to-rate response",
         columns=(
             Column("compensation", "Compensation"),
-            *(Column(path, path) for path in paths if path != "compensation"),
+            *(Column(path, path, exact=True) for path in paths if path != "compensation"),
             Column("frequency", "Resonance", "Hz", "Hz"),
             Column("antiresonance", "Antiresonance", "Hz", "Hz"),
             Column("damping_ratio", "Damping ratio"),
         ),
         rows=tuple(rows),
-        note="A resonance and an antiresonance fitted on top of a smooth response.",
+        note="A resonance and an antiresonance fitted on top of a smooth response; intervals from "
+        "what the fit leaves over.",
     )
     return table, tuple(findings), tuple(notes)

@@ -7,22 +7,34 @@ faster the swing, the wider the loop (Figure 2.10).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
+from campaign.estimate import Estimate, Window
 from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import Place, in_models, places
+from campaign.experiments.friction_models import (
+    OF_ONE,
+    Place,
+    combined,
+    in_models,
+    places,
+    simulated,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.identification.intervals import of_repeats, shifted_by
+from campaign.identification.sampled import LOST, SAMPLES, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import (
     Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -30,16 +42,22 @@ from campaign.result import (
     Panel,
     Result,
     Table,
-    Value,
 )
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Frequency
 
 OWN = ("frequency",)
+METRICS = {
+    "friction_lag_width": "N m",
+    "friction_lag_widest": "N m",
+    "friction_lag_area": "N m rad/s",
+}
+"""What one recording tells, and in which units."""
 PER_CYCLE = 400
 """Samples, and straight pieces of the prescribed rate, in a cycle."""
 
+TORQUES = Axis("Friction torque", "N m", "N m")
 SLOW = 0.01
 """rad/s; rates up to here are shown in mrad/s."""
 
@@ -54,7 +72,7 @@ class FrictionLagOptions(Options):
     frequencies: tuple[Frequency, ...] = Field(default=(1.0, 5.0, 20.0), min_length=1)
     """Frequencies of the swing."""
     cycles: int = Field(default=4, ge=2, le=1000)
-    """Cycles of the swing; the last one is measured."""
+    """Cycles of the swing; the first one is not measured."""
     models: tuple[str, ...] = ()
     """Friction models to describe the bench's friction by, one after the other; none: its own."""
 
@@ -79,7 +97,16 @@ def _trials(options: FrictionLagOptions, bench: Bench) -> Iterator[TrialRequest]
                 ),
                 point={**point, "frequency": frequency},
                 bench=tree,
+                windows=cycle_windows(options, frequency),
             )
+
+
+def cycle_windows(options: FrictionLagOptions, frequency: float) -> tuple[Window, ...]:
+    """The cycles that are measured: all but the first, in which the contact settles."""
+    return tuple(
+        Window(f"cycle-{cycle}", cycle / frequency, (cycle + 1) / frequency)
+        for cycle in range(2, options.cycles + 1)
+    )
 
 
 def swing(options: FrictionLagOptions, frequency: float) -> Polyline:
@@ -92,7 +119,7 @@ def swing(options: FrictionLagOptions, frequency: float) -> Polyline:
 
 @dataclass(frozen=True)
 class Loop:
-    """The last cycle at one frequency: rate (rad/s) and friction (N m), shape (n,).
+    """The loops at one frequency: rate (rad/s) and friction (N m) of the last one, shape (n,).
 
     Attributes:
         width: friction while the rate rises less friction while it falls, at the mean rate (N m).
@@ -103,39 +130,82 @@ class Loop:
     frequency: float
     rate: Array
     friction: Array
-    width: float
-    widest: float
-    area: float
+    width: Estimate
+    widest: Estimate
+    area: Estimate
 
 
-def _loop(data: TrialData) -> Loop:
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    """Width, largest width and area of the loops, each the mean of the cycles.
+
+    Not determined where samples of a cycle were lost (NaN).
+    """
     options = FrictionLagOptions.model_validate(data.trial.options, context={"si": True})
-    cut = data.recording().window(*data.trial.task.window)
-    rate, friction = cut[LOAD_RATE], cut[FRICTION_TORQUE]
-    top = int(np.argmax(rate))
+    frequency = float(str(data.trial.point["frequency"]))
     common = options.mean_rate + options.amplitude * np.linspace(-0.98, 0.98, 99)
+    recording = data.recording()
+    shapes, coarse = [], []
+    for window in data.trial.windows or cycle_windows(options, frequency):
+        cut = recording.window(window.start, window.stop)
+        rate, friction = cut[LOAD_RATE], cut[FRICTION_TORQUE]
+        if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(friction))):
+            return simulated(map(_lost, METRICS))
+        shapes.append(loop_shape(rate, friction, common))
+        coarse.append(loop_shape(rate[::2], friction[::2], common))
+    # Trapezoids and straight lines between samples err with the square of their distance.
+    errors = np.max(np.abs(np.array(coarse) - np.array(shapes)), axis=0) / 3.0
+    torque = float(np.max(np.abs(friction)))
+    scales = torque, torque, torque * options.amplitude
+    each = zip(METRICS.items(), np.array(shapes).T, errors, scales, strict=True)
+    return simulated(
+        where_it_scatters(_mean(name, values, unit, float(error)), scale)
+        for (name, unit), values, error, scale in each
+    )
+
+
+def _lost(name: str) -> Estimate:
+    return Estimate.without_interval(name, math.nan, METRICS[name], LOST)
+
+
+def _mean(name: str, values: Array, unit: str, error: float) -> Estimate:
+    """Of the cycles; `error` is that of sampling, the same in each."""
+    found = of_repeats(name, values, unit, "cycles")
+    return shifted_by(found, SAMPLES, error / math.sqrt(3.0))
+
+
+def loop_shape(rate: Array, friction: Array, common: Array) -> tuple[float, float, float]:
+    """Of one cycle: width at the middle one of the rates `common`, largest width, and area.
+
+    rate, friction: shape (n,), from the lowest rate up and down again. A width is friction while
+    the rate rises less friction while it falls, at the same rate.
+    """
+    top = int(np.argmax(rate))
     rising = np.interp(common, rate[: top + 1], friction[: top + 1])
     falling = np.interp(common, rate[top:][::-1], friction[top:][::-1])
     difference = rising - falling
-    closed_rate, closed = np.append(rate, rate[0]), np.append(friction, friction[0])
-    return Loop(
-        frequency=float(str(data.trial.point["frequency"])),
-        rate=closed_rate,
-        friction=closed,
-        width=float(difference[len(common) // 2]),
-        widest=float(difference[np.argmax(np.abs(difference))]),
-        area=float(np.trapezoid(closed, closed_rate)),
-    )
+    widest = float(difference[np.argmax(np.abs(difference))])
+    closed_rate, closed_friction = _closed(rate, friction)
+    area = float(np.trapezoid(closed_friction, closed_rate))
+    return float(difference[len(common) // 2]), widest, area
+
+
+def _closed(rate: Array, friction: Array) -> tuple[Array, Array]:
+    return np.append(rate, rate[0]), np.append(friction, friction[0])
+
+
+def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
+    found = combined(trials, _measure)
+    cut = trials[0].recording().window(*trials[0].trial.task.window)
+    rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
+    return Loop(frequency, rate, friction, *(found.get(name) or _lost(name) for name in METRICS))
 
 
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), OWN)
     if not found:
         return Result(notes=failures_note(data))
-    loops = [
-        (place, sorted(map(_loop, place.trials), key=lambda o: o.frequency)) for place in found
-    ]
-    rows: list[dict[str, Value]] = [
+    loops = [(place, [_loop(*each) for each in place.by("frequency").items()]) for place in found]
+    rows: list[dict[str, Cell]] = [
         {
             **place.point,
             "frequency": loop.frequency,
@@ -151,18 +221,17 @@ def _analyse(data: TestData) -> Result:
         title="Width of the loops of friction lag",
         columns=(
             *found[0].columns,
-            Column("frequency", "Frequency", "Hz", "Hz"),
+            Column("frequency", "Frequency", "Hz", "Hz", exact=True),
             Column("width", "Width at the mean rate", "N m", "N m"),
             Column("widest", "Largest width", "N m", "N m"),
             Column("area", "Area of the loop", "N m rad/s", "N m rad/s"),
         ),
         rows=tuple(rows),
-        note="Width: friction while the rate rises less friction while it falls, at the same rate.",
+        note="Width: friction while the rate rises less friction while it falls, at the same rate. "
+        "Each number is the mean of all cycles but the first. " + OF_ONE,
     )
     findings = tuple(
-        Finding(
-            "friction_lag_width", loop.width, "N m", {**place.point, "frequency": loop.frequency}
-        )
+        Finding.of(loop.width, {**place.point, "frequency": loop.frequency})
         for place, own in loops
         for loop in own
     )
@@ -185,13 +254,18 @@ def _panel(place: Place, loops: list[Loop]) -> Panel:
         Curve(loop.rate, loop.friction, f"{loop.frequency:.4g} Hz", f"loop-{number}")
         for number, loop in enumerate(loops)
     ]
-    fine = np.linspace(min(loop.rate.min() for loop in loops), loops[0].rate.max(), 300)
+    known = [rate for loop in loops if len(rate := loop.rate[np.isfinite(loop.rate)])]
+    if not known:
+        return Panel(_rates("deg/s"), TORQUES, curves, place.label)
+    fine = np.linspace(min(rate.min() for rate in known), known[0].max(), 300)
     steady = np.add(*steady_friction(bench_of(place.trials[0].trial), fine))
     curves.append(Curve(fine, steady, "steady sliding", "reference", "thin"))
     display = "mrad/s" if fine[-1] < SLOW else "deg/s"
-    return Panel(
-        Axis("Rate", "rad/s", display), Axis("Friction torque", "N m", "N m"), curves, place.label
-    )
+    return Panel(_rates(display), TORQUES, curves, place.label)
+
+
+def _rates(display: str) -> Axis:
+    return Axis("Rate", "rad/s", display)
 
 
 EXPERIMENT = Experiment(
@@ -200,5 +274,7 @@ EXPERIMENT = Experiment(
     options=FrictionLagOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
     requires={FRICTION_TORQUE: "the loops", LOAD_RATE: "the loops"},
+    measure=_measure,
 )

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import JsonValue, ValidationError
 
+from campaign.estimate import Estimate
 from campaign.experiments.common import grouped
-from campaign.experiments.interface import TrialData
+from campaign.experiments.interface import TrialData, metrics
+from campaign.identification.intervals import shifted_by
+from campaign.identification.sampled import together
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.result import Column, Value
@@ -88,7 +91,44 @@ class Place:
     @property
     def columns(self) -> tuple[Column, ...]:
         """Of a table that lists several places."""
-        return tuple(Column(path, "Model" if path == "model" else path) for path in self.point)
+        return tuple(
+            Column(path, "Model" if path == "model" else path, exact=True) for path in self.point
+        )
+
+    def by(self, name: str) -> dict[float, tuple[TrialData, ...]]:
+        """Its trials by what the experiment varies as `name` (SI), ascending; repeats together."""
+        found: dict[float, list[TrialData]] = {}
+        for item in self.trials:
+            found.setdefault(float(str(item.trial.point[name])), []).append(item)
+        return {value: tuple(found[value]) for value in sorted(found)}
+
+
+OF_ONE = (
+    "Without repeats an interval is of the one recording: repeat the test to see how trials "
+    "scatter. What the time step of a simulation adds, --check-step tells."
+)
+"""For the note of a table of such experiments."""
+
+
+def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
+    """Numbers that only a simulation can know, with what its step adds: nobody has said how much.
+
+    No sample shows it, and no repeat. Half the step may change such a number by a thousandth, while
+    its cycles agree to the last digit.
+    """
+    return tuple(
+        each if each.kind == "count" else shifted_by(each, "time step of the simulation", None)
+        for each in found
+    )
+
+
+def combined(
+    trials: Sequence[TrialData], measure: Callable[[TrialData], Sequence[Estimate]]
+) -> dict[str, Estimate]:
+    """The metrics of repeats, by name, as `sampled.together` puts them; of those that all have."""
+    each = [metrics(item, measure) for item in trials]
+    names = [name for name in each[0] if all(name in found for found in each)]
+    return {name: together([found[name] for found in each]) for name in names}
 
 
 def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[Place, ...]:

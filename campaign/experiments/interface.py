@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from campaign.channels import missing
+from campaign.estimate import Estimate
 from campaign.experiments.swept_tables import table_names
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
-from campaign.trial import Ending, Recording, Tree, Trial, TrialRequest, canonical_json
+from campaign.trial import Ending, Most, Recording, Tree, Trial, TrialRequest, canonical_json
 
 
 class TrialData(Protocol):
@@ -28,6 +29,10 @@ class TrialData(Protocol):
 
     def channel_names(self) -> frozenset[str]:
         """What was recorded, without reading any of it. Raises ArchiveError likewise."""
+
+    @property
+    def estimates(self) -> Sequence[Estimate]:
+        """What `Experiment.measure` found when it was executed; nothing if nobody looked then."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,35 @@ class TestData:
 
 
 @dataclass(frozen=True)
+class Chosen:
+    """A value (SI) that an experiment chose for an option that a test does not write, and why."""
+
+    value: Any
+    reason: str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Trials of one point of a test's matrix that follow from what those before them found.
+
+    Attributes:
+        name: a word or two, unique within the experiment: `refinement`.
+        why: what follows from what, for the plan and the record.
+        most: what they take at most at a point, from its options and bench. The plan shows it and
+            judges its size, and nobody gets more: a stage that asks for more is not executed.
+        trials: which they are, from options and bench of the point and all of its trials so far,
+            failed ones included. Asked once, when all of those have ended; the same data gives the
+            same trials. They are numbered, checked and archived like planned ones. What it raises
+            costs the stage and not the run.
+    """
+
+    name: str
+    why: str
+    most: Callable[[Any, Bench], Most]
+    trials: Callable[[Any, Bench, TestData], Iterable[TrialRequest]]
+
+
+@dataclass(frozen=True)
 class Experiment:
     """A kind of test.
 
@@ -65,12 +99,22 @@ class Experiment:
             ValueError with a message for the user when options and bench do not go together.
         analyse: tables, figures and findings of a whole test. Must cope with failed trials, and
             with recordings that lack a channel of `can_use`.
+        measure: the metrics of one recording, from its samples and its trial's windows alone; they
+            are archived with the trial, and `metrics` gives them to `analyse`. Raises ValueError
+            with a message for the user when the recording holds none.
+        fit: options that a test does not write, as they suit its bench. Handed the options with
+            their plain defaults (`model_fields_set` has those written) and the bench; what it does
+            not name keeps its default.
         requires: names of the channels without which a measurement is in vain, and what each is
             for. A `TrialRequest` says so where its trial requires only some of them.
         can_use: names of further channels, and what there is none of without them, in words that
             go on after "no": `figure of the command`.
         seeks_instability: it goes to where a loop is unstable, to find out where that is; the plan
             of any other test with an unstable loop is refused.
+        perturbs_bench: its trials are on benches that it makes from the test's own, on purpose
+            (`TrialRequest.bench`); what it finds is still said of the test's bench.
+        stages: further trials of a point, which follow from those of `trials` and of the stages
+            before; nothing else may lead to trials that are not in the plan.
     """
 
     name: str
@@ -78,9 +122,13 @@ class Experiment:
     options: type[Options]
     trials: Callable[[Any, Bench], Iterable[TrialRequest]]
     analyse: Callable[[TestData], Result]
+    measure: Callable[[TrialData], Sequence[Estimate]] | None = None
+    fit: Callable[[Any, Bench], Mapping[str, Chosen]] | None = None
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
     seeks_instability: bool = False
+    perturbs_bench: bool = False
+    stages: tuple[Stage, ...] = ()
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
@@ -92,6 +140,16 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
     notes = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
     return replace(result, notes=(*result.notes, *notes))
+
+
+def metrics(
+    data: TrialData, measure: Callable[[TrialData], Sequence[Estimate]]
+) -> dict[str, Estimate]:
+    """What one recording says, by name: as it was archived when the trial ended, or else by now.
+
+    Raises what `measure` raises.
+    """
+    return {found.name: found for found in data.estimates or measure(data)}
 
 
 def with_named_tables(data: TestData) -> TestData:
@@ -115,6 +173,7 @@ class _Named:
         self.ending = data.ending
         self.recording = data.recording
         self.channel_names = data.channel_names
+        self.estimates = data.estimates
 
 
 def lost_without(experiment: Experiment, name: str) -> str:

@@ -7,6 +7,7 @@ parameter can be varied (Figures 5.12 and 5.13).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -14,15 +15,32 @@ import numpy as np
 from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
-from campaign.experiments.common import conditions, failures_note, method_label, with_changes
-from campaign.experiments.friction_models import in_models, model_label, model_series, places
+from campaign.estimate import Estimate
+from campaign.experiments.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    with_changes,
+)
+from campaign.experiments.friction_models import (
+    OF_ONE,
+    combined,
+    in_models,
+    model_label,
+    model_series,
+    places,
+    simulated,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.identification.sampled import LOST, at_sample, bracketed, named, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import (
     Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -32,7 +50,6 @@ from campaign.result import (
     Result,
     Style,
     Table,
-    Value,
 )
 from campaign.signals import Sine
 from campaign.trial import Recording, Task, Tree, TrialRequest
@@ -43,6 +60,9 @@ VARIED = ("parameter", "factor")
 UNCHANGED = "unchanged"
 RATE = Axis("Rate", "rad/s", "deg/s")
 TORQUE = Axis("Friction torque", "N m", "N m")
+METRICS = ("peak", "at_amplitude", "at_reversal")
+JUMP = 20.0
+"""times the step of the torque from sample to sample beside it."""
 CYCLES = 2
 """of the prescribed rate; the first brings the bristles into their cycle, the last is shown."""
 NEAR_ZERO = 0.08
@@ -145,17 +165,18 @@ def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
 
 def _analyse(data: TestData) -> Result:
     measured = list(data.completed())
-    rows: list[dict[str, Value]] = []
+    rows: list[dict[str, Cell]] = []
     findings: list[Finding] = []
     plain = places((item for item in measured if "parameter" not in item.trial.point), OWN)
     varied = places((item for item in measured if "parameter" in item.trial.point), VARIED)
     for place in (*plain, *varied):
-        for item in place.trials:
-            row = _row(item)
-            rows.append({**place.point, **row})
-            for quantity in ("peak", "at_reversal"):
-                value = float(str(row[quantity]))
-                findings.append(Finding(f"model_{quantity}", value, "N m", conditions(item)))
+        for repeats in grouped(place.trials).values():
+            found = combined(repeats, _measure)
+            row = {name: found.get(f"model_{name}") or _not_found(name) for name in METRICS}
+            rows.append({**place.point, "source": _source(repeats[0]), **row})
+            findings += [
+                Finding.of(row[name], conditions(repeats[0])) for name in ("peak", "at_reversal")
+            ]
     figures: list[Figure] = []
     for number, place in enumerate(plain, start=1):
         suffix = f"-{number}" if len(plain) > 1 else ""
@@ -179,7 +200,7 @@ def _analyse(data: TestData) -> Result:
         ),
         rows=tuple(rows),
         note="Where the rate falls through zero a static model jumps, and a dynamic one still "
-        "holds the torque of its bristles.",
+        "holds the torque of its bristles. " + OF_ONE,
     )
     return Result((table,), tuple(figures), tuple(findings), failures_note(data))
 
@@ -205,20 +226,48 @@ def _symbol(parameter: str) -> str:
     return SYMBOLS.get(parameter, parameter.replace("_", " "))
 
 
-def _row(data: TrialData) -> dict[str, Value]:
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    """Torque of the last cycle: the largest, at the largest rate, and where the rate reverses.
+
+    Without what cannot be told because samples of the rate were lost (NaN).
+    """
     cut, torque = _cycle(data)
     rate = cut[LOAD_RATE]
+    found = [peak("peak", torque, "N m")]
+    if np.all(np.isfinite(rate)):
+        found.append(at_sample("at_amplitude", torque, int(np.argmax(rate)), "N m"))
+        found += _at_reversal(rate, torque)
+    return simulated(named(each, f"model_{each.name}") for each in found)
+
+
+def _not_found(name: str) -> Estimate:
+    reason = f"the rate does not fall through zero, or {LOST}" if name == "at_reversal" else LOST
+    return Estimate.without_interval(f"model_{name}", math.nan, "N m", reason)
+
+
+def _at_reversal(rate: Array, torque: Array) -> Iterator[Estimate]:
+    """Torque (N m) where the rate falls through zero: between two samples, unless it jumps there.
+
+    A jump is a step between neighbours that is far larger than those beside it.
+    """
     falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
-    reversal = float(torque[falling[0]]) if len(falling) else float("nan")
-    peak = float(np.max(torque))
-    if abs(reversal) < 1e-9 * peak:  # a sine's zero is not quite zero, and a jump goes through it
-        reversal = 0.0
-    return {
-        "source": _source(data),
-        "peak": peak,
-        "at_amplitude": float(torque[np.argmax(rate)]),
-        "at_reversal": reversal,
-    }
+    if not len(falling):
+        return
+    at = int(falling[0])
+    value = float(torque[at])
+    near = torque[max(at - 2, 0) : at + 5]
+    if not np.all(np.isfinite(near)):
+        yield Estimate.without_interval("at_reversal", math.nan, "N m", LOST)
+        return
+    steps = np.abs(np.diff(near))
+    if np.max(steps) > JUMP * np.median(steps):
+        # A sine's zero is not quite zero, and a jump goes through it.
+        middle = 0.0 if abs(value) < 1e-9 * float(np.nanmax(torque)) else value
+        reason = "the torque jumps where the rate changes its sign"
+        yield Estimate.without_interval("at_reversal", middle, "N m", reason)
+        return
+    ends = value, float(torque[at + 1])
+    yield bracketed("at_reversal", value, "N m", ends, "between the samples around it")
 
 
 def _static_figure(data: TrialData, suffix: str) -> Figure:
@@ -260,7 +309,7 @@ def _sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
         thin = compensated and "compensation" not in point
         style: Style = "thin" if thin else "line"
         curves.append(Curve(*_closed(cut[LOAD_RATE], torque), _source(item), name, style))
-    near = NEAR_ZERO * float(max(np.max(curve.x) for curve in curves))
+    near = NEAR_ZERO * max(_largest(curve.x) for curve in curves)
     zoom = Axis(RATE.label, "rad/s", "deg/s", limits=(-near, near))
     mark = (Mark("", x=0.0),)
     return Figure(
@@ -282,6 +331,12 @@ def _sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
 
 def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:
     return np.append(rate, rate[0]), np.append(torque, torque[0])
+
+
+def _largest(rate: Array) -> float:
+    """The largest of the samples that were not lost; 1 rad/s where all were."""
+    known = rate[np.isfinite(rate)]
+    return float(np.max(known)) if len(known) else 1.0
 
 
 def _near(curve: Curve, rate: float) -> Curve:
@@ -333,7 +388,7 @@ def _variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Fig
 
 def _is_dynamic(varied: list[TrialData], plain: list[TrialData]) -> bool:
     """Whether steady sliding is the same for all values of a parameter."""
-    rate = np.linspace(1e-6, 1.0, 50) * float(np.max(varied[0].recording()[LOAD_RATE]))
+    rate = np.linspace(1e-6, 1.0, 50) * _largest(varied[0].recording()[LOAD_RATE])
     curves = [np.add(*steady_friction(bench_of(item.trial), rate)) for item in (*plain, *varied)]
     return all(np.allclose(curve, curves[0], rtol=1e-12) for curve in curves)
 
@@ -349,7 +404,7 @@ def _variation(
         series = "reference" if factor == 1.0 else f"factor {factor:g}"
         label = UNCHANGED if factor == 1.0 else f"× {factor:g}"
         curves.append(Curve(*_closed(cut[LOAD_RATE], torque), label, series))
-    largest = float(np.max(curves[0].x))
+    largest = _largest(curves[0].x)
     shown = NEAR_ZERO * largest if near_zero else largest
     axis = Axis(RATE.label, "rad/s", "deg/s", limits=(-1.02 * shown, 1.02 * shown))
     if near_zero:
@@ -363,9 +418,11 @@ EXPERIMENT = Experiment(
     options=ModelOutputOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
     requires={
         LOAD_RATE: "the rate that the models are told",
         FRICTION_TORQUE: "the output of a friction model",
         COMPENSATION_TORQUE: "the output of a compensation",
     },
+    measure=_measure,
 )

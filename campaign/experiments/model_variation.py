@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
+from campaign.estimate import Window
 from campaign.experiments.common import method_label
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
@@ -24,6 +25,8 @@ CYCLES = 1.5
 """of the prescribed rate; the reversal that is shown is the second, when the bristles move."""
 AROUND = 0.05
 """of a cycle, before and after that reversal."""
+REVERSAL = "reversal"
+CYCLE = "cycle"
 SLOW = 0.35
 """Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
 FAST = ("viscous_friction",)
@@ -67,9 +70,31 @@ def model_trials(
             point={"parameter": parameter, "change": change, "repetition": 1},
             note="the model alone, at a prescribed rate",
             bench=tree,
+            windows=model_windows(task),
             requires=(),  # nothing but figures comes of it
             can_use=(COMPENSATION_TORQUE, RELATIVE_RATE),
         )
+
+
+def model_windows(task: Task) -> tuple[Window, Window]:
+    """What is shown of the model's output, for its plan; for archives without any, too.
+
+    The reversal after half a cycle, which is a third into its window, and one whole cycle.
+    """
+    command = task.command
+    frequency = command.frequency if isinstance(command, Sine) else 1.0
+    middle, around = 0.5 / frequency, AROUND / frequency
+    return (
+        Window(REVERSAL, middle - around, middle + 2 * around),
+        Window(CYCLE, middle, 1.5 / frequency),
+    )
+
+
+def _cut(data: TrialData, name: str) -> tuple[Window, Recording]:
+    """A window of the trial, and what was recorded in it."""
+    windows = (*data.trial.windows, *model_windows(data.trial.task))
+    window = next(each for each in windows if each.name == name)
+    return window, data.recording().window(window.start, window.stop)
 
 
 def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
@@ -124,16 +149,14 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
         )
 
 
-View = Callable[[Recording, float], tuple[Axis, Any, Any]]
+View = Callable[[TrialData], tuple[Axis, Any, Any]]
 
 
 def _panel(name: str, runs: dict[float, TrialData], view: View) -> Panel:
     torque = Axis("Model torque", "N m", "N m")
     curves, axis = [], Axis("")
     for change, data in sorted(runs.items()):
-        command = data.trial.task.command
-        frequency = command.frequency if isinstance(command, Sine) else 1.0
-        axis, x, y = view(data.recording(), frequency)
+        axis, x, y = view(data)
         series = "reference" if change == 0 else ("low" if change < 0 else "high")
         label = "unchanged" if change == 0 else f"{change:+.0%}".replace("-", "−")
         curves.append(Curve(x, y, label, series))
@@ -141,23 +164,23 @@ def _panel(name: str, runs: dict[float, TrialData], view: View) -> Panel:
     return Panel(axis, torque, curves, title[:1].upper() + title[1:])
 
 
-def _reversal(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
+def _reversal(data: TrialData) -> tuple[Axis, Any, Any]:
     """Torque around the reversal after half a cycle, over the time from it."""
-    middle = 0.5 / frequency
-    cut = recording.window(middle - AROUND / frequency, middle + 2 * AROUND / frequency)
+    window, cut = _cut(data, REVERSAL)
+    middle = window.start + (window.stop - window.start) / 3
     axis = Axis("Time from the reversal", "s", "s")
     return axis, cut.time - middle, cut[COMPENSATION_TORQUE]
 
 
-def _all(recording: Recording, frequency: float, share: float = 1.0) -> tuple[Axis, Any, Any]:
+def _all(data: TrialData, share: float = 1.0) -> tuple[Axis, Any, Any]:
     """Torque over rate, one whole cycle."""
-    cut = recording.window(0.5 / frequency, 1.5 / frequency)
+    _, cut = _cut(data, CYCLE)
     rate = cut[RELATIVE_RATE]
     largest = share * float(np.max(np.abs(rate)))
     axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
     return axis, rate, cut[COMPENSATION_TORQUE]
 
 
-def _slow(recording: Recording, frequency: float) -> tuple[Axis, Any, Any]:
+def _slow(data: TrialData) -> tuple[Axis, Any, Any]:
     """The slow part of it."""
-    return _all(recording, frequency, SLOW)
+    return _all(data, SLOW)

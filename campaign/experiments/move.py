@@ -11,10 +11,12 @@ from pydantic import Field
 
 from campaign.channels import RELATIVE_ANGLE
 from campaign.experiments.common import failures_note
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.identification.intervals import of_series, shifted_by
+from campaign.identification.sampled import shifted
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Column, Result, Table, Value
+from campaign.result import Cell, Column, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Role, Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
@@ -95,7 +97,7 @@ def _analyse(data: TestData) -> Result:
         columns=(
             Column("trial", "Trial"),
             Column("role", "Role"),
-            Column("target", "End of the command", "rad", "deg"),
+            Column("target", "End of the command", "rad", "deg", exact=True),
             Column("reached", "Reached", "rad", "deg"),
             Column("deviation", "Deviation", "rad", "deg"),
         ),
@@ -106,18 +108,22 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), notes=notes)
 
 
-def _row(data: TrialData) -> dict[str, Value]:
+def _row(data: TrialData) -> dict[str, Cell]:
     options = MoveOptions.model_validate(data.trial.options, context={"si": True})
     target = options.position if options.cycles else options.angle
     recording = data.recording()
-    row: dict[str, Value] = {"trial": data.trial.name, "role": data.trial.role.value}
+    row: dict[str, Cell] = {"trial": data.trial.name, "role": data.trial.role.value}
     row |= {"target": target, "reached": None, "deviation": None}
     if RELATIVE_ANGLE not in recording.channels:
         return row
     last = recording[RELATIVE_ANGLE][recording.time >= data.trial.task.duration - LOOKED_AT]
     if last.size and np.isfinite(last).all():
-        reached = float(last.mean())
-        row |= {"reached": reached, "deviation": reached - target}
+        count = bench_of(data.trial).sensors.encoder.resolution
+        reached = of_series("reached", last, "rad")
+        if count > 0:
+            # An axis that stands still shows one count, wherever in it the axis stands.
+            reached = shifted_by(reached, "resolution of the encoder", count / math.sqrt(12.0))
+        row |= {"reached": reached, "deviation": shifted("deviation", reached, -target)}
     return row
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
 
+from campaign.estimate import Estimate
+from campaign.experiments.observer_metrics import Gain
+from campaign.experiments.pointing_error import ends, values
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 CORNER = Axis("Corner frequency N K0 / (2π J')", "Hz", "Hz", scale="log")
@@ -14,54 +16,40 @@ SHOWN_GAINS = 4
 """curves in the figure of rejection, the one without observer among them."""
 
 
-class GainLike(Protocol):
-    """What a figure needs of one gain; see `observer_gain.Gain`."""
-
-    @property
-    def corner(self) -> float: ...
-    @property
-    def error(self) -> float | None: ...
-    @property
-    def error_theory(self) -> float | None: ...
-    @property
-    def noise(self) -> float | None: ...
-    @property
-    def noise_theory(self) -> float | None: ...
-    @property
-    def rejection(self) -> Array: ...
-    @property
-    def unstable(self) -> str: ...
+def _pairs(gains: Sequence[Gain], name: str) -> tuple[Array, list[Estimate]]:
+    """Corner frequencies and estimates, of stable gains with an observer that have them."""
+    stable = [(g.corner, getattr(g, name)) for g in gains if g.corner and not g.unstable]
+    known = [(corner, value) for corner, value in stable if value is not None]
+    return np.array([corner for corner, _ in known]), [value for _, value in known]
 
 
-def _pairs(gains: Sequence[GainLike], name: str) -> tuple[Array, Array]:
-    """Corner frequency and a value, of stable gains with an observer that have it."""
-    found = [(g.corner, getattr(g, name)) for g in gains if g.corner and not g.unstable]
-    found = [(corner, value) for corner, value in found if value is not None]
-    array = np.array(found, dtype=float).reshape(-1, 2)
-    return array[:, 0], array[:, 1]
+def _points(x: Array, estimates: Sequence[Estimate], label: str, series: str) -> Curve:
+    """Dots with their intervals."""
+    low, high = ends(estimates)
+    return Curve(x, values(estimates), label, series, "points", low=low, high=high)
 
 
-def _marks(gains: Sequence[GainLike], own: float) -> list[Mark]:
+def _marks(gains: Sequence[Gain], own: float) -> list[Mark]:
     marks = [Mark("the bench's", x=own)]
     unstable = next((gain.corner for gain in gains if gain.unstable), None)
     return marks if unstable is None else [*marks, Mark("unstable", x=unstable)]
 
 
-def _without(gains: Sequence[GainLike], name: str) -> list[Mark]:
-    value = next((getattr(gain, name) for gain in gains if gain.corner == 0), None)
-    return [] if value is None else [Mark("without observer", y=value)]
+def _without(gains: Sequence[Gain], name: str) -> list[Mark]:
+    found = next((getattr(gain, name) for gain in gains if gain.corner == 0), None)
+    return [] if found is None else [Mark("without observer", y=found.value)]
 
 
-def error_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
+def error_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
     """Stabilization error over the gain."""
     x, y = _pairs(gains, "error")
     if not len(x):
         return
-    curves = [Curve(x, y, "measured", "measured", "points")]
+    curves = [_points(x, y, "measured", "measured")]
     theory_x, theory_y = _pairs(gains, "error_theory")
     if len(theory_x):
         label = "Equation 5.4, of the friction that acted"
-        curves.insert(0, Curve(theory_x, theory_y, label, "fit"))
+        curves.insert(0, Curve(theory_x, values(theory_y), label, "fit"))
     error = Axis("Stabilization error (1σ)", "rad", "mrad", scale="log")
     yield Figure(
         key="error",
@@ -74,15 +62,17 @@ def error_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
     )
 
 
-def noise_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
+def noise_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
     """True rate of the load that the gyro's noise causes, over the gain."""
     x, y = _pairs(gains, "noise")
     if not len(x):
         return
-    theory_x, theory_y = _pairs(gains, "noise_theory")
+    stable = [gain for gain in gains if gain.corner and not gain.unstable]
+    theory = [(g.corner, g.noise_theory) for g in stable if g.noise_theory is not None]
+    equation = np.array(theory, dtype=float).reshape(-1, 2)
     curves = [
-        Curve(theory_x, theory_y, "Equation 5.5", "fit"),
-        Curve(x, y, "measured", "measured", "points"),
+        Curve(equation[:, 0], equation[:, 1], "Equation 5.5", "fit"),
+        _points(x, y, "measured", "measured"),
     ]
     rate = Axis("Rate of the load from noise (1σ)", "rad/s", "mrad/s", scale="log")
     yield Figure(
@@ -96,9 +86,9 @@ def noise_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
     )
 
 
-def rejection_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
+def rejection_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
     """Rate per disturbance torque over its frequency, for a few gains."""
-    usable = [gain for gain in gains if len(gain.rejection) and not gain.unstable]
+    usable = [gain for gain in gains if gain.rejection and not gain.unstable]
     if not usable:
         return
     curves = []
@@ -108,9 +98,11 @@ def rejection_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
         else:
             label = f"corner {gain.corner:.3g} Hz"
             series = label
-        frequency, measured, expected = gain.rejection.T
+        frequency = np.array([point.frequency for point in gain.rejection])
+        expected = np.array([point.expected for point in gain.rejection])
+        measured = [point.measured for point in gain.rejection]
         curves.append(Curve(frequency, expected, label, series))
-        curves.append(Curve(frequency, measured, "", series, "points"))
+        curves.append(_points(frequency, measured, "", series))
     x = Axis("Frequency of the disturbance", "Hz", "Hz", scale="log")
     y = Axis("|ω/T|", "rad/s/(N m)", "mrad/s/(N m)", scale="log")
     yield Figure(
@@ -126,7 +118,7 @@ def rejection_figure(gains: Sequence[GainLike], own: float) -> Iterator[Figure]:
     )
 
 
-def _spread(gains: Sequence[GainLike], own: float) -> list[GainLike]:
+def _spread(gains: Sequence[Gain], own: float) -> list[Gain]:
     """A few gains: the one without observer, the bench's own, and some evenly between."""
     with_observer = [gain for gain in gains if gain.corner]
     picks = np.unique(np.linspace(0, len(with_observer) - 1, SHOWN_GAINS - 1).round().astype(int))

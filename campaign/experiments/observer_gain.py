@@ -11,25 +11,38 @@ every bench.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
+from campaign.estimate import Estimate
+from campaign.experiments import fitting
 from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
-from campaign.experiments.stabilization import stabilization_error
+from campaign.experiments.observer_metrics import (
+    BY_THEORY,
+    Gain,
+    gain_of,
+    is_noisy,
+    measure,
+    measured_corner,
+    multiple,
+    own_observer,
+    worst_ratio,
+)
+from campaign.experiments.pointing_error import windows_of
+from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.options import Options
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.stability import growth_rate
-from campaign.result import Array, Column, Figure, Finding, Result, Table, Value
+from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Outcome, Recording, Task, Tree, TrialRequest
+from campaign.trial import Outcome, Task, Tree, TrialRequest
 from campaign.units import AngularAcceleration, Frequency, Time, Torque
 
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
@@ -67,27 +80,16 @@ class ObserverGainOptions(Options):
     """Rate of the recording."""
 
 
-def _own(bench: Bench, name: str) -> tuple[float, float | None]:
-    """Corner frequency (Hz) of the bench's observer, and the inertia it assumes (kg m^2)."""
-    if name not in bench.compensation:
-        named = ", ".join(bench.compensation) or "none"
-        raise ValueError(f"the bench has no compensation '{name}'; it has {named}")
-    observer = bench.compensation[name]
-    if observer.method != "observer":
-        raise ValueError(f"'{name}' is no disturbance observer: its method is '{observer.method}'")
-    return theory.corner_frequency(bench, observer.gain, observer.inertia), observer.inertia
-
-
 def _tuned(bench: Bench, name: str, corner: float) -> Bench:
     """The bench with its observer at this corner frequency (Hz)."""
-    gain = theory.gain_for(bench, corner, _own(bench, name)[1])
+    gain = theory.gain_for(bench, corner, own_observer(bench, name)[1])
     tree = with_changes(bench, {f"compensation.{name}.gain": gain})
     return Bench.model_validate(tree, context={"si": True})
 
 
 def _benches(options: ObserverGainOptions, bench: Bench) -> Iterator[tuple[float, Bench]]:
     """Each corner frequency (Hz; 0 is without observer) with the bench tuned to it."""
-    own, _ = _own(bench, options.observer)
+    own, _ = own_observer(bench, options.observer)
     yield 0.0, bench
     for corner in sorted({*options.corners, own}):
         if corner <= 0:
@@ -118,7 +120,7 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
         yield _request(_error_task(options, name), plain, corner, "error")
         if corner and growth_rate(tuned, name) >= 0:
             continue  # it will end early; once is enough to know
-        if options.noise_time and _is_noisy(bench):
+        if options.noise_time and is_noisy(bench):
             yield _request(_noise_task(options, name), linear, corner, "noise")
         for frequency in options.disturbance_frequencies:
             task = _rejection_task(options, name, frequency)
@@ -133,11 +135,14 @@ def _request(task: Task, bench: Tree, corner: float, measured: str, **more: floa
     point: dict[str, JsonValue] = {"measured": measured, "corner": corner, **more}
     can_use = (FRICTION_TORQUE,) if measured == "error" else ()
     requires = (REQUIRED[measured],)
-    return TrialRequest(task, point=point, bench=bench, requires=requires, can_use=can_use)
-
-
-def _is_noisy(bench: Bench) -> bool:
-    return bench.controller.sample_rate is not None and bench.sensors.gyro.noise > 0
+    return TrialRequest(
+        task,
+        point=point,
+        bench=bench,
+        requires=requires,
+        can_use=can_use,
+        windows=windows_of(task)[:1],
+    )
 
 
 def _error_task(options: ObserverGainOptions, name: str) -> Task:
@@ -171,69 +176,16 @@ def _task(
     )
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What was found at one gain, SI; None where it was not measured, or not stable.
-
-    Attributes:
-        corner: Hz; 0 is without observer.
-        gain: N K0, N m s/rad at the load.
-        error, error_theory: stabilization error (rad).
-        noise, noise_theory: true rate of the load from the gyro's noise (rad/s, 1 sigma).
-        rejection: frequency (Hz), measured and theoretical |w/Td| (rad/s per N m), shape (n, 3).
-        unstable: why its trials ended early; empty when they did not.
-    """
-
-    corner: float
-    gain: float
-    error: float | None
-    error_theory: float | None
-    noise: float | None
-    noise_theory: float | None
-    rejection: Array
-    unstable: str
-
-
-def amplitude(recording: Recording, channel: str, frequency: float) -> float:
-    """Amplitude of a channel at `frequency` (Hz), by least squares with a mean."""
-    turned = 2 * np.pi * frequency * recording.time
-    regressors = np.stack([np.sin(turned), np.cos(turned), np.ones_like(turned)], axis=1)
-    sine, cosine, _ = np.linalg.lstsq(regressors, recording[channel], rcond=None)[0]
-    return float(np.hypot(sine, cosine))
-
-
-def predicted_error(
-    recording: Recording, bench: Bench, corner: float, inertia: float | None
-) -> float:
-    """Error (rad, 1 sigma) that Eq. 5.4 makes of the friction of a recording of whole cycles.
-
-    The true friction is the disturbance; its spectrum through w/Td and the integration to an angle
-    gives the error. A simulator alone knows it.
-    """
-    time = recording.time
-    count = len(time)
-    step = float(np.ptp(time)) / (count - 1)
-    frequency: Array = np.fft.rfftfreq(count, step)[1:].astype(float)
-    torque = np.fft.rfft(recording[FRICTION_TORQUE])[1:] / count
-    s = 2j * np.pi * frequency
-    high_pass = 2 * np.pi * bench.controller.pointing_high_pass
-    angle = torque * theory.rejection(bench, corner, inertia, frequency) / (s + high_pass)
-    twice = np.full(len(angle), 2.0)
-    if count % 2 == 0:
-        twice[-1] = 1.0
-    return float(np.sqrt(np.sum(twice * np.abs(angle) ** 2)))
-
-
 def _analyse(data: TestData) -> Result:
     if not data.trials:
         return Result()
     options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
     bench = bench_of(data.trials[0].trial)
-    own, inertia = _own(bench, options.observer)
+    own, inertia = own_observer(bench, options.observer)
     groups: dict[float, list[TrialData]] = {}
     for item in data.trials:
         groups.setdefault(float(str(item.trial.point["corner"])), []).append(item)
-    gains = [_gain(c, group, options, inertia) for c, group in sorted(groups.items())]
+    gains = [gain_of(corner, group) for corner, group in sorted(groups.items())]
     figures: list[Figure] = [
         *error_figure(gains, own),
         *rejection_figure(gains, own),
@@ -243,52 +195,6 @@ def _analyse(data: TestData) -> Result:
     findings = tuple(_findings(gains, own, inertia or bench.axis.inertia, options))
     notes = tuple(_notes(gains, data, limit, options))
     return Result((_table(gains),), tuple(figures), findings, notes)
-
-
-def _gain(
-    corner: float, group: list[TrialData], options: ObserverGainOptions, inertia: float | None
-) -> Gain:
-    ended = [i for i in group if i.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)]
-    by_kind: dict[str, list[TrialData]] = {}
-    for item in group:
-        if item.ending.outcome is Outcome.COMPLETED:
-            by_kind.setdefault(str(item.trial.point["measured"]), []).append(item)
-    bench = bench_of(group[0].trial)
-    found: dict[str, float | None] = dict.fromkeys(("error", "error_theory", "noise"))
-    for item in by_kind.get("error", [])[:1]:
-        cut = item.recording().window(*item.trial.task.window)
-        found["error"] = stabilization_error(cut, options.frequency)
-        if FRICTION_TORQUE in cut.channels:
-            found["error_theory"] = predicted_error(cut, bench, corner, inertia)
-    for item in by_kind.get("noise", [])[:1]:
-        cut = item.recording().window(*item.trial.task.window)
-        found["noise"] = float(np.std(cut[LOAD_RATE])) if LOAD_RATE in cut.channels else None
-    points = []
-    for item in by_kind.get("rejection", []):
-        frequency = float(str(item.trial.point["disturbance_frequency"]))
-        cut = item.recording().window(*item.trial.task.window)
-        measured = amplitude(cut, GYRO_RATE, frequency) / options.disturbance
-        expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
-        points.append((frequency, measured, float(expected)))
-    return Gain(
-        corner=corner,
-        gain=2 * np.pi * corner * (inertia or bench.axis.inertia),
-        noise_theory=theory.noise_rate(bench, corner, inertia) if _is_noisy(bench) else None,
-        rejection=np.array(sorted(points)).reshape(-1, 3),
-        unstable=ended[0].ending.reason if ended else "",
-        **found,
-    )
-
-
-def measured_corner(gain: Gain, without: Gain) -> float | None:
-    """Corner frequency (Hz) that explains by how much the observer reduced |w/Td|.
-
-    By Eq. 5.4 the ratio of the two is s / (s + a), so that (1 / ratio)^2 - 1 = (a / w)^2.
-    """
-    known = {row[0]: row[1] for row in without.rejection}
-    pairs = [(f, known[f] / m) for f, m, _ in gain.rejection if known.get(f) and m > 0]
-    corners = [f * np.sqrt(ratio**2 - 1) for f, ratio in pairs if ratio > 1]
-    return float(np.median(corners)) if corners else None
 
 
 def _findings(
@@ -301,26 +207,40 @@ def _findings(
     for gain in gains:
         where: dict[str, Value] = {"corner": gain.corner, "observer": options.observer}
         if gain.error is not None:
-            yield Finding("stabilization_error_at_gain", gain.error, "rad", {**motion, **where})
+            error = replace(gain.error, name="stabilization_error_at_gain")
+            yield Finding.of(error, {**motion, **where})
         if gain.noise is not None:
-            yield Finding("noise_rate", gain.noise, "rad/s", where)
-        for frequency, measured, _ in gain.rejection:
-            there = {**where, "disturbance_frequency": float(frequency)}
-            yield Finding("disturbance_rejection", float(measured), "rad/s/(N m)", there)
-    first = _first_unstable(gains)
-    if first is not None:
-        yield Finding("unstable_corner_frequency", first.corner, "Hz", {})
+            yield Finding.of(gain.noise, where)
+        for point in gain.rejection:
+            there = {**where, "disturbance_frequency": point.frequency}
+            yield Finding.of(point.measured, there)
+    yield from _limit_found(gains)
     chosen = [g for g in gains if np.isclose(g.corner, own)]
     corner = measured_corner(chosen[0], gains[0]) if chosen and gains[0].corner == 0 else None
     if corner is not None:
         told: dict[str, Value] = {"compensation": options.observer}
-        yield Finding("observer_corner_frequency", corner, "Hz", told)
-        load_gain = 2 * np.pi * corner * inertia
-        yield Finding("observer_gain", load_gain, "N m s/rad", told)
+        yield Finding.of(corner, told)
+        load_gain = multiple(corner, 2 * np.pi * inertia, "observer_gain", "N m s/rad")
+        yield Finding.of(shifted_by(load_gain, "inertia", None), told)
+
+
+def _limit_found(gains: list[Gain]) -> Iterator[Finding]:
+    """Where the loop becomes unstable: between two gains that were tried, or beyond all of them."""
+    name = "unstable_corner_frequency"
+    stable = [gain.corner for gain in gains if gain.corner and not gain.unstable]
+    first = _first_unstable(gains)
+    if first is not None:
+        below = max((corner for corner in stable if corner < first.corner), default=0.0)
+        method = "the lowest gain tried that was unstable, and the highest below it that was stable"
+        limit = Estimate(name, first.corner, "Hz", below, first.corner, LEVEL, method)
+        yield Finding.of(limit, {})
+    elif stable:
+        reason = "stable at every gain that was tried"
+        yield Finding.of(Estimate(name, max(stable), "Hz", kind="at least", reason=reason), {})
 
 
 def _first_unstable(gains: list[Gain]) -> Gain | None:
-    return next((gain for gain in gains if gain.unstable), None)
+    return next((gain for gain in gains if gain.unstable and gain.corner > 0), None)
 
 
 def _notes(
@@ -351,28 +271,35 @@ def _notes(
         )
 
 
+def _row(gain: Gain) -> dict[str, Cell]:
+    state = "unstable" if gain.unstable else "stable"
+    return {
+        "corner": gain.corner,
+        "gain": gain.gain,
+        "error": gain.error,
+        "error_theory": gain.error_theory,
+        "noise": gain.noise,
+        "noise_theory": gain.noise_theory,
+        "worst": worst_ratio(gain),
+        "state": state if gain.corner else "no observer",
+    }
+
+
 def _table(gains: list[Gain]) -> Table:
-    rows: list[Mapping[str, Any]] = []
-    for gain in gains:
-        row = {key: value for key, value in vars(gain).items() if key != "rejection"}
-        ratios = gain.rejection[:, 1] / gain.rejection[:, 2] if len(gain.rejection) else None
-        worst = None if ratios is None else float(ratios[np.argmax(np.abs(ratios - 1))])
-        state = "unstable" if gain.unstable else "stable"
-        rows.append({**row, "worst": worst, "state": state if gain.corner else "no observer"})
     return Table(
         key="observer-gain",
         title="What the observer's gain gives and costs",
         columns=(
-            Column("corner", "Corner frequency", "Hz", "Hz"),
-            Column("gain", "K0 at the load", "N m s/rad", "N m s/rad"),
+            Column("corner", "Corner frequency", "Hz", "Hz", exact=True),
+            Column("gain", "K0 at the load", "N m s/rad", "N m s/rad", exact=True),
             Column("error", "Error (1σ)", "rad", "mrad"),
             Column("error_theory", "by Eq. 5.4", "rad", "mrad"),
             Column("noise", "Rate from noise (1σ)", "rad/s", "deg/s"),
-            Column("noise_theory", "by Eq. 5.5", "rad/s", "deg/s"),
+            Column("noise_theory", "by Eq. 5.5", "rad/s", "deg/s", reason=BY_THEORY),
             Column("worst", "|ω/T| over Eq. 5.4, worst"),
             Column("state", "Loop"),
         ),
-        rows=tuple(rows),
+        rows=tuple(_row(gain) for gain in gains),
         note="The error by Eq. 5.4 is what it makes of the friction that acted in the same trial. "
         "Equations 5.4 and 5.5 are taken with the bench's PI controller in place of a constant.",
     )
@@ -384,6 +311,9 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
+    fit=fitting.base_motion,
+    perturbs_bench=True,
+    measure=measure,
     requires={
         POINTING_ERROR: "the stabilization error",
         GYRO_RATE: "the rejection of disturbances; disturbance_frequencies = [] does without",

@@ -7,21 +7,25 @@ in a cycle (Figure 2.11).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
+from campaign.estimate import Estimate, Window
+from campaign.experiments import fitting
 from campaign.experiments.common import failures_note
 from campaign.experiments.friction_models import Place, in_models, places
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.identification.intervals import shifted_by
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (
     Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -29,7 +33,6 @@ from campaign.result import (
     Panel,
     Result,
     Table,
-    Value,
 )
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
@@ -62,7 +65,8 @@ class PreslidingHysteresisOptions(Options):
 def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[TrialRequest]:
     if options.sample_rate < 100 * options.frequency:
         raise ValueError("a loop needs at least 100 samples per cycle; raise sample_rate")
-    stop = (0.5 + options.cycles) / options.frequency
+    windows = windows_of(options)
+    last = windows[-1]
     for point, tree in in_models(bench, options.models):
         for amplitude in options.amplitudes:
             if amplitude <= 0:
@@ -71,13 +75,24 @@ def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[Tria
                 Task(
                     mode="prescribed",
                     command=strokes(options, amplitude),
-                    duration=stop,
-                    window=(stop - 1.0 / options.frequency, stop),
+                    duration=last.stop,
+                    window=(last.start, last.stop),
                     sample_rate=options.sample_rate,
                 ),
                 point={**point, "amplitude": amplitude},
                 bench=tree,
+                windows=windows,
             )
+
+
+def windows_of(options: PreslidingHysteresisOptions) -> tuple[Window, Window]:
+    """The last two cycles, for the plan and for recordings of a plan that did not name them."""
+    period = 1.0 / options.frequency
+    stop = (0.5 + options.cycles) / options.frequency
+    return (
+        Window("cycle before", stop - 2.0 * period, stop - period),
+        Window("last cycle", stop - period, stop),
+    )
 
 
 def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
@@ -93,63 +108,81 @@ def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
     return Polyline(times=tuple(map(float, times)), values=tuple(map(float, rate)))
 
 
+NOISELESS = "a computed loop has no noise; how nearly it closes is its systematic part"
+UNITS = {"peak": "N m", "hysteresis_energy": "J", "loss_factor": ""}
+
+
 @dataclass(frozen=True)
 class Loop:
-    """One closed cycle: displacement (rad) and friction (N m), shape (n,); the energy it takes (J).
+    """One closed cycle: displacement (rad) and friction (N m), shape (n,)."""
 
-    Attributes:
-        peak: largest friction torque (N m).
-    """
-
-    amplitude: float
     displacement: Array
     friction: Array
-    energy: float
-    peak: float
 
-    @property
-    def loss_factor(self) -> float:
-        """Energy over pi times peak and amplitude: 0 for a spring, 4/pi for dry sliding."""
-        return self.energy / (np.pi * self.peak * self.amplitude)
+    def sizes(self, amplitude: float) -> dict[str, float]:
+        """Largest torque (N m), energy (J), and loss factor: energy over pi times peak times
+        amplitude (rad), 0 for a spring, 4/pi for dry sliding.
+        """
+        peak = float(np.max(np.abs(self.friction)))
+        energy = float(np.trapezoid(self.friction, self.displacement))
+        loss = energy / (np.pi * peak * amplitude)
+        return {"peak": peak, "hysteresis_energy": energy, "loss_factor": loss}
 
 
-def _loop(data: TrialData) -> Loop:
-    cut = data.recording().window(*data.trial.task.window)
-    displacement = np.append(cut[RELATIVE_ANGLE], cut[RELATIVE_ANGLE][0])
-    friction = np.append(cut[FRICTION_TORQUE], cut[FRICTION_TORQUE][0])
+def _amplitude_of(data: TrialData) -> float:
+    return float(str(data.trial.point["amplitude"]))
+
+
+def _loop(data: TrialData, window: Window) -> Loop:
+    cut = data.recording().window(window.start, window.stop)
     return Loop(
-        amplitude=float(str(data.trial.point["amplitude"])),
-        displacement=displacement,
-        friction=friction,
-        energy=float(np.trapezoid(friction, displacement)),
-        peak=float(np.max(np.abs(friction))),
+        np.append(cut[RELATIVE_ANGLE], cut[RELATIVE_ANGLE][0]),
+        np.append(cut[FRICTION_TORQUE], cut[FRICTION_TORQUE][0]),
     )
+
+
+def _windows(data: TrialData) -> tuple[Window, ...]:
+    options = PreslidingHysteresisOptions.model_validate(data.trial.options, context={"si": True})
+    return data.trial.windows or windows_of(options)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """Sizes of the last loop; what the loop before differs by is how far it is from closed."""
+    before, last = (_loop(data, window).sizes(_amplitude_of(data)) for window in _windows(data))
+    return [
+        shifted_by(
+            Estimate.without_interval(name, last[name], unit, NOISELESS),
+            "loop not closed",
+            abs(last[name] - before[name]),
+        )
+        for name, unit in UNITS.items()
+    ]
 
 
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), OWN)
     if not found:
         return Result(notes=failures_note(data))
-    loops = [(place, [_loop(item) for item in place.trials]) for place in found]
-    rows: list[dict[str, Value]] = [
+    loops = [(place, [(item, metrics(item, _measure)) for item in place.trials]) for place in found]
+    rows: list[dict[str, Cell]] = [
         {
             **place.point,
-            "amplitude": loop.amplitude,
-            "peak": loop.peak,
-            "energy": loop.energy,
-            "loss_factor": loop.loss_factor,
+            "amplitude": _amplitude_of(item),
+            "peak": own["peak"],
+            "energy": own["hysteresis_energy"],
+            "loss_factor": own["loss_factor"],
         }
-        for place, own in loops
-        for loop in own
+        for place, items in loops
+        for item, own in items
     ]
-    largest = max(loop.amplitude for _, own in loops for loop in own)
+    largest = max(_amplitude_of(item) for place in found for item in place.trials)
     display, energy = ("urad", "uJ") if largest <= SMALL else ("mrad", "mJ")
     table = Table(
         key="presliding-hysteresis",
         title="Energy lost in a cycle by amplitude of the displacement",
         columns=(
             *found[0].columns,
-            Column("amplitude", "Amplitude", "rad", display),
+            Column("amplitude", "Amplitude", "rad", display, exact=True),
             Column("peak", "Largest friction torque", "N m", "N m"),
             Column("energy", "Energy per cycle", "J", energy),
             Column("loss_factor", "Loss factor"),
@@ -160,9 +193,9 @@ def _analyse(data: TestData) -> Result:
         "dry sliding.",
     )
     findings = tuple(
-        Finding("hysteresis_energy", loop.energy, "J", {**place.point, "amplitude": loop.amplitude})
-        for place, own in loops
-        for loop in own
+        Finding.of(own["hysteresis_energy"], {**place.point, "amplitude": _amplitude_of(item)})
+        for place, items in loops
+        for item, own in items
     )
     figure = Figure(
         key="presliding-hysteresis",
@@ -172,22 +205,19 @@ def _analyse(data: TestData) -> Result:
         "any size.",
         alt="Friction torque over displacement: one closed loop per amplitude, narrow for small "
         "amplitudes and nearly rectangular for large ones.",
-        panels=tuple(_panel(place, own, display) for place, own in loops),
+        panels=tuple(_panel(place, display) for place in found),
         thesis=("2.11",),
-        across=min(2, len(loops)),
+        across=min(2, len(found)),
     )
     return Result((table,), (figure,), findings, failures_note(data))
 
 
-def _panel(place: Place, loops: list[Loop], display: str) -> Panel:
+def _panel(place: Place, display: str) -> Panel:
     curves = [
-        Curve(
-            loop.displacement,
-            loop.friction,
-            _amplitude(loop.amplitude, display),
-            f"loop-{number}",
-        )
-        for number, loop in enumerate(loops)
+        Curve(loop.displacement, loop.friction, label, f"loop-{number}")
+        for number, item in enumerate(place.trials)
+        for loop in [_loop(item, _windows(item)[-1])]
+        for label in [_amplitude(_amplitude_of(item), display)]
     ]
     return Panel(
         Axis("Displacement", "rad", display),
@@ -209,5 +239,8 @@ EXPERIMENT = Experiment(
     options=PreslidingHysteresisOptions,
     trials=_trials,
     analyse=_analyse,
+    measure=_measure,
+    fit=fitting.presliding,
+    perturbs_bench=True,
     requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

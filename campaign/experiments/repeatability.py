@@ -8,27 +8,37 @@ map as two sets, so that three maps are sets 1 to 6.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.estimate import Estimate, Origin
+from campaign.experiments import fitting
 from campaign.experiments.common import failures_note
-from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.experiments.velocity_map import (
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.systematic import shared_parts
+from campaign.experiments.velocity_map_figures import point_bars
+from campaign.experiments.velocity_map_fits import MapFits, fit_map
+from campaign.experiments.velocity_map_points import measure, points_of, steady
+from campaign.experiments.velocity_map_runs import (
+    CAN_USE,
     DIRECTIONS,
+    OWN,
     REQUIRED,
-    SYMBOLS,
-    DirectionFit,
-    MapPoint,
     VelocityMapOptions,
-    fit_direction,
-    map_points,
     map_trials,
+    settling_notes,
 )
-from campaign.identification.velocity_map import PARAMETERS, UNITS
+from campaign.identification.intervals import of_repeats
+from campaign.identification.scatter import relative_scatter
+from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
+from campaign.identification.velocity_map import doubts
 from campaign.result import (
+    Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -53,62 +63,111 @@ class MapSet:
     Attributes:
         name: of its two sets, e.g. "1-2".
         where: what is particular about it, e.g. `bench.variation.day = 1`.
-        fits: by direction, the exponent free.
+        found: by direction and parameter, the exponent free.
     """
 
     name: str
     where: str
-    points: tuple[MapPoint, ...]
-    fits: Mapping[str, DirectionFit]
+    fits: MapFits
+    found: Mapping[str, Mapping[str, Estimate]]
 
     def value(self, direction: str, parameter: str) -> float:
-        return self.fits[direction].free.values[parameter]
+        return self.found[direction][parameter].value
 
 
 def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
     """The maps in plan order: one for each point of the sweep and each repetition."""
     groups: dict[str, list[TrialData]] = {}
     for item in data.completed():
-        place = {k: v for k, v in item.trial.point.items() if k != "speed"}
+        place = {k: v for k, v in item.trial.point.items() if k not in OWN}
         groups.setdefault(canonical_json([place, item.trial.repeat]), []).append(item)
     for number, group in enumerate(groups.values(), start=1):
         first = group[0].trial
-        place = {k: v for k, v in first.point.items() if k != "speed"}
+        place = {k: v for k, v in first.point.items() if k not in OWN}
         where = ", ".join(f"{path} = {value}" for path, value in place.items())
         name = f"{2 * number - 1}-{2 * number}"
-        points = [point for item in group for point in map_points(item)]
+        bench = bench_of(first)
+        points, _ = steady(points_of(group, bench, notes), notes)
         try:
-            fits = {word: fit_direction(points, sign) for word, sign in DIRECTIONS.items()}
+            fits = fit_map(points, bench)
         except ValueError as error:
             notes.append(f"Sets {name} have no fit: {error}.")
             continue
-        yield MapSet(name, where or f"repetition {first.repeat}", tuple(points), fits)
+        where = where or f"repetition {first.repeat}"
+        yield MapSet(name, where, fits, fits.estimates("free"))
 
 
 def relative_deviation(values: Sequence[float]) -> float:
     """Standard deviation over mean, of these values and no others (n, not n - 1).
 
     Table 4.4's deviations of Tc and vs follow with n from its own columns, and with n - 1 none.
+    NaN where the mean is zero.
     """
-    return float(np.std(values) / np.mean(values))
+    mean = float(np.mean(values))
+    return float(np.std(values)) / mean if mean != 0.0 else math.nan
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
+    notes = [*failures_note(data), *settling_notes(item.trial for item in data.completed())]
     sets = list(_sets(data, notes))
     if not sets:
         return Result(notes=tuple(notes))
     if len(sets) == 1:
         notes.append("One map says nothing about repeatability; repeat it, or sweep the day.")
     for each in sets:
-        for direction, fit in each.fits.items():
-            notes += [f"Sets {each.name}, {direction}: {doubt}." for doubt in fit.free.doubts]
+        for direction, fit in each.fits.fits.items():
+            notes += [f"Sets {each.name}, {direction}: {doubt}." for doubt in doubts(fit)]
     figures = (_overlay(sets), _scatter(sets)) if len(sets) > 1 else (_overlay(sets),)
     return Result((_table(sets),), figures, tuple(_findings(sets)), tuple(notes))
 
 
-def _all_values(sets: Sequence[MapSet], parameter: str) -> list[float]:
-    return [each.value(direction, parameter) for each in sets for direction in DIRECTIONS]
+def _by_map(sets: Sequence[MapSet], parameter: str) -> Array:
+    """Values of a parameter, shape (maps, directions)."""
+    return np.array([[each.value(name, parameter) for name in DIRECTIONS] for each in sets])
+
+
+def _mean(sets: Sequence[MapSet], parameter: str) -> Estimate:
+    """Over all maps and directions; the maps are what repeats, their directions are two numbers.
+
+    Both directions of a map share its day, so that only the mean of each map is a repetition. The
+    bench's constants shift all maps alike.
+    """
+    parts = shared_parts(_found(sets, parameter))
+    values, unit = _by_map(sets, parameter).mean(axis=1), UNITS[parameter]
+    told = of_repeats(parameter, values, unit, "maps", systematic=parts)
+    return _flagged(told, _found(sets, parameter))
+
+
+def _deviation(sets: Sequence[MapSet], parameter: str) -> Estimate:
+    """Relative standard deviation over all maps and directions, as Table 4.4 has it."""
+    told = relative_scatter(parameter, _by_map(sets, parameter))
+    return _flagged(told, _found(sets, parameter))
+
+
+def _found(sets: Sequence[MapSet], parameter: str) -> list[Estimate]:
+    return [each.found[name][parameter] for each in sets for name in DIRECTIONS]
+
+
+def _flagged(told: Estimate, found: Sequence[Estimate]) -> Estimate:
+    """What maps say together, not determined where one of them says nothing of the parameter.
+
+    A value at its bound is not what the data say, and one that is not determined may be any: how
+    these scatter tells nothing. To leave them out would select: of what is nearly zero, only the
+    large values are determined. The number stays, for who wants to see it.
+    """
+    doubtful = [each for each in found if each.origin in (Origin.AT_BOUND, Origin.NOT_DETERMINED)]
+    if not doubtful or math.isnan(told.value):
+        return told
+    origins = " or ".join(dict.fromkeys(str(each.origin) for each in doubtful))
+    reason = f"{len(doubtful)} of {len(found)} values are {origins}"
+    return Estimate(
+        told.name,
+        told.value,
+        told.unit,
+        origin=Origin.NOT_DETERMINED,
+        reason=reason,
+        systematic=told.systematic,
+    )
 
 
 def _findings(sets: Sequence[MapSet]) -> Iterator[Finding]:
@@ -117,16 +176,17 @@ def _findings(sets: Sequence[MapSet]) -> Iterator[Finding]:
         for each in sets:
             for direction in DIRECTIONS:
                 where: dict[str, Value] = {"set": each.name, "direction": direction}
-                yield Finding(parameter, each.value(direction, parameter), UNITS[parameter], where)
+                yield Finding.of(each.found[direction][parameter], where)
         if len(sets) > 1:
-            values = _all_values(sets, parameter)
-            mean, deviation = float(np.mean(values)), relative_deviation(values)
+            deviation = _deviation(sets, parameter)
             deviations.append(deviation)
-            yield Finding(parameter, mean, UNITS[parameter], {"statistic": "mean"})
-            told: dict[str, Value] = {"statistic": "relative standard deviation"}
-            yield Finding(parameter, deviation, "", told)
-    if deviations:
-        yield Finding("relative_standard_deviation", max(deviations), "", {"parameters": "worst"})
+            yield Finding.of(_mean(sets, parameter), {"statistic": "mean"})
+            yield Finding.of(deviation, {"statistic": "relative standard deviation"})
+    if known := [each for each in deviations if each.origin is not Origin.NOT_DETERMINED]:
+        worst = max(known, key=lambda each: each.value)
+        reason = "the largest of several: each has its own interval"
+        told = Estimate.without_interval("relative_standard_deviation", worst.value, "", reason)
+        yield Finding.of(told, {"parameters": "worst"})
 
 
 def _table(sets: Sequence[MapSet]) -> Table:
@@ -139,13 +199,12 @@ def _table(sets: Sequence[MapSet]) -> Table:
     columns += [Column("mean", "Mean"), Column("deviation", "Rel. std. deviation", "", "percent")]
     rows = []
     for parameter in PARAMETERS:
-        values = _all_values(sets, parameter)
-        row: dict[str, Value] = {"parameter": SYMBOLS[parameter], "unit": UNITS[parameter]}
+        row: dict[str, Cell] = {"parameter": SYMBOLS[parameter], "unit": UNITS[parameter]}
         for each in sets:
             for direction in DIRECTIONS:
-                row[f"{direction}_{each.name}"] = each.value(direction, parameter)
-        row["mean"] = float(np.mean(values))
-        row["deviation"] = relative_deviation(values) if len(sets) > 1 else None
+                row[f"{direction}_{each.name}"] = each.found[direction][parameter]
+        row["mean"] = _mean(sets, parameter)
+        row["deviation"] = _deviation(sets, parameter) if len(sets) > 1 else None
         rows.append(row)
     told = "; ".join(f"sets {each.name}: {each.where}" for each in sets)
     return Table(
@@ -154,7 +213,11 @@ def _table(sets: Sequence[MapSet]) -> Table:
         columns=tuple(columns),
         rows=tuple(rows),
         thesis=("4.4",),
-        note=f"{told}. The deviation is taken over all columns, with n; δ is fitted, too.",
+        note=f"{told}. The deviation is taken over all columns, with n; δ is fitted, too. The "
+        "interval of the mean is that of the maps, that of the deviation includes how far the two "
+        "directions are apart, which maps do not change. What the bench's constants may be off by "
+        "shifts all maps alike: it is in the interval of the mean. Neither has one where a map has "
+        "its value at a bound or does not determine it.",
     )
 
 
@@ -166,8 +229,7 @@ def _overlay(sets: Sequence[MapSet]) -> Figure:
     for direction, sign in DIRECTIONS.items():
         curves = []
         for each, word in zip(shown, series, strict=False):
-            fit = each.fits[direction]
-            curves.append(Curve(sign * fit.rate, fit.torque, f"sets {each.name}", word, "points"))
+            curves.append(point_bars(each.fits.fits[direction], f"sets {each.name}", word, sign))
         x = Axis("Rate", "rad/s", "deg/s")
         y = Axis("Friction torque, in its direction", "N m", "N m")
         panels.append(Panel(x, y, curves, f"{direction.capitalize()} direction"))
@@ -190,13 +252,26 @@ def _scatter(sets: Sequence[MapSet]) -> Figure:
     for parameter in SCORED:
         curves = []
         for direction in DIRECTIONS:
-            values = np.array([each.value(direction, parameter) for each in sets])
-            curves.append(Curve(places, values, f"{direction} direction", direction, "points"))
-        everything = _all_values(sets, parameter)
-        mean = float(np.mean(everything))
+            found = [each.found[direction][parameter] for each in sets]
+            low, high = np.array([each.combined for each in found], dtype=float).T
+            values = np.array([each.value for each in found])
+            curves.append(
+                Curve(
+                    places,
+                    values,
+                    f"{direction} direction",
+                    direction,
+                    "points",
+                    low=low,
+                    high=high,
+                )
+            )
+        everything = list(_by_map(sets, parameter).ravel())
+        mean, deviation = float(np.mean(everything)), relative_deviation(everything)
+        told = "its mean is zero" if math.isnan(deviation) else f"{100 * deviation:.1f} %"
         unit = UNITS[parameter]
         axis = Axis(SYMBOLS[parameter], unit, DISPLAY.get(parameter, unit))
-        title = f"{SYMBOLS[parameter]}: {100 * relative_deviation(everything):.1f} %"
+        title = f"{SYMBOLS[parameter]}: {told}"
         panels.append(Panel(number, axis, curves, title, [Mark("mean", y=mean)]))
     return Figure(
         key="scatter",
@@ -216,5 +291,8 @@ EXPERIMENT = Experiment(
     options=VelocityMapOptions,
     trials=map_trials,
     analyse=_analyse,
+    measure=measure,
+    fit=fitting.velocity_map,
     requires=REQUIRED,
+    can_use=CAN_USE,
 )

@@ -9,44 +9,35 @@ threshold says how well it has to be identified, and ranks the parameters (Figur
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
-from campaign.experiments.common import failures_note, method_label, with_changes
+from campaign.estimate import Estimate
+from campaign.experiments import fitting
+from campaign.experiments.common import failures_note, with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.model_variation import model_figures, model_trials
-from campaign.experiments.stabilization import stabilization_error
+from campaign.experiments.pointing_error import error_of, found, measured_part, of_each, windows_of
+from campaign.experiments.sensitivity_results import (
+    SYMBOLS,
+    Response,
+    judge,
+    sensitivity_figure,
+    sensitivity_findings,
+    sensitivity_table,
+)
+from campaign.identification.stabilization_error import over_trials
+from campaign.identification.threshold import Threshold
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import (
-    Array,
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-    Value,
-)
+from campaign.result import Finding, Result, Value
 from campaign.signals import Sine
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, Frequency
 
-SYMBOLS = {
-    "bristle_stiffness": "σ0",
-    "bristle_damping": "σ1",
-    "viscous_friction": "σ2",
-    "static_torque": "Ts",
-    "coulomb_torque": "Tc",
-    "stribeck_velocity": "vs",
-}
 CHANGES = (-0.8, -0.65, -0.5, -0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8)
 
 
@@ -147,76 +138,34 @@ def _trials(options: SensitivityOptions, bench: Bench) -> Iterator[TrialRequest]
                 point={"parameter": parameter, "change": change, "repetition": repetition},
                 note=f"{parameter} {change:+.0%}" if parameter else "the model as it is",
                 bench=tree,
+                windows=windows_of(task),
             )
     if options.model_output:
         yield from model_trials(bench, options, known, _varied)
 
 
-@dataclass(frozen=True)
-class Response:
-    """Error over the change of one parameter; changes increase, 0 among them.
-
-    Attributes:
-        change, error: shape (n,), relative and rad: the mean over repetitions.
-        dots: every trial's (change, error), shape (m, 2).
-    """
-
-    change: Array
-    error: Array
-    dots: Array
+def _measure(data: TrialData) -> list[Estimate]:
+    """The stabilization error; of the model alone there is no metric, only a figure."""
+    if data.trial.task.mode != "rate":
+        return []
+    return found([error_of(measured_part(data), data.trial.task)])
 
 
-def crossing(change: Array, error: Array, threshold: float) -> float | None:
-    """Smallest size of a change at which `error` passes `threshold`, linearly interpolated.
-
-    Both sides are followed outwards from no change, and the nearer crossing counts. 0 when the
-    error is beyond it unchanged; None when it is passed nowhere. Shapes (n,), changes increasing.
-    """
-    middle = int(np.argmin(np.abs(change)))
-    if error[middle] > threshold:
-        return 0.0
-    found = []
-    for side in (range(middle + 1, len(change)), range(middle - 1, -1, -1)):
-        before = middle
-        for here in side:
-            if error[here] > threshold:
-                share = (threshold - error[before]) / (error[here] - error[before])
-                found.append(abs(change[before] + share * (change[here] - change[before])))
-                break
-            before = here
-    return float(min(found)) if found else None
-
-
-def ranking(responses: Mapping[str, Response], threshold: float) -> dict[str, int]:
-    """Rank of each parameter, 1 the most important: by the threshold, then by the largest error."""
-
-    def order(parameter: str) -> tuple[float, float]:
-        response = responses[parameter]
-        passed = crossing(response.change, response.error, threshold)
-        largest = float(np.max(response.error))
-        return (np.inf if passed is None else passed), -largest
-
-    return {name: rank for rank, name in enumerate(sorted(responses, key=order), start=1)}
-
-
-def _responses(measured: Sequence[TrialData], options: SensitivityOptions) -> dict[str, Response]:
+def _responses(measured: Sequence[TrialData]) -> dict[str, Response]:
     """By parameter; the trials with the model as it is belong to every one of them."""
-    errors: dict[str, dict[float, list[float]]] = {}
+    errors: dict[str, dict[float, list[Estimate]]] = {}
     for data in measured:
-        if data.trial.task.mode != "rate":
-            continue
-        cut = data.recording().window(*data.trial.task.window)
-        error = stabilization_error(cut, options.frequency)
-        place = errors.setdefault(str(data.trial.point["parameter"]), {})
-        place.setdefault(float(str(data.trial.point["change"])), []).append(error)
+        for error in of_each([data], _measure, "stabilization_error"):
+            place = errors.setdefault(str(data.trial.point["parameter"]), {})
+            place.setdefault(float(str(data.trial.point["change"])), []).append(error)
     unchanged = errors.pop("", {})
     responses = {}
     for parameter, by_change in errors.items():
         ordered = sorted({**unchanged, **by_change}.items())
         responses[parameter] = Response(
             change=np.array([change for change, _ in ordered]),
-            error=np.array([float(np.mean(values)) for _, values in ordered]),
-            dots=np.array([(change, value) for change, values in ordered for value in values]),
+            errors=tuple(over_trials(each) for _, each in ordered),
+            dots=np.array([(change, one.value) for change, each in ordered for one in each]),
         )
     return responses if unchanged else {}
 
@@ -227,22 +176,20 @@ def _analyse(data: TestData) -> Result:
     if not measured:
         return Result(notes=tuple(notes))
     options = SensitivityOptions.model_validate(measured[0].trial.options, context={"si": True})
-    responses = _responses(measured, options)
+    responses = _responses(measured)
     figures = tuple(model_figures(measured, options.compensation))
     if not responses:
         notes.append("No trial with the unchanged model completed: there is nothing to compare.")
         return Result(figures=figures, notes=tuple(notes))
-    first = next(iter(responses.values()))
-    unchanged = float(first.error[np.argmin(np.abs(first.change))])
+    unchanged = next(iter(responses.values())).unchanged
     ratio = options.threshold_ratio
-    threshold = options.threshold if ratio is None else ratio * unchanged
-    if unchanged > threshold:
+    limit = Threshold(options.threshold if ratio is None else ratio * unchanged.value, ratio)
+    if unchanged.value > limit.value:
         notes.append(
-            f"The error is {unchanged * 1e3:.3g} mrad with the unchanged model, already beyond "
-            f"the threshold of {threshold * 1e3:.3g} mrad; no change has a meaning then."
+            f"The error is {unchanged.value * 1e3:.3g} mrad with the unchanged model, already "
+            f"beyond the threshold of {limit.value * 1e3:.3g} mrad; no change has a meaning then."
         )
-    ranks = ranking(responses, threshold)
-    rows = [_row(name, responses[name], ranks[name], threshold, unchanged) for name in responses]
+    judged = judge(responses, limit)
     told: dict[str, Value] = {
         "compensation": options.compensation,
         "frequency": options.frequency,
@@ -250,106 +197,16 @@ def _analyse(data: TestData) -> Result:
     }
     findings: list[Finding] = []
     if len(measured) == len(data.trials):
-        findings += _findings(rows, told)
+        findings += sensitivity_findings(judged, told)
     else:
         notes.append("Thresholds and ranks are not compared: they need every trial.")
-    findings.append(Finding("stabilization_error", unchanged, "rad", told))
+    findings.append(Finding.of(unchanged, told))
     notes += _skipped_notes(measured, options)
     return Result(
-        (_table(rows, threshold),),
-        (*figures, _figure(responses, ranks, threshold, options)),
+        (sensitivity_table(judged, limit),),
+        (*figures, sensitivity_figure(judged, limit, options.compensation)),
         tuple(findings),
         tuple(notes),
-    )
-
-
-def _row(
-    name: str, response: Response, rank: int, threshold: float, unchanged: float
-) -> dict[str, Value]:
-    passed = crossing(response.change, response.error, threshold)
-    reach = float(min(-response.change[0], response.change[-1]))
-    low = float(response.error[0])
-    high = float(response.error[-1])
-    return {
-        "parameter": name,
-        "symbol": SYMBOLS.get(name, name),
-        "threshold": passed,
-        "reach": reach,
-        "rank": rank,
-        "unchanged": unchanged,
-        "lowest_change": float(response.change[0]),
-        "low": low,
-        "highest_change": float(response.change[-1]),
-        "high": high,
-        "said": "" if passed is not None else f"none below {reach:.0%}",
-    }
-
-
-def _findings(rows: Sequence[Mapping[str, Value]], told: Mapping[str, Value]) -> Iterator[Finding]:
-    """Threshold and rank. Where nothing passes, the largest change tried is a lower bound."""
-    for row in rows:
-        where = {**told, "parameter": row["parameter"]}
-        passed, reach = row["threshold"], row["reach"]
-        bound = passed if isinstance(passed, float) else reach
-        beyond = passed is None
-        yield Finding("sensitivity_threshold", float(str(bound)), "", where, lower_bound=beyond)
-        yield Finding("sensitivity_rank", float(str(row["rank"])), "", where)
-
-
-def _table(rows: Sequence[Mapping[str, Value]], threshold: float) -> Table:
-    return Table(
-        key="sensitivity",
-        title=f"Change of each parameter at which the error passes {threshold * 1e3:.3g} mrad",
-        columns=(
-            Column("symbol", "Parameter"),
-            Column("parameter", "Name"),
-            Column("threshold", "Change", "", "percent"),
-            Column("said", "Within the changes tried"),
-            Column("rank", "Rank"),
-            Column("unchanged", "Error, unchanged", "rad", "mrad"),
-            Column("lowest_change", "Largest decrease", "", "percent"),
-            Column("low", "Error there", "rad", "mrad"),
-            Column("highest_change", "Largest increase", "", "percent"),
-            Column("high", "Error there", "rad", "mrad"),
-        ),
-        rows=tuple(sorted(rows, key=lambda row: float(str(row["rank"])))),
-        thesis=("figure 5.14",),
-        note="The smaller of decrease and increase counts, interpolated between the changes tried. "
-        "Parameters that never pass are ranked by their largest error.",
-    )
-
-
-def _figure(
-    responses: Mapping[str, Response],
-    ranks: Mapping[str, int],
-    threshold: float,
-    options: SensitivityOptions,
-) -> Figure:
-    top = 1.08 * max(float(np.max(r.dots[:, 1])) for r in responses.values())
-    error = Axis("Stabilization error (1σ)", "rad", "mrad", limits=(0.0, max(top, 1.1 * threshold)))
-    panels = []
-    for name, response in responses.items():
-        symbol = SYMBOLS.get(name, name)
-        passed = crossing(response.change, response.error, threshold)
-        marks = [Mark(f"{threshold * 1e3:.3g} mrad", y=threshold)]
-        said = "not passed" if passed is None else f"passes at {passed:.0%}"
-        mean = Curve(response.change, response.error, "mean", "measured", "line")
-        dots = Curve(response.dots[:, 0], response.dots[:, 1], "each trial", "measured", "points")
-        curves = [mean, dots] if options.repeats > 1 else [mean]
-        change = Axis(f"Change of {symbol}", "", "percent")
-        title = f"{symbol}: {said}, rank {ranks[name]}"
-        panels.append(Panel(change, error, curves, title, marks))
-    return Figure(
-        key="sensitivity",
-        title=f"Error over the change of each parameter, {method_label(options.compensation)}",
-        caption="Each panel changes one parameter of the compensation's model and leaves the "
-        "others and the true friction alone. The steeper the valley, the better the parameter has "
-        "to be known; the horizontal line is the threshold. All panels have one scale.",
-        alt="Stabilization error over the relative change of each model parameter, one panel per "
-        "parameter, with a dot for every trial and a line at the threshold.",
-        panels=tuple(panels),
-        thesis=("5.14",),
-        across=2,
     )
 
 
@@ -371,6 +228,9 @@ EXPERIMENT = Experiment(
     options=SensitivityOptions,
     trials=_trials,
     analyse=_analyse,
+    fit=fitting.base_motion,
+    perturbs_bench=True,
+    measure=_measure,
     requires={POINTING_ERROR: "the stabilization error"},
     can_use={
         COMPENSATION_TORQUE: "figures of the model alone",

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import COMMAND, GYRO_RATE
+from campaign.estimate import Estimate, Window
+from campaign.experiments import fitting
 from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
-from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.identification.step_response import StepCharacteristics, step_characteristics
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.identification.intervals import of_repeats
+from campaign.identification.sampled import where_it_scatters
+from campaign.identification.step_response import step_characteristics
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (
     Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -29,7 +34,7 @@ from campaign.result import (
     Value,
 )
 from campaign.signals import Polyline
-from campaign.trial import Task, Tree, TrialRequest
+from campaign.trial import Recording, Task, Tree, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 SHOWN = 2.5
@@ -79,7 +84,46 @@ def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest
         ),
         bench=_without_friction(bench) if options.linear else None,
         note="without the bench's friction" if options.linear else "",
+        windows=tuple(_windows(options)),
     )
+
+
+REST, ANSWER = "rest", "answer"
+"""Windows: standstill before the step, and all that follows it."""
+
+
+def _windows(options: StepResponseOptions) -> Iterator[Window]:
+    """For the plan, and for archived trials that are older than windows."""
+    yield Window(REST, 0.0, options.rest)
+    yield Window(ANSWER, options.rest, options.rest + options.duration)
+
+
+def _answer(trial: Trial) -> Window:
+    windows = trial.windows or _windows(_options(trial))
+    return next(window for window in windows if window.name == ANSWER)
+
+
+def _options(trial: Trial) -> StepResponseOptions:
+    return StepResponseOptions.model_validate(trial.options, context={"si": True})
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """Rise, settling, overshoot and what error stays; without those that were not seen."""
+    options = _options(data.trial)
+    recording = data.recording()
+    found = step_characteristics(
+        recording.time, recording[GYRO_RATE], _answer(data.trial).start, options.step, options.band
+    )
+    values = ((name, float(getattr(found, name)), unit) for name, unit in QUANTITIES)
+    return tuple(
+        Estimate(name, value, unit, reason=ONE_STEP)
+        for name, value, unit in values
+        if math.isfinite(value)
+    )
+
+
+ONE_STEP = "it is of one step: repeats would show how it scatters"
+NOT_SEEN = "not every step was seen to do that before its recording ended"
 
 
 def _without_friction(bench: Bench) -> Tree:
@@ -101,15 +145,17 @@ class Step:
     rate: Array
     command: Array | None
     options: StepResponseOptions
-    found: StepCharacteristics
+    found: Mapping[str, Estimate]
+
+    def value(self, name: str) -> float:
+        """A characteristic by name; NaN where it was not seen."""
+        return self.found[name].value if name in self.found else math.nan
 
 
 def _evaluate(data: TrialData, paths: list[str]) -> Step:
-    options = StepResponseOptions.model_validate(data.trial.options, context={"si": True})
-    recording = data.recording()
-    found = step_characteristics(
-        recording.time, recording[GYRO_RATE], options.rest, options.step, options.band
-    )
+    options = _options(data.trial)
+    found = metrics(data, _measure)
+    recording: Recording = data.recording()  # for the figure
     place = conditions(data, "compensation", "linear")
     words = ["linear loop" if options.linear else "with friction"]
     if options.compensation != "none" or "compensation" in paths:
@@ -121,7 +167,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
         place,
         label,
         "measured" if plain else label,
-        recording.time - options.rest,
+        recording.time - _answer(data.trial).start,
         recording[GYRO_RATE],
         recording[COMMAND] if COMMAND in recording.channels else None,
         options,
@@ -149,28 +195,35 @@ def _analyse(data: TestData) -> Result:
             notes.append(f"{group[0].trial.label}: {error}.")
             continue
         steps += repeats
-        for name, unit in QUANTITIES:
-            mean = float(np.mean([getattr(step.found, name) for step in repeats]))
-            findings.append(Finding(name, mean, unit, repeats[0].place))
+        findings += (
+            Finding.of(_together(repeats, name, unit), repeats[0].place)
+            for name, unit in QUANTITIES
+        )
     if not steps:
         return Result(notes=tuple(notes))
     notes += [
         f"{step.label[0].upper()}{step.label[1:]}: the rate does not stay within "
         f"{100 * step.options.band:g} % of the step."
         for step in steps
-        if not math.isfinite(step.found.settling_time)
+        if not math.isfinite(step.value("settling_time"))
     ]
     tables = (_table(steps, [path for path in paths if path not in ("linear", "compensation")]),)
     return Result(tables, (_figure(steps),), tuple(findings), tuple(dict.fromkeys(notes)))
 
 
+def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
+    """Mean of a characteristic over repeated steps, with the interval of their scatter."""
+    values = [step.value(name) for step in repeats]
+    if not all(map(math.isfinite, values)):
+        return Estimate.without_interval(name, math.nan, unit, NOT_SEEN)
+    return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
+
+
 def _table(steps: list[Step], extra: list[str]) -> Table:
-    rows: list[dict[str, Value]] = []
+    rows: list[Mapping[str, Cell]] = []
     for step in steps:
-        values = {name: getattr(step.found, name) for name, _ in QUANTITIES}
-        finite = {name: v if math.isfinite(v) else None for name, v in values.items()}
         loop = "without friction" if step.options.linear else "with friction"
-        rows.append({**step.place, "loop": loop, **finite})
+        rows.append({**step.place, "loop": loop, **step.found})
     band = 100 * steps[0].options.band
     return Table(
         key="step-response",
@@ -178,7 +231,7 @@ def _table(steps: list[Step], extra: list[str]) -> Table:
         columns=(
             Column("loop", "Loop"),
             Column("compensation", "Compensation"),
-            *(Column(path, path) for path in extra),
+            *(Column(path, path, exact=True) for path in extra),
             Column("rise_time", "Rise time (10 to 90 %)", "s", "ms"),
             Column("settling_time", f"Settling time ({band:g} %)", "s", "ms"),
             Column("overshoot", "Overshoot", "", "percent"),
@@ -186,13 +239,15 @@ def _table(steps: list[Step], extra: list[str]) -> Table:
         ),
         rows=tuple(rows),
         thesis=(),
-        note="Times count from the start of the step.",
+        note="Times count from the start of the step. Each row is one step; what repeats of it say "
+        "together, with intervals, is among the findings.",
     )
 
 
 def _figure(steps: list[Step]) -> Figure:
     first = steps[0]
-    settled = [s.found.settling_time for s in steps if math.isfinite(s.found.settling_time)]
+    times = [step.value("settling_time") for step in steps]
+    settled = [time for time in times if math.isfinite(time)]
     end = min(SHOWN * max(settled), first.options.duration) if settled else first.options.duration
     height = first.options.step
     curves = []
@@ -204,8 +259,8 @@ def _figure(steps: list[Step]) -> Figure:
         Mark(f"±{100 * band:g} %", y=height * (1 + band)),
         Mark("", y=height * (1 - band)),
     ]
-    if math.isfinite(first.found.settling_time):
-        marks.append(Mark("settled", x=first.found.settling_time))
+    if math.isfinite(times[0]):
+        marks.append(Mark("settled", x=times[0]))
     return Figure(
         key="step",
         title="Step response of the rate loop",
@@ -231,6 +286,9 @@ EXPERIMENT = Experiment(
     options=StepResponseOptions,
     trials=_trials,
     analyse=_analyse,
+    measure=_measure,
+    fit=fitting.step_response,
+    perturbs_bench=True,
     requires={GYRO_RATE: "the response"},
     can_use={COMMAND: "command in the figure"},
 )

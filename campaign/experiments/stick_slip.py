@@ -6,21 +6,44 @@ spring because sliding friction is smaller, and sticks again (Figure 2.12).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.estimate import Estimate
 from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import in_models, model_series, places
+from campaign.experiments.friction_models import (
+    OF_ONE,
+    Place,
+    combined,
+    in_models,
+    model_series,
+    places,
+    simulated,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.identification.intervals import of_repeats, shifted_by
+from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table, Value
+from campaign.result import (
+    Array,
+    Axis,
+    Cell,
+    Column,
+    Curve,
+    Figure,
+    Finding,
+    Panel,
+    Result,
+    Table,
+)
 from campaign.signals import Polyline
-from campaign.trial import Recording, Task, TrialRequest
+from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Frequency, RotationalStiffness, Time
 
 
@@ -36,7 +59,7 @@ class StickSlipOptions(Options):
     slip_rate: AngularRate = Field(default=0.02, gt=0)
     """Rate of the load that counts as a slip."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
-    """Rate of the recording; slips are timed to one sample."""
+    """Rate of the recording; slips are timed between two samples."""
     models: tuple[str, ...] = ()
     """Friction models to describe the bench's friction by, one after the other; none: its own."""
 
@@ -58,59 +81,64 @@ def _trials(options: StickSlipOptions, bench: Bench) -> Iterator[TrialRequest]:
         )
 
 
-@dataclass(frozen=True)
-class StickSlip:
-    """What one pull shows; NaN where it never came to that.
-
-    Attributes:
-        slips: how many there were.
-        first_slip: time of the first (s).
-        period: mean time between slips (s). The first is left out: its spring began unstretched.
-        peak_torque: largest torque of the spring (N m).
-        top_rate: largest rate of the load (rad/s).
-    """
-
-    slips: int
-    first_slip: float
-    period: float
-    peak_torque: float
-    top_rate: float
+UNITS = {"first_slip": "s", "period": "s", "peak_torque": "N m", "top_rate": "rad/s"}
+"""What a pull shows: time of the first slip, mean time between slips (without the first, whose
+spring began unstretched), largest torque of the spring, and largest rate of the load."""
+OF_SLIPS = ("first_slip", "period")
+PREFIX = "stick_slip_"
 
 
-def slip_times(recording: Recording, slip_rate: float) -> list[float]:
-    """Times (s) at which the load passes `slip_rate` (rad/s) upwards."""
-    fast = recording[LOAD_RATE] > slip_rate
-    return [float(t) for t in recording.time[1:][fast[1:] & ~fast[:-1]]]
-
-
-def _measure(data: TrialData) -> StickSlip:
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    """The number of slips, and what `UNITS` names as far as the pull came to it."""
     options = StickSlipOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
-    times = slip_times(recording, options.slip_rate)
-    return StickSlip(
-        slips=len(times),
-        first_slip=times[0] if times else float("nan"),
-        period=float(np.mean(np.diff(times[1:]))) if len(times) > 2 else float("nan"),
-        peak_torque=float(np.max(recording[DRIVE_TORQUE])),
-        top_rate=float(np.max(recording[LOAD_RATE])),
-    )
+    rate = recording[LOAD_RATE]
+    peaks = peak("peak_torque", recording[DRIVE_TORQUE], "N m"), peak("top_rate", rate, "rad/s")
+    if not np.all(np.isfinite(rate)):  # nobody knows how many slips were lost
+        return simulated(replace(each, name=PREFIX + each.name) for each in peaks)
+    times, before = upward_crossings(recording.time, rate, options.slip_rate)
+    step = 1.0 / data.trial.task.sample_rate
+    slips = Estimate("slips", float(len(times)), "", kind="count", reason="counted")
+    found = [slips, *peaks]
+    if len(times):
+        ends = float(before[0]), float(before[0]) + step
+        method = "where the rate rises, between two samples"
+        found.append(bracketed("first_slip", float(times[0]), "s", ends, method))
+    if len(times) > 2:
+        found.append(_period(np.diff(times[1:]), step))
+    return simulated(replace(each, name=PREFIX + each.name) for each in found)
 
 
-UNITS = {"first_slip": "s", "period": "s", "peak_torque": "N m", "top_rate": "rad/s"}
+def _period(between: Array, step: float) -> Estimate:
+    """Mean time between slips (s) from each of them, shape (n,), timed to one `step` (s)."""
+    mean, one = float(np.mean(between)), step / len(between)
+    if len(between) == 1:
+        method = "one time between slips, each between two samples"
+        return bracketed("period", mean, "s", (mean - one, mean + one), method)
+    # The first and the last slip err by at most a step each; a triangular distribution of both.
+    found = of_repeats("period", between, "s", "times between slips")
+    return shifted_by(found, SAMPLES, one / math.sqrt(6.0))
 
 
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), own=())
     if not found:
         return Result(notes=failures_note(data))
-    measured = [(place, _measure(place.trials[0])) for place in found]
-    rows: list[dict[str, Value]] = [{**place.point, **vars(m)} for place, m in measured]
+    measured = [(place, _shown(place)) for place in found]
+    rows: list[dict[str, Cell]] = [
+        {
+            **place.point,
+            "slips": _count(m["slips"].value),
+            **{name: m[name] for name in UNITS},
+        }
+        for place, m in measured
+    ]
     table = Table(
         key="stick-slip",
         title="Stick-slip of a load pulled through a spring",
         columns=(
             *found[0].columns,
-            Column("slips", "Slips"),
+            Column("slips", "Slips", exact=True),
             Column("first_slip", "First slip", "s", "s"),
             Column("period", "Period", "s", "s"),
             Column("peak_torque", "Largest torque of the spring", "N m", "N m"),
@@ -118,21 +146,39 @@ def _analyse(data: TestData) -> Result:
         ),
         rows=tuple(rows),
         note="The period is the mean time between slips after the first one, which started from "
-        "an unstretched spring.",
+        "an unstretched spring. " + OF_ONE,
     )
     findings = tuple(
-        Finding(f"stick_slip_{quantity}", float(getattr(m, quantity)), unit, place.point)
+        Finding.of(replace(m[name], name=PREFIX + name), place.point)
         for place, m in measured
-        for quantity, unit in UNITS.items()
+        for name in UNITS
     )
     notes = tuple(
         f"{place.label or 'The load'}: fewer than three slips, so there is no period; pull longer, "
         "slower, or through a softer spring."
         for place, m in measured
-        if m.slips < 3
+        if math.isnan(m["period"].value) and not math.isnan(m["slips"].value)
     )
     shown = [(place.label, str(place.point.get("model", "")), place.trials[0]) for place in found]
     return Result((table,), (_figure(shown),), findings, failures_note(data) + notes)
+
+
+def _count(slips: float) -> int | float:
+    """A mean of repeats may be no whole number."""
+    return int(slips) if slips.is_integer() else slips
+
+
+def _shown(place: Place) -> dict[str, Estimate]:
+    """What the pulls of a place show, by name; what they did not come to is not determined."""
+    found = {
+        name.removeprefix(PREFIX): each for name, each in combined(place.trials, _measure).items()
+    }
+    counted = "slips" in found
+    for name, unit in {"slips": "", **UNITS}.items():
+        if name not in found:
+            reason = "there were too few slips" if counted and name in OF_SLIPS else LOST
+            found[name] = Estimate.without_interval(name, math.nan, unit, reason)
+    return found
 
 
 def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
@@ -170,6 +216,7 @@ EXPERIMENT = Experiment(
     options=StickSlipOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
     requires={
         LOAD_RATE: "the slips",
         DRIVE_TORQUE: "the torque of the spring",
@@ -178,4 +225,5 @@ EXPERIMENT = Experiment(
         RELATIVE_ANGLE: "angle of the load in the figure",
         COMMAND: "far end of the spring in the figure",
     },
+    measure=_measure,
 )

@@ -8,20 +8,32 @@ sliding (Figure 2.9, Equation 4.6); what the measurement adds is that it does ge
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
+from campaign.estimate import Estimate
 from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import Place, in_models, places
-from campaign.experiments.interface import Experiment, TestData, bench_of
+from campaign.experiments.friction_models import (
+    OF_ONE,
+    Place,
+    combined,
+    in_models,
+    places,
+    simulated,
+)
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.identification.intervals import of_series
+from campaign.identification.sampled import largest, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import (
     Array,
     Axis,
+    Cell,
     Column,
     Curve,
     Figure,
@@ -29,12 +41,12 @@ from campaign.result import (
     Panel,
     Result,
     Table,
-    Value,
 )
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
+OF_THE_MODEL = "worked out from the model of the bench, and not measured"
 OWN = ("speed",)
 RAMP = 0.1
 """s, from rest to the speed."""
@@ -90,37 +102,71 @@ def _trials(options: StribeckCurveOptions, bench: Bench) -> Iterator[TrialReques
                 )
 
 
-def _points(place: Place) -> tuple[Array, Array]:
-    """Rate (rad/s) and mean friction torque (N m) of each run, both signed; (n,), by rate."""
-    points = []
-    for item in place.trials:
-        cut = item.recording().window(*item.trial.task.window)
-        points.append((float(np.mean(cut[LOAD_RATE])), float(np.mean(cut[FRICTION_TORQUE]))))
-    rate, torque = np.array(sorted(points)).T
-    return rate, torque
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    """Mean rate (rad/s) and mean friction torque (N m) of the reading, both signed."""
+    cut = data.recording().window(*data.trial.task.window)
+    found = (
+        of_series("rate", cut[LOAD_RATE], "rad/s"),
+        of_series("friction_torque", cut[FRICTION_TORQUE], "N m"),
+    )
+    return simulated(where_it_scatters(each, abs(each.value)) for each in found)
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Readings by rate, both signed, repeats together.
+
+    Attributes:
+        promised: friction of steady sliding by the bench's own model (N m), shape (n,).
+        deviations: share by which each reading is off that, whatever the sign.
+    """
+
+    rates: tuple[Estimate, ...]
+    torques: tuple[Estimate, ...]
+    promised: Array
+    deviations: tuple[Estimate, ...]
+
+    @property
+    def rate(self) -> Array:
+        """rad/s, shape (n,)."""
+        return np.array([each.value for each in self.rates])
+
+
+def _points(place: Place) -> _Points:
+    found = [combined(trials, _measure) for trials in place.by("speed").values()]
+    rates = tuple(each["rate"] for each in found)
+    torques = tuple(each["friction_torque"] for each in found)
+    rate = np.array([each.value for each in rates])
+    promised = np.add(*steady_friction(bench_of(place.trials[0].trial), rate))
+    return _Points(rates, torques, promised, tuple(map(_deviation, torques, promised)))
+
+
+def _deviation(torque: Estimate, promised: float) -> Estimate:
+    error = None if torque.standard_error is None else torque.standard_error / abs(float(promised))
+    value = abs(torque.value / float(promised) - 1.0)
+    return replace(torque, value=value, unit="", low=None, high=None, standard_error=error)
+
+
+def _largest_deviation(points: _Points) -> Estimate:
+    found = largest("stribeck_deviation", points.deviations, "")
+    low = None if found.low is None else max(found.low, 0.0)
+    return replace(found, low=low, systematic=points.deviations[0].systematic)
 
 
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), OWN)
     if not found:
         return Result(notes=failures_note(data))
-    rows: list[dict[str, Value]] = []
+    rows: list[dict[str, Cell]] = []
     findings, panels = [], []
     for place in found:
-        rate, torque = _points(place)
-        promised = np.add(*steady_friction(bench_of(place.trials[0].trial), rate))
+        points = _points(place)
         rows += [
-            {
-                **place.point,
-                "rate": float(v),
-                "torque": float(t),
-                "curve": float(p),
-            }
-            for v, t, p in zip(rate, torque, promised, strict=True)
+            {**place.point, "rate": v, "torque": t, "curve": float(p)}
+            for v, t, p in zip(points.rates, points.torques, points.promised, strict=True)
         ]
-        largest = float(np.max(np.abs(torque / promised - 1.0)))
-        findings.append(Finding("stribeck_deviation", largest, "", place.point))
-        panels.append(_panel(place, rate, torque))
+        findings.append(Finding.of(_largest_deviation(points), place.point))
+        panels.append(_panel(place, points))
     worst = max(finding.value for finding in findings)
     table = Table(
         key="stribeck-curve",
@@ -129,10 +175,12 @@ def _analyse(data: TestData) -> Result:
             *found[0].columns,
             Column("rate", "Rate", "rad/s", "deg/s"),
             Column("torque", "Friction torque", "N m", "N m"),
-            Column("curve", "Stribeck curve", "N m", "N m"),
+            Column("curve", "Stribeck curve", "N m", "N m", reason=OF_THE_MODEL),
         ),
         rows=tuple(rows),
-        note=f"Measured torque and curve agree within {max(worst, 1e-12):.0e} of the torque.",
+        note=f"Measured torque and curve agree within {max(worst, 1e-12):.0e} of the torque. A "
+        "reading is the friction over the travel of its window; a ripple over position that is "
+        f"longer than that stays in it. {OF_ONE}",
     )
     figure = Figure(
         key="stribeck-curve",
@@ -149,18 +197,17 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), (figure,), tuple(findings), failures_note(data))
 
 
-def _panel(place: Place, rate: Array, torque: Array) -> Panel:
+def _panel(place: Place, points: _Points) -> Panel:
     bench = bench_of(place.trials[0].trial)
-    speed = np.abs(rate)
+    speed = np.abs(points.rate)
     fine = np.geomspace(speed.min() / SHOWN, speed.max() * SHOWN, 400)
     dry, viscous = steady_friction(bench, fine)
-    forwards, backwards = rate > 0, rate < 0
     curves = [
         Curve(fine, dry + viscous, "s(v) + σ2 v", "fit"),
         Curve(fine, dry, "Stribeck part s(v)", "alternative", "thin"),
         Curve(fine, viscous, "viscous part σ2 v", "reference", "thin"),
-        Curve(speed[forwards], torque[forwards], "positive direction", "positive", "points"),
-        Curve(speed[backwards], -torque[backwards], "negative direction", "negative", "points"),
+        _direction(points, +1.0, "positive"),
+        _direction(points, -1.0, "negative"),
     ]
     lower = -np.add(*steady_friction(bench, -fine))
     if not np.allclose(lower, dry + viscous):
@@ -173,11 +220,33 @@ def _panel(place: Place, rate: Array, torque: Array) -> Panel:
     )
 
 
+def _direction(points: _Points, sign: float, name: str) -> Curve:
+    """The readings of one direction over their speeds, with their intervals."""
+    chosen = [
+        _signed(torque, sign)
+        for rate, torque in zip(points.rate, points.torques, strict=True)
+        if rate * sign > 0
+    ]
+    speeds = np.abs(points.rate[points.rate * sign > 0])
+    return Curve.of(speeds, chosen, f"{name} direction", name)
+
+
+def _signed(torque: Estimate, sign: float) -> Estimate:
+    """The torque as it is, or of the other sign."""
+    if sign > 0:
+        return torque
+    low = None if torque.high is None else -torque.high
+    high = None if torque.low is None else -torque.low
+    return replace(torque, value=-torque.value, low=low, high=high)
+
+
 EXPERIMENT = Experiment(
     name="stribeck_curve",
     summary="friction of steady sliding at constant speeds, beside the model's curve (Figure 2.9)",
     options=StribeckCurveOptions,
     trials=_trials,
     analyse=_analyse,
+    perturbs_bench=True,
     requires={FRICTION_TORQUE: "the friction of each point", LOAD_RATE: "the rate of each point"},
+    measure=_measure,
 )

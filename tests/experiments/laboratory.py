@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from campaign.backends.sim import SimBackend, SimOptions
+from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import channels_of
-from campaign.result import Finding, Result, Table
+from campaign.result import Finding, Result, Table, bare
 from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
 
 Tree = dict[str, Any]
@@ -24,6 +25,7 @@ class Done:
     trial: Trial
     ending: Ending
     samples: Recording
+    estimates: tuple[Estimate, ...] = ()
 
     def recording(self) -> Recording:
         return self.samples
@@ -53,6 +55,7 @@ def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},
                     note=request.note,
                     requires=requires,
                     can_use=can_use,
+                    windows=request.windows,
                 )
             )
     return found
@@ -78,6 +81,13 @@ def failed(item: Done) -> Done:
 
 
 def table(result: Result, key: str) -> Table:
+    """A table of the result with bare values in its cells."""
+    found = table_of_estimates(result, key)
+    rows = tuple({name: bare(cell) for name, cell in row.items()} for row in found.rows)
+    return replace(found, rows=rows)
+
+
+def table_of_estimates(result: Result, key: str) -> Table:
     return next(table for table in result.tables if table.key == key)
 
 

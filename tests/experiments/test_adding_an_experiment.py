@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from campaign.experiments import experiments
-from campaign.experiments.interface import Experiment, TestData
+from campaign.experiments.interface import (
+    Experiment,
+    TestData,
+    bench_of,
+    options_of,
+)
 from campaign.options import describe
 from campaign.protocol import check_limits, load_protocol, make_plan
+from campaign.trial import Most
 from tests.experiments.laboratory import execute, failed, table
 
 ROOT = Path(__file__).parents[2]
@@ -56,6 +64,29 @@ def test_the_example_runs_and_finds_the_friction(experiment: Experiment, tmp_pat
     nothing = experiment.analyse(TestData("", "", {}, tuple(map(failed, done))))
     assert not nothing.figures
     assert "did not complete" in nothing.notes[0]
+
+
+def test_the_stage_on_the_page_finds_the_push_for_its_speed(
+    experiment: Experiment, tmp_path: Path
+) -> None:
+    """The rate is a straight line over the torque between two pushes."""
+    names = dict(experiment.trials.__globals__)  # type: ignore[attr-defined]
+    exec(compile(block("python stage"), "page", "exec"), names)
+    stage = names["STAGE"]
+    protocol = tmp_path / "my.toml"
+    protocol.write_text(block("toml protocol").split("[test.matrix]")[0], encoding="utf-8")
+    staged = replace(experiment, stages=(stage,))
+    registry = {**experiments(), experiment.name: staged}
+    plan = make_plan(load_protocol(protocol, registry, shipped=ROOT / "protocols"))
+    assert plan.following == Most(1, 2.8, 2800)
+    done = execute(plan.trials)
+    rig = bench_of(plan.trials[0])
+    options = options_of(staged, plan.trials[0].options)
+    (request,) = stage.trials(options, rig, TestData("", "", {}, done))
+    result = experiment.analyse(TestData("", "", {}, done))
+    slow, fast = (float(str(row["rate"])) for row in table(result, "coast-down").rows)
+    share = (np.deg2rad(20.0) - slow) / (fast - slow)
+    assert request.point["torque"] == pytest.approx(50.0 + 20.0 * share, abs=1e-3)
 
 
 def test_the_example_documents_its_options(experiment: Experiment) -> None:

@@ -105,7 +105,8 @@ class Loss:
     columns: tuple[tuple[str, str], ...] = ()
 
 
-STUCK = Loss(figures=("relative-rate",), columns=(("stabilization-error", "stuck"),))
+STUCK = Loss(columns=(("stabilization-error", "stuck"),))
+RELATIVE = Loss(figures=("relative-rate",))
 LOSSES = {
     ("move", "relative_angle"): Loss(columns=(("moves", "reached"), ("moves", "deviation"))),
     ("observer_gain", "friction_torque"): Loss(
@@ -113,14 +114,18 @@ LOSSES = {
     ),
     ("sensitivity", "compensation_torque"): Loss(figures=("model-dynamic", "model-static")),
     ("sensitivity", "relative_rate"): Loss(figures=("model-static",)),
-    ("stabilization", "base_rate"): STUCK,
-    ("stabilization", "relative_rate"): STUCK,
+    ("stabilization", "base_rate"): replace(RELATIVE, columns=STUCK.columns),
+    ("stabilization", "relative_rate"): RELATIVE,
+    ("stabilization", "relative_angle"): STUCK,
+    ("stabilization", "gyro_rate"): STUCK,
     ("stabilization", "compensation_torque"): Loss(figures=("compensation-torque",)),
     ("stabilization", "friction_torque"): Loss(curves=("compensation-torque",)),
     ("step_response", "command"): Loss(curves=("step",)),
     ("stick_slip", "command"): Loss(curves=("stick-slip",)),
     ("stick_slip", "relative_angle"): Loss(curves=("stick-slip",)),
     ("velocity_map", "command"): Loss(curves=("one-point",)),
+    ("velocity_map", "relative_angle"): Loss(),  # this bench has no ripple
+    ("repeatability", "relative_angle"): Loss(),
 }
 
 NOT_FATAL = {("observer_gain", "load_rate")}

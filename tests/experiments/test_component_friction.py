@@ -79,6 +79,48 @@ def test_trials_scatter_and_the_deviation_is_theirs() -> None:
     assert not [f for f in result.findings if f.quantity == "load_share"]
 
 
+def test_a_deviation_of_ten_readings_is_one_draw() -> None:
+    """Chi-square with nine: 0.688 to 1.826 of s, which divides by nine."""
+    result = result_of(scattering, components=["load"], measurements=10)
+    found = finding(result, "breakaway_torque", statistic="standard deviation").estimate
+    assert found is not None
+    assert found.low == pytest.approx(0.688 * found.value * np.sqrt(10 / 9), rel=2e-3)
+    assert found.high == pytest.approx(1.826 * found.value * np.sqrt(10 / 9), rel=2e-3)
+    mean = finding(result, "breakaway_torque", statistic="mean").estimate
+    assert mean is not None
+    assert mean.half_width == pytest.approx(2.262 * found.value / 3.0, rel=1e-3)
+
+
+def test_a_deviation_below_one_count_is_a_bound() -> None:
+    """Ten readings on one count of 1.41 N m: friction may scatter by 0.44 of a count, unseen."""
+    result = result_of(three, components=["motor"], measurements=10)
+    found = finding(result, "breakaway_torque", statistic="standard deviation").estimate
+    assert found is not None
+    assert (found.value, found.low) == (0.0, 0.0)
+    assert found.high == pytest.approx(0.443 * 0.01 * RATIO, rel=2e-3)
+    assert "less than one count" in found.reason
+    mean = finding(result, "breakaway_torque", statistic="mean").estimate
+    assert mean is not None
+    assert mean.half_width == pytest.approx(1.96 * 0.01 * RATIO / np.sqrt(12), rel=2e-3)
+
+
+def test_every_number_has_an_interval_or_says_why() -> None:
+    result = result_of(scattering, measurements=3)
+    assert all(found.known.says_enough and found.estimate for found in result.findings)
+    share = finding(result, "load_share").estimate
+    assert share is not None
+    means = {
+        name: finding(result, "breakaway_torque", component=name, statistic="mean").estimate
+        for name in ("motor", "gearbox", "load")
+    }
+    values = {name: each.value for name, each in means.items() if each is not None}
+    errors = {name: each.standard_error for name, each in means.items() if each is not None}
+    total, others = sum(values.values()), values["motor"] + values["gearbox"]
+    by_load = others / total**2 * errors["load"]
+    by_others = values["load"] / total**2 * np.hypot(errors["motor"], errors["gearbox"])
+    assert share.standard_error == pytest.approx(np.hypot(by_load, by_others))
+
+
 def test_both_directions_are_measured_in_turn() -> None:
     def lopsided(tree: dict[str, Any]) -> None:
         tree["friction"]["load"] |= {"negative": {"static_torque": "40 N m"}}

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
+from campaign.estimate import Estimate
+from campaign.experiments.frequency_response import EXPERIMENT, _point
 from campaign.physics.limits import margins
 from campaign.result import Result
-from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
+from campaign.trial import Recording
+from tests.experiments.laboratory import (
+    analyse,
+    execute,
+    failed,
+    finding,
+    table,
+    table_of_estimates,
+    trials,
+)
+from tests.identification.coverage import holds
 from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, RATIO, L, R, bench
 
 KIND = "frequency_response"
+NOTHING = Recording(np.empty(0), {})
 SOME = {"frequencies": ["0.5 Hz", "3 Hz", "10 Hz", "40 Hz", "100 Hz"]}
 
 
@@ -42,8 +56,6 @@ def current_to_rate(s: complex) -> complex:
 
 def measured(edit: Any, options: dict[str, Any]) -> dict[float, complex]:
     """Response by frequency, as the analysis finds it."""
-    from campaign.experiments.frequency_response import _point
-
     done = execute(trials(KIND, bench(edit), options))
     assert {item.ending.outcome for item in done} == {"completed"}
     points = [_point(item) for item in done]
@@ -59,16 +71,20 @@ def test_closed_loop_of_a_continuous_bench_without_friction() -> None:
 
 def test_closed_loop_of_a_sampled_bench_without_friction() -> None:
     """Held current, one sample of delay, and a PI whose integral is summed backwards."""
+    for frequency, found in measured(sampled, SOME).items():
+        (loop,) = sampled_loop(np.exp([2j * np.pi * frequency * 1e-3]))
+        assert found == pytest.approx(loop / (1 + loop), rel=2e-3)
+
+
+def sampled_loop(z: np.ndarray) -> np.ndarray:
+    """L of the bench `sampled`, shape (n,)."""
     # States: rate, current, integral of the current error; input: commanded current.
     a = np.array([[0, RATIO * KT / INERTIA, 0], [-KE * RATIO / L, -(R + KPC) / L, KIC / L]])
     a = np.vstack([a, [0, -1, 0]])
     b = np.array([[0.0], [KPC / L], [1.0]])
     ad, bd, *_ = cont2discrete((a, b, np.eye(3), np.zeros((3, 1))), 1e-3)
-    for frequency, found in measured(sampled, SOME).items():
-        z = np.exp(2j * np.pi * frequency * 1e-3)
-        plant = np.linalg.solve(z * np.eye(3) - ad, bd)[0, 0] / z
-        loop = KPV * DEG * (1 + KIV * 1e-3 * z / (z - 1)) * plant
-        assert found == pytest.approx(loop / (1 + loop), rel=2e-3)
+    plant = np.array([np.linalg.solve(one * np.eye(3) - ad, bd)[0, 0] / one for one in z])
+    return KPV * DEG * (1 + KIV * 1e-3 * z / (z - 1)) * plant
 
 
 def test_open_loop_of_a_free_axis_is_an_integrator_and_swings_around_the_middle() -> None:
@@ -197,6 +213,58 @@ def test_the_thesis_sweep_and_its_amplitudes() -> None:
 def test_options_that_do_not_go_together(edit: Any, options: dict[str, Any], why: str) -> None:
     with pytest.raises(ValueError, match=why):
         trials(KIND, bench(edit), options)
+
+
+def test_the_response_is_a_metric_of_its_trial_and_the_analysis_believes_it() -> None:
+    """What was archived is read, not the samples: without them the numbers are the same."""
+    options = {"lowest": "1 Hz", "highest": "20 Hz", "step": "1 Hz", "cycles": 4}
+    done = execute(trials(KIND, bench(frictionless), options))
+    measure = EXPERIMENT.measure
+    assert measure is not None
+    archived = [replace(item, estimates=tuple(measure(item)), samples=NOTHING) for item in done]
+    names = {found.name for found in archived[0].estimates}
+    assert names == {"response_real", "response_imag", "coherence"}
+    told, measured_now = analyse(KIND, archived), analyse(KIND, done)
+    assert told.findings == measured_now.findings
+    assert told.tables == measured_now.tables
+    moved = [replace(each, value=0.5 * each.value) for each in archived[0].estimates]
+    other = analyse(KIND, [replace(archived[0], estimates=tuple(moved)), *archived[1:]])
+    assert other.figures[0].panels[0].curves[0].y[0] < -5
+
+
+def test_only_the_window_is_measured_and_old_trials_have_one() -> None:
+    """What is before it does not count; a trial without named windows has its task's."""
+    (item,) = execute(trials(KIND, bench(frictionless), {"frequencies": ["10 Hz"], "cycles": 4}))
+    (window,) = item.trial.windows
+    assert (window.start, window.stop) == item.trial.task.window
+    channels = {
+        name: replace(channel, samples=np.where(item.samples.time < window.start, 9.0, samples))
+        for name, channel in item.samples.channels.items()
+        for samples in (channel.samples,)
+    }
+    spoilt = replace(item, samples=replace(item.samples, channels=channels))
+    older = replace(spoilt, trial=item.trial.model_copy(update={"windows": ()}))
+    assert _point(spoilt) == _point(item) == _point(older)
+
+
+def test_a_sweep_to_100_hz_bounds_what_it_does_not_reach() -> None:
+    """On `sampled`, phase -180 deg lies above 100 Hz: a hull of fits and a bound, and both hold."""
+    at = {"frequencies": [f"{f} Hz" for f in (*range(2, 20), *range(20, 101, 4))], "cycles": 6}
+    result = analyse(KIND, execute(trials(KIND, bench(sampled), at)))
+    omega = 2 * np.pi * np.linspace(100, 400, 60_001)
+    loop = sampled_loop(np.exp(1j * omega * 1e-3))
+    turned = np.argmax(np.unwrap(np.angle(loop)) < -np.pi)
+    margin = -20 * np.log10(abs(loop[turned]))
+    known = finding(result, "gain_margin").known
+    assert known.low is not None
+    assert holds(known, margin)
+    (row,) = table_of_estimates(result, "servo-characteristics").rows
+    bound = row["gain_margin_bound"]
+    assert isinstance(bound, Estimate)
+    assert bound.kind == "at least"
+    assert bound.value < margin
+    (read,) = table(result, "crossovers").rows
+    assert read["crossover"] == "extrapolated"
 
 
 def test_failed_trials_leave_a_gap() -> None:

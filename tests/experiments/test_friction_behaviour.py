@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
+from campaign.estimate import Systematic
+from campaign.execution.measuring import checked
 from campaign.experiments import experiments
 from campaign.experiments.friction_models import with_model
+from campaign.identification.sampled import LOST
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import Result
-from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
+from tests.experiments.laboratory import Done, analyse, execute, failed, finding, table, trials
 from tests.physics.benches import bench
 
 SPECIMEN = (
@@ -156,7 +161,9 @@ def test_stick_slip() -> None:
 def test_one_slip_has_no_period() -> None:
     result = result_of("stick_slip", stiffness="2 N m/rad", pull_rate="0.1 rad/s", duration="9 s")
     assert finding(result, "stick_slip_first_slip").value == pytest.approx(7.478, rel=3e-4)
-    assert math.isnan(finding(result, "stick_slip_period").value)
+    period = finding(result, "stick_slip_period")
+    assert math.isnan(period.value)
+    assert period.known.reason == "there were too few slips"
     assert "fewer than three slips" in result.notes[0]
 
 
@@ -264,3 +271,126 @@ def test_scatter_of_what_another_model_lacks_goes_with_it() -> None:
     changed = Bench.model_validate(with_model(bench(edit), "stribeck"), context={"si": True})
     assert changed.variation is not None
     assert [line.name for line in changed.variation.days] == ["static_torque"]
+
+
+ROUNDED = 0.5e-4
+"""N m, and of the others in their units: half of the last digit that is published."""
+
+
+def test_brackets_hold_what_was_published() -> None:
+    """Peaks of the LuGre model and of stick-slip, within half of the last digit they have."""
+    rates = [f"{rate} N m/s" for rate in PEAKS]
+    ramps = result_of("force_rate", torque_rates=rates, peak_torque="4 N m", models=["lugre"])
+    found = {float(str(f.conditions["torque_rate"])): f.known for f in ramps.findings}
+    pull = result_of("stick_slip", stiffness="2 N m/rad", pull_rate="0.1 rad/s", duration="35 s")
+    slips = {f.quantity: f.known for f in pull.findings}
+    held = [(found[rate], peak, ROUNDED) for rate, peak in PEAKS.items()]
+    held += [(slips["stick_slip_period"], 6.3627, ROUNDED)]
+    held += [(slips["stick_slip_first_slip"], 7.478, 10 * ROUNDED)]
+    held += [(slips["stick_slip_peak_torque"], 1.508, 10 * ROUNDED)]
+    held += [(slips["stick_slip_top_rate"], 0.3698, ROUNDED)]
+    for estimate, published, rounded in held:
+        low, high = estimate.combined
+        assert low is not None
+        assert high is not None
+        assert low - rounded <= published <= high + rounded, estimate
+        assert high - low < 1e-3 * published, estimate
+        assert Systematic("time step of the simulation") in estimate.systematic
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "key"),
+    [
+        ("force_rate", {"torque_rates": ["5 N m/s", "50 N m/s"], "peak_torque": "4 N m"}, None),
+        ("friction_lag", {"frequencies": ["5 Hz", "20 Hz"]}, None),
+        ("stribeck_curve", {"speeds": ["1 mrad/s"]}, None),
+        ("stick_slip", {"stiffness": "2 N m/rad", "pull_rate": "0.1 rad/s"}, "slips"),
+        ("model_output", {"models": ["lugre"]}, None),
+    ],
+)
+def test_repeats_are_one_row_and_one_finding(
+    kind: str, options: dict[str, Any], key: str | None
+) -> None:
+    done = execute(trials(kind, specimen(), options))
+    once, thrice = analyse(kind, done), analyse(kind, [*done, *done, *done])
+    assert len(thrice.tables[0].rows) == len(once.tables[0].rows)
+    assert len(thrice.findings) == len(once.findings)
+    for one, three in zip(once.findings, thrice.findings, strict=True):
+        assert three.value == pytest.approx(one.value, rel=1e-12, nan_ok=True)
+    if key is not None:
+        assert thrice.tables[0].rows[0][key] == once.tables[0].rows[0][key]
+
+
+def test_a_ripple_over_position_is_the_scatter_of_the_cycles() -> None:
+    """Of 2 % and 400 periods per turn: cycles at different places differ, and the interval says so.
+
+    Without it they agree to the last digit, and there is no scatter to speak of.
+    """
+
+    def rippled(tree: dict[str, Any]) -> None:
+        tree["friction"]["load"]["ripple"] = {"amplitude": 0.02, "periods": 400.0}
+
+    options = {"frequencies": ["1 Hz"], "cycles": 9}
+    plain = analyse("friction_lag", execute(trials("friction_lag", bench(), options)))
+    waved = analyse("friction_lag", execute(trials("friction_lag", bench(rippled), options)))
+    (smooth,), (rough,) = plain.findings, waved.findings
+    assert "9 digits" in smooth.known.reason
+    assert rough.known.freedom == 7  # the first cycle is not measured
+    low, high = rough.known.combined
+    assert low is not None
+    assert high is not None
+    assert low < smooth.value < high
+
+
+DAMAGED = {
+    "friction_lag": {"frequencies": ["20 Hz"]},
+    "stick_slip": {"stiffness": "200 N m/rad", "pull_rate": "0.1 rad/s", "duration": "3 s"},
+    "model_output": {"models": ["lugre"]},
+}
+
+
+def damaged(item: Done, channel: str, lost: slice) -> Done:
+    """The same trial with samples of a channel lost, and with the metrics that are archived then.
+
+    Samples that were lost are NaN.
+    """
+    samples = item.samples
+    values = samples[channel].copy()
+    values[lost] = math.nan
+    info = samples.channels[channel]
+    channels = {**samples.channels, channel: replace(info, samples=values)}
+    hurt = replace(item, samples=replace(samples, channels=channels))
+    measure = experiments()[item.trial.kind].measure
+    assert measure is not None
+    return replace(hurt, estimates=checked(measure(hurt)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "gone"),
+    [
+        ("friction_lag", LOAD_RATE, {"friction_lag_width"}),
+        ("friction_lag", FRICTION_TORQUE, {"friction_lag_width"}),
+        ("stick_slip", LOAD_RATE, {"stick_slip_first_slip", "stick_slip_top_rate"}),
+        ("stick_slip", DRIVE_TORQUE, {"stick_slip_peak_torque"}),
+        ("model_output", LOAD_RATE, {"model_at_reversal"}),
+        ("model_output", FRICTION_TORQUE, {"model_peak"}),
+    ],
+)
+@pytest.mark.parametrize("lost", [slice(-30, -20), slice(None)], ids=["some", "all"])
+@pytest.mark.parametrize("both", [False, True], ids=["one", "both"])
+def test_samples_that_were_lost_cost_their_numbers_and_no_analysis(
+    kind: str, channel: str, gone: set[str], lost: slice, both: bool
+) -> None:
+    """Of two repeats, one or both are damaged, at the end of what is looked at or everywhere."""
+    (item,) = execute(trials(kind, bench(), DAMAGED[kind]))
+    hurt = damaged(item, channel, lost)
+    result = analyse(kind, [hurt, hurt] if both else [item, hurt])
+    reasons = {
+        each.quantity: each.estimate.reason
+        for each in result.findings
+        if math.isnan(each.value) and each.estimate is not None
+    }
+    assert gone <= set(reasons)
+    assert all(LOST in reasons[name] for name in gone)
+    few = any("fewer than three slips" in note for note in result.notes)
+    assert not (few and channel == LOAD_RATE), "nobody knows how many there were"

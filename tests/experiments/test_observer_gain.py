@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions, amplitude
-from campaign.trial import Channel, Ending, Outcome, Recording
+from campaign.estimate import Estimate
+from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions
+from campaign.experiments.observer_metrics import Gain, Rejection, measured_corner
+from campaign.identification.sine_amplitude import amplitude
+from campaign.trial import Ending, Outcome
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench
 
@@ -64,13 +67,56 @@ def test_measured_beside_theory(done) -> None:
     assert gain == pytest.approx(2 * np.pi * 4.0 * 35.0, rel=0.08)
     assert {figure.key for figure in result.figures} == {"error", "rejection", "noise"}
     assert any("Stable at every gain" in note for note in result.notes)
+    limit = finding(result, "unstable_corner_frequency").estimate
+    assert (limit.kind, limit.value) == ("at least", 8.0)
+
+
+def test_every_number_has_an_interval_or_a_reason_and_repeats_count(done) -> None:
+    again = [replace(item, trial=item.trial.model_copy(update={"repeat": 2})) for item in done]
+    channel = "pointing_error"
+    louder = []
+    for item in again:
+        was = item.samples.channels[channel]
+        more = replace(was, samples=1.02 * was.samples)
+        samples = replace(item.samples, channels={**item.samples.channels, channel: more})
+        louder.append(replace(item, samples=samples))
+    one, both = analyse("observer_gain", done), analyse("observer_gain", [*done, *louder])
+    for result in (one, both):
+        assert all(f.known.says_enough for f in result.findings)
+    for row, twice in zip(one.tables[0].rows, both.tables[0].rows, strict=True):
+        assert "of that one trial" in row["error"].reason
+        assert twice["error"].value == pytest.approx(row["error"].value * np.sqrt(1.02))
+        assert twice["error"].freedom == 1
+        assert row["noise"].low < row["noise"].value < row["noise"].high
+        assert row["worst"].low < row["worst"].value < row["worst"].high
+
+
+def test_the_corner_frequency_of_six_disturbances_has_their_range() -> None:
+    """Corners of 4 (1 + 1/f) from f = 1 to 6: median of 8, 6, 5.33, 5, 4.8, 4.67 is 5.17 Hz."""
+
+    def gain(corner: float, ratios: dict[float, float]) -> Gain:
+        measured = {f: Estimate("rejection", value, "") for f, value in ratios.items()}
+        points = tuple(Rejection(f, each, 1.0) for f, each in measured.items())
+        return Gain(corner, 1.0, None, None, None, None, points, "")
+
+    frequencies = [float(f) for f in range(1, 7)]
+    corners = {f: 4 * (1 + 1 / f) for f in frequencies}
+    reduced = {f: 1 / np.sqrt(1 + (corners[f] / f) ** 2) for f in frequencies}
+    found = measured_corner(gain(4.0, reduced), gain(0.0, dict.fromkeys(frequencies, 1.0)))
+    assert found.value == pytest.approx(0.5 * (16 / 3 + 5))
+    assert (found.low, found.high) == pytest.approx((4 * 7 / 6, 8.0))
+    few = dict(list(reduced.items())[:5])
+    less = measured_corner(gain(4.0, few), gain(0.0, dict.fromkeys(frequencies, 1.0)))
+    assert less.low is None
+    assert "5 frequencies" in less.reason
 
 
 def test_an_unstable_gain_is_a_result(done) -> None:
     ending = Ending(Outcome.LIMIT, "drive_torque reached 1200 N m at 0.1 s")
     cut = [replace(i, ending=ending) if i.trial.point["corner"] == 8.0 else i for i in done]
     result = analyse("observer_gain", cut)
-    assert finding(result, "unstable_corner_frequency").value == 8.0
+    limit = finding(result, "unstable_corner_frequency").estimate
+    assert (limit.low, limit.value, limit.high) == (4.0, 8.0, 8.0)
     row = table(result, "observer-gain").rows[-1]
     assert (row["state"], row["error"]) == ("unstable", None)
     assert any("Unstable from K0 = 1759" in note for note in result.notes)  # 2 pi 8 * 35
@@ -106,5 +152,5 @@ def test_amplitude_of_a_sine_under_noise_and_offset() -> None:
     time = np.arange(4000) / 1000.0
     noise = np.random.default_rng(3).normal(scale=0.05, size=4000)
     samples = 0.7 * np.sin(2 * np.pi * 3.0 * time + 1.0) + 5.0 + noise
-    made = Recording(time, {"w": Channel("w", "", "", "", samples)})
-    assert amplitude(made, "w", 3.0) == pytest.approx(0.7, abs=4 * 0.05 * np.sqrt(2 / 4000))
+    found = amplitude("w", time, samples, 3.0, "").value
+    assert found == pytest.approx(0.7, abs=4 * 0.05 * np.sqrt(2 / 4000))

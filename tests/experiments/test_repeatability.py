@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from campaign.experiments.repeatability import relative_deviation
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.experiments.repeatability import MapSet, relative_deviation
+from campaign.experiments.repeatability import _deviation as deviation_of
+from campaign.experiments.repeatability import _mean as over_maps
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench
 
@@ -32,6 +36,41 @@ FAST = {
 def test_the_statistics_of_table_4_4(columns, mean: float, percent: float) -> None:
     assert np.mean(columns) == pytest.approx(mean, rel=2e-3)
     assert round(100 * relative_deviation(columns), 1) == percent
+
+
+def test_a_parameter_that_is_zero_in_all_maps_has_no_relative_deviation() -> None:
+    assert np.isnan(relative_deviation([0.0] * 6))
+
+
+def sets_of(values: Sequence[float], **more: object) -> list[MapSet]:
+    """Maps that found these Coulomb torques (N m), in both directions alike."""
+    sets = []
+    for number, value in enumerate(values):
+        told = Estimate("coulomb_torque", value, "N m", value - 1.0, value + 1.0, **more)
+        found = {name: {"coulomb_torque": told} for name in ("positive", "negative")}
+        sets.append(MapSet(str(number), "", None, found))
+    return sets
+
+
+def test_maps_do_not_average_a_wrong_torque_constant_away() -> None:
+    """0.3 N m in each map is 0.3 N m in their mean; t(2) of 25, 26, 27 is 4.303 / sqrt(3)."""
+    parts = (Systematic("torque constant", 0.3), Systematic("inertia"))
+    mean = over_maps(sets_of([25.0, 26.0, 27.0], systematic=parts), "coulomb_torque")
+    assert [part.source for part in mean.systematic] == ["torque constant", "inertia"]
+    assert mean.systematic_uncertainty == pytest.approx(0.3)
+    expected = np.hypot(4.303 / np.sqrt(3.0), 1.960 * 0.3)
+    assert mean.half_width == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("origin", [Origin.AT_BOUND, Origin.NOT_DETERMINED])
+def test_maps_that_do_not_determine_a_parameter_have_no_mean_with_an_interval(origin) -> None:
+    """Three maps at 0.1 agree perfectly, and say nothing."""
+    sets = [*sets_of([0.1, 0.1], origin=origin, reason="open"), *sets_of([0.1])]
+    for told in (over_maps(sets, "coulomb_torque"), deviation_of(sets, "coulomb_torque")):
+        assert not told.has_interval
+        assert told.origin is Origin.NOT_DETERMINED
+        assert told.reason == f"4 of 6 values are {origin}"
+    assert over_maps(sets, "coulomb_torque").value == pytest.approx(0.1)
 
 
 def coulomb(level: float):
@@ -113,3 +152,20 @@ def test_a_map_that_cannot_be_fitted_is_left_out_and_said(three_days) -> None:
     assert any("Sets 3-4 have no fit" in note for note in result.notes)
     assert {f.conditions.get("set") for f in result.findings} == {"1-2", "5-6", None}
     assert analyse("repeatability", []).tables == ()
+
+
+def test_every_number_has_an_interval_or_a_reason(three_days) -> None:
+    """The mean of three days has t(2) about it, and their deviation a chi-square."""
+    result = analyse("repeatability", three_days)
+    assert all(found.known.says_enough for found in result.findings)
+    for each in result.tables:
+        for row in each.rows:
+            cells = [row.get(c.name) for c in each.columns if not (c.exact or c.reason)]
+            assert not [cell for cell in cells if isinstance(cell, int | float)]
+    mean = finding(result, "coulomb_torque", statistic="mean").known
+    # 1, 1.04 and 0.96 of 26 N m: a deviation of 1.04 N m, over the root of 3, times t(2) = 4.303.
+    assert mean.half_width == pytest.approx(4.303 * 1.04 / np.sqrt(3), rel=0.02)
+    told = finding(result, "coulomb_torque", statistic="relative standard deviation").known
+    # 0.04 with two degrees of freedom: chi-square 7.378 and 0.0506.
+    assert told.low == pytest.approx(0.04 * np.sqrt(2 / 7.378), rel=0.1)
+    assert told.high == pytest.approx(0.04 * np.sqrt(2 / 0.0506), rel=0.1)

@@ -7,43 +7,32 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from campaign.experiments.sensitivity import (
-    EXPERIMENT,
-    Response,
-    SensitivityOptions,
-    crossing,
-    ranking,
-)
+from campaign.estimate import Estimate
+from campaign.experiments.sensitivity import EXPERIMENT, SensitivityOptions
+from campaign.experiments.sensitivity_results import Response, judge, ranking
+from campaign.identification.threshold import Threshold
 from campaign.trial import Channel, Recording
-from tests.experiments.laboratory import Done, analyse, execute, failed, finding, table, trials
+from tests.experiments.laboratory import (
+    Done,
+    analyse,
+    execute,
+    failed,
+    finding,
+    table_of_estimates,
+    trials,
+)
 from tests.physics.benches import bench
 
 CHANGES = np.array([-0.8, -0.4, -0.2, 0.0, 0.2, 0.4, 0.8])
 
 
-@pytest.mark.parametrize(
-    ("error", "expected"),
-    [
-        # 0.1 + 0.5 |x| passes 0.2 at 0.2 exactly where a straight line says so
-        (0.1 + 0.5 * np.abs(CHANGES), 0.2),
-        # steeper below: 0.1 + |x| at -0.1 (interpolated), 0.1 + x/4 above at 0.4
-        (np.where(CHANGES < 0, 0.1 - CHANGES, 0.1 + 0.25 * CHANGES), 0.1),
-        # passed on one side only, between 0.4 (0.15) and 0.8 (0.35): 0.4 + 0.4 * 0.05 / 0.2
-        (np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.15, 0.35]), 0.5),
-        # a return below the threshold does not undo the first passing
-        (np.array([0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.1]), 0.1),
-        (np.full(7, 0.2), None),  # reached, never passed
-        (np.full(7, 0.21), 0.0),
-    ],
-)
-def test_where_a_curve_passes_the_threshold(error: np.ndarray, expected: float | None) -> None:
-    found = crossing(CHANGES, error, 0.2)
-    assert found == (None if expected is None else pytest.approx(expected, abs=1e-12))
-
-
 def test_rank_is_by_threshold_and_then_by_the_largest_error() -> None:
     def response(slope: float) -> Response:
-        return Response(CHANGES, 0.1 + slope * np.abs(CHANGES), np.zeros((0, 2)))
+        errors = (
+            Estimate.without_interval("error", 0.1 + slope * abs(change), "rad", "made up")
+            for change in CHANGES
+        )
+        return Response(CHANGES, tuple(errors), np.zeros((0, 2)))
 
     ranks = ranking(
         {
@@ -55,6 +44,24 @@ def test_rank_is_by_threshold_and_then_by_the_largest_error() -> None:
         0.2,
     )
     assert ranks == {"steep": 1, "some": 2, "mild": 3, "flat": 4}
+
+
+def test_a_rank_says_with_whom_it_may_change_places() -> None:
+    """Thresholds 0.50 and 0.53 of a deviation near 0.02 overlap; 0.1 and a bound of 0.8 do not."""
+
+    def response(slope: float) -> Response:
+        values = 0.1 * (1 + slope * np.abs(CHANGES))
+        errors = (Estimate("e", float(v), "", standard_error=2e-3) for v in values)
+        return Response(CHANGES, tuple(errors), np.zeros((0, 2)))
+
+    responses = {"a": response(2.0), "b": response(1.9), "c": response(10.0), "d": response(0.1)}
+    judged = {one.parameter: one for one in judge(responses, Threshold(0.2))}
+    assert [judged[name].rank.value for name in "abcd"] == [2, 3, 1, 4]
+    assert judged["a"].rank.reason.endswith("may change places with b")
+    assert judged["b"].rank.reason.endswith("may change places with a")
+    for alone in "cd":
+        assert judged[alone].rank.reason == "a place in an order, not a size"
+    assert [judged[name].passed for name in "abcd"] == [True, True, True, False]
 
 
 def test_each_trial_varies_one_parameter_of_the_model_and_none_of_the_bench() -> None:
@@ -149,11 +156,17 @@ def test_thresholds_and_ranking_of_made_up_errors() -> None:
         assert found.value == pytest.approx(threshold, rel=2e-3)
         assert found.lower_bound is not passed
         assert finding(result, "sensitivity_rank", parameter=parameter).value == rank
+        assert finding(result, "sensitivity_rank", parameter=parameter).estimate.kind == "count"
+    reached = finding(result, "sensitivity_threshold", parameter="coulomb_torque").estimate
+    assert reached.low < 0.10 < reached.high
+    order = finding(result, "sensitivity_rank", parameter="static_torque").estimate.reason
+    assert order == "a place in an order, not a size"  # no interval reaches its neighbours
     cut_off = analyse("sensitivity", [*done[:-1], failed(done[-1])])
     assert not [f for f in cut_off.findings if f.quantity.startswith("sensitivity_")]
     assert any("need every trial" in note for note in cut_off.notes)
-    rows = {row["parameter"]: row for row in table(result, "sensitivity").rows}
-    assert rows["stribeck_velocity"]["threshold"] is None
+    rows = {row["parameter"]: row for row in table_of_estimates(result, "sensitivity").rows}
+    bound = rows["stribeck_velocity"]["threshold"]
+    assert (bound.kind, bound.value) == ("at least", 0.75)
     assert rows["stribeck_velocity"]["said"] == "none below 75%"
     (figure,) = result.figures
     assert figure.thesis == ("5.14",)
@@ -167,6 +180,28 @@ def test_thresholds_and_ranking_of_made_up_errors() -> None:
         analyse("sensitivity", again), "sensitivity_threshold", parameter="static_torque"
     )
     assert found.value == pytest.approx(0.25, rel=1e-2)
+
+
+def test_every_trial_of_the_error_has_a_metric_and_a_model_alone_has_none() -> None:
+    options = {"parameters": ["coulomb_torque"], "changes": [0.3], "repeats": 1, "cycles": 2}
+    done = execute(trials("sensitivity", bench(), options))
+    for item in done:
+        names = [window.name for window in item.trial.windows]
+        if item.trial.task.mode == "rate":
+            assert names == ["measured", "shown"]
+            (error,) = EXPERIMENT.measure(item)
+            cut = item.samples.window(*item.trial.task.window)
+            assert error.value == pytest.approx(float(np.std(cut["pointing_error"])), rel=1e-3)
+        else:
+            assert names == ["reversal", "cycle"]
+            assert EXPERIMENT.measure(item) == []
+    older = [replace(d, trial=d.trial.model_copy(update={"windows": ()})) for d in done]
+    was, now = analyse("sensitivity", older), analyse("sensitivity", done)
+    assert was.findings == now.findings
+    for one, other in zip(was.figures, now.figures, strict=True):
+        for panel, same in zip(one.panels, other.panels, strict=True):
+            for curve, again in zip(panel.curves, same.curves, strict=True):
+                np.testing.assert_array_equal(curve.y, again.y)
 
 
 def test_failed_trials_leave_the_others_alone() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.experiments.velocity_map import EXPERIMENT, VelocityMapOptions, plan_run
+from campaign.experiments.velocity_map import EXPERIMENT
+from campaign.experiments.velocity_map_runs import VelocityMapOptions, map_speeds, plan_run
 from campaign.result import Result
 from campaign.trial import Role
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
@@ -52,7 +53,7 @@ def test_every_point_lies_on_the_curve(full_map: Result) -> None:
 
 
 def test_the_shipped_speeds() -> None:
-    speeds = np.rad2deg(VelocityMapOptions().speeds)
+    speeds = np.rad2deg(map_speeds(VelocityMapOptions()))
     assert len(speeds) == 80
     assert speeds[0] == pytest.approx(0.05)
     assert speeds[-1] == pytest.approx(65.0)
@@ -148,3 +149,24 @@ def test_nothing_measured_gives_nothing() -> None:
     result = analyse("velocity_map", [failed(done[0])])
     assert result.findings == ()
     assert result.notes
+
+
+def stiff(level: float):
+    """The bench with bristles of another stiffness: Ts / sigma0 is 32 N m over it."""
+
+    def edit(tree):
+        tree["friction"]["load"]["bristle_stiffness"] = f"{level} N m/rad"
+
+    return bench(edit)
+
+
+def test_too_short_a_settling_is_told_in_the_plan_and_behind_the_run() -> None:
+    """Seven times 32 N m / 12 000 N m/rad (0.153 deg) are 1.07 deg; 20 deg/s settles for 6 deg."""
+    options = {**FEW, "speeds": ["1 deg/s", "20 deg/s"]}
+    advice = "settle for 1.1 deg or more: Ts/sigma0 is 0.153 deg"
+    slow, fast = trials("velocity_map", stiff(12_000), options)
+    assert advice in slow.note
+    assert "settle" not in fast.note
+    result = analyse("velocity_map", execute([slow, fast]))
+    assert f"At 1 to 1 deg/s: {advice}." in result.notes
+    assert not any("settle for" in t.note for t in trials("velocity_map", bench(), options))

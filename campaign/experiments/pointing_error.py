@@ -1,0 +1,96 @@
+"""The pointing error of a trial under base motion: its windows, and its metric.
+
+Several experiments measure it. Their analyses build on the metric, which is archived with a trial;
+samples are read for figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+
+from campaign.channels import POINTING_ERROR
+from campaign.estimate import Estimate, Window
+from campaign.experiments.interface import TrialData, metrics
+from campaign.identification import stabilization_error
+from campaign.result import Array
+from campaign.signals import Sine
+from campaign.trial import Recording, Task, Trial
+
+MEASURED = "measured"
+"""The window that counts: after the transient; whole cycles of a sinusoidal motion."""
+SHOWN = "shown"
+"""The beginning of it that time histories show."""
+SHOWN_CYCLES = 1.5
+"""of the base motion in a time history; more cycles only make the reversals smaller."""
+SHOWN_TIME = 60.0
+"""s; of a motion that is not sinusoidal."""
+
+
+def windows_of(task: Task) -> tuple[Window, Window]:
+    """The windows of a trial under base motion, for its plan; for archives without any, too."""
+    start, stop = task.window
+    signal = task.base_acceleration
+    shown = SHOWN_CYCLES / signal.frequency if isinstance(signal, Sine) else SHOWN_TIME
+    return Window(MEASURED, start, stop), Window(SHOWN, start, min(stop, start + shown))
+
+
+def window_of(trial: Trial, name: str) -> Window:
+    """A window of the trial by its name."""
+    return next(
+        window for window in (*trial.windows, *windows_of(trial.task)) if window.name == name
+    )
+
+
+def measured_part(data: TrialData) -> Recording:
+    """What was recorded in the window that counts."""
+    window = window_of(data.trial, MEASURED)
+    return data.recording().window(window.start, window.stop)
+
+
+def rate_of(recording: Recording) -> float:
+    """Samples per second."""
+    return (len(recording.time) - 1) / float(np.ptp(recording.time))
+
+
+def error_of(recording: Recording, task: Task) -> Estimate:
+    """Stabilization error of the measured part: by its cycles, or by blocks without such."""
+    samples, signal = recording[POINTING_ERROR], task.base_acceleration
+    if len(samples) > 1 and isinstance(signal, Sine):
+        return stabilization_error.over_cycles(samples, rate_of(recording) / signal.frequency)
+    return stabilization_error.over_blocks(samples)
+
+
+def found(estimates: Iterable[Estimate]) -> list[Estimate]:
+    """Those with a number, as an archive keeps them."""
+    return [estimate for estimate in estimates if np.isfinite(estimate.value)]
+
+
+Measure = Callable[[TrialData], Sequence[Estimate]]
+
+
+def of_each(group: Iterable[TrialData], measure: Measure, name: str) -> list[Estimate]:
+    """One metric of each trial that has it, in order; none of a trial without samples."""
+    by_trial = (_told(data, measure) for data in group)
+    return [by_name[name] for by_name in by_trial if name in by_name]
+
+
+def _told(data: TrialData, measure: Measure) -> Mapping[str, Estimate]:
+    try:
+        return metrics(data, measure)
+    except ValueError:
+        return {}
+
+
+def values(estimates: Sequence[Estimate]) -> Array:
+    """Values of estimates, shape (n,), for a curve."""
+    return np.array([estimate.value for estimate in estimates], dtype=float)
+
+
+def ends(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
+    """Both ends of each interval, shape (n,), for a curve; NaN where there is none."""
+    pairs = [estimate.combined for estimate in estimates]
+    low = np.array([np.nan if end is None else end for end, _ in pairs])
+    high = np.array([np.nan if end is None else end for _, end in pairs])
+    return low, high

@@ -1,0 +1,60 @@
+"""What no repetition can show: how far a bench's own constants move what was measured with them.
+
+A torque is a current times the torque constant, and friction is that torque less J times an
+acceleration. How uncertain those constants are, a bench may say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from campaign.estimate import Estimate, Systematic
+from campaign.identification.intervals import shifted_by
+from campaign.physics.bench import Bench
+
+TORQUE_CONSTANT = "motor.torque_constant"
+INERTIA = "axis.inertia"
+SOURCES = {TORQUE_CONSTANT: "torque constant", INERTIA: "inertia"}
+"""What a constant is called where its part stands, by its path in the bench."""
+
+
+def known_uncertainty(bench: Bench, path: str) -> float | None:
+    """Relative standard uncertainty of the bench's value at a dotted path; None: nobody said."""
+    own = bench.known_uncertainty(path)
+    if own is None:
+        return None
+    value: Any = bench
+    for name in path.split("."):
+        value = getattr(value, name)
+    return own / abs(float(value))
+
+
+def with_systematic(estimate: Estimate, bench: Bench, path: str, effect: float) -> Estimate:
+    """The estimate with the part of one constant of the bench.
+
+    effect: by how much the value moves when the constant grows to twice its size and nothing bends,
+        that is dvalue / d ln(constant), in the value's unit. A torque that follows from a current
+        moves by itself with the torque constant.
+    """
+    relative = known_uncertainty(bench, path)
+    part = None if relative is None else abs(effect) * relative
+    return shifted_by(estimate, SOURCES.get(path, path), part)
+
+
+def shared_parts(found: Iterable[Estimate]) -> tuple[Systematic, ...]:
+    """The parts of a mean of estimates: no averaging makes them smaller.
+
+    Root mean square of each over those that have it; unknown where it is unknown to all.
+    """
+    sizes: dict[str, list[float]] = {}
+    for part in (part for each in found for part in each.systematic):
+        own = sizes.setdefault(part.source, [])
+        if part.standard_uncertainty is not None:
+            own.append(part.standard_uncertainty)
+    return tuple(
+        Systematic(source, float(np.sqrt(np.mean(np.square(own)))) if own else None)
+        for source, own in sizes.items()
+    )
