@@ -13,8 +13,11 @@ import pandas as pd
 import pytest
 
 import campaign
+from campaign.access.estimates import findings_table
 from campaign.archive import open_run
 from campaign.errors import UsageError
+from campaign.estimate import Estimate, Systematic
+from campaign.result import Finding
 from campaign.trial import Channel, Ending, Outcome, Recording
 from tests.archives import archived, plan_of, simulated_run
 
@@ -172,3 +175,67 @@ def test_h5dump_reads_the_samples(run):
     done = subprocess.run([*command, run.path], capture_output=True, text=True, check=True)
     listed = done.stdout.split("DATA {")[1].split("}")[0].replace(",", " ").split()
     np.testing.assert_array_equal(np.array(listed, float), run.trial(1).frame()["gyro_rate"])
+
+
+CONDITIONS = {"compensation": "lugre", "frequency": 0.24, "unit": "given", "method": 3}
+BOTH_PARTS = Estimate(
+    "gain",
+    2.0,
+    "dB",
+    1.5,
+    2.75,
+    0.95,
+    "mean of 4 repeats",
+    standard_error=0.25,
+    freedom=3.0,
+    systematic=(Systematic("inertia", 0.1), Systematic("alignment")),
+)
+
+
+def test_findings_are_one_table_with_intervals_reasons_and_conditions():
+    alone = Estimate.without_interval("lag", 0.5, "s", "a single trial")
+    findings = [
+        Finding.of(BOTH_PARTS, CONDITIONS),
+        Finding.of(alone, {"frequency": 2.0}),
+        Finding("of a plug-in", 7.0, "N m", {}),
+        Finding("lost", float("nan"), "N m", {}),
+    ]
+    table = findings_table(findings)
+    assert list(table["quantity"]) == ["gain", "lag", "of a plug-in", "lost"]
+    first = table.iloc[0]
+    assert (first["value"], first["scatter_low"], first["scatter_high"]) == (2.0, 1.5, 2.75)
+    assert (first["standard_error"], first["freedom"]) == (0.25, 3.0)
+    assert (first["origin"], first["kind"], first["unit"]) == ("measured", "number", "dB")
+    assert first["systematic"] == {"inertia": 0.1, "alignment": None}
+    wide = 1.959964 * 0.1
+    assert first["low"] == pytest.approx(2.0 - np.hypot(0.5, wide))
+    assert first["high"] == pytest.approx(2.0 + np.hypot(0.75, wide))
+    assert (first["compensation"], first["frequency"]) == ("lugre", 0.24)
+    assert (first["condition.unit"], first["condition.method"]) == ("given", 3)
+    assert list(table["reason"]) == [
+        "",
+        "a single trial",
+        "the analysis gives no interval",
+        "the analysis did not find it",
+    ]
+    assert np.isnan(table["low"].iloc[1:].to_numpy()).all()
+    assert table["origin"].iloc[3] == "not determined"
+    assert (table.dtypes[["value", "low", "high", "scatter_high"]] == "float64").all()
+
+
+def test_no_findings_are_an_empty_table_with_the_same_columns():
+    table = findings_table([])
+    assert len(table) == 0
+    assert list(table.columns)[:3] == ["quantity", "value", "unit"]
+
+
+def test_a_test_has_its_findings_and_metrics_and_goes_by_its_name(run):
+    test = run["stabilization"]
+    assert test.name == run.test("stabilization").name
+    result = test.result
+    assert list(test.findings["value"]) == [finding.value for finding in result.findings]
+    assert test.findings.attrs["damaged"] == []
+    assert len(test.metrics) == 0  # of a run that was not executed by the runner
+    assert {"trial", "quantity", "measured_by"} <= set(test.metrics.columns)
+    with pytest.raises(UsageError, match="did you mean 'stabilization'"):
+        run["stabilisation"]

@@ -23,6 +23,7 @@ def open_view(
     results: str | PathLike[str] = "results",
     *,
     strict: bool = False,
+    measure_anew: bool = False,
 ) -> RunView:
     """Open an archived run; an ArchiveWarning says what of it is damaged.
 
@@ -30,10 +31,12 @@ def open_view(
         run: a path, a run's name, or a unique beginning of it; absent: the newest.
         results: the folder in which names are looked up.
         strict: whether any damage is an error.
+        measure_anew: whether recordings are measured by this program, and not as they were when
+            they were executed.
 
     Raises UsageError when there is no such run, ArchiveError when it cannot be read.
     """
     name = None if run is None else str(run)
-    view = RunView(open_run(find_run(Path(results), name)), strict)
+    view = RunView(open_run(find_run(Path(results), name)), strict, measure_anew)
     tell(view.path, view.damaged, strict=strict)
     return view

@@ -28,10 +28,12 @@ class RunView:
 
     Attributes:
         strict: whether an analysis refuses to leave a damaged trial out.
+        measure_anew: whether an analysis leaves aside what was measured when it was executed.
     """
 
     archive: RunReader
     strict: bool = False
+    measure_anew: bool = False
 
     @property
     def name(self) -> str:
@@ -101,6 +103,10 @@ class RunView:
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(views) or 'none'}"
         raise UsageError(f"{self.name}: there is no test {name!r}; {hint}")
 
+    def __getitem__(self, name: str) -> TestView:
+        """The same as `test`: `run["map"].findings`."""
+        return self.test(name)
+
     def trial(self, number: int | str) -> TrialView:
         """The trial of that number, or of that name: `trial-00017`.
 
@@ -149,6 +155,7 @@ class RunView:
                     run=self.path,
                     damaged=of_test(self.archive, name),
                     strict=self.strict,
+                    measure_anew=self.measure_anew,
                 )
             )
         return views

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from campaign.archive import ArchivedTrial
 from campaign.archive.damage import Damage
 from campaign.archive.damage_words import in_words
-from campaign.result import Table
+from campaign.estimate import Estimate
+from campaign.result import Table, bare
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,16 +74,36 @@ def _row(archived: ArchivedTrial) -> dict[str, object]:
 def result_table(table: Table, damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """A table of an analysis, unrounded, SI; `attrs` has its title, units and labels.
 
-    `attrs["damaged"]` names, in words, what is damaged of the trials that it should be made of.
+    After the table's own columns, `<name>_low` and `<name>_high` of each that has estimates: their
+    95 % intervals, systematic parts included. `attrs["estimates"]` has the estimates themselves, by
+    column and row; `attrs["damaged"]` names, in words, what is damaged of the trials that the table
+    should be made of.
     """
     import pandas as pd
 
     names = [column.name for column in table.columns]
-    frame = pd.DataFrame([dict(row) for row in table.rows], columns=names)
+    frame = pd.DataFrame(
+        [{name: bare(cell) for name, cell in row.items()} for row in table.rows], columns=names
+    )
+    estimates = {name: _estimates(table, name) for name in names}
+    for name, found in estimates.items():
+        if found:
+            ends = [found[k].combined if k in found else (None, None) for k in range(len(frame))]
+            frame[f"{name}_low"] = pd.array([low for low, _ in ends], dtype="Float64").astype(float)
+            frame[f"{name}_high"] = pd.array([high for _, high in ends], dtype="Float64").astype(
+                float
+            )
     frame.attrs = {
         "title": table.title,
         "units": {column.name: column.unit for column in table.columns},
         "labels": {column.name: column.label for column in table.columns},
+        "estimates": {name: found for name, found in estimates.items() if found},
         "damaged": [in_words(damage) for damage in damaged],
     }
     return frame
+
+
+def _estimates(table: Table, name: str) -> dict[int, Estimate]:
+    """The estimates of a column by the number of their row, from 0."""
+    cells = ((number, row.get(name)) for number, row in enumerate(table.rows))
+    return {number: cell for number, cell in cells if isinstance(cell, Estimate)}

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from campaign.access.estimates import findings_table, metrics_table
 from campaign.access.tables import result_table, trials_table
 from campaign.access.telling import tell
 from campaign.access.trial import TrialView
@@ -34,6 +35,7 @@ class TestView:
         run: where the run lies.
         damaged: what was found damaged, in opening the run, of this test, or of no trial.
         strict: whether an analysis that has to leave a trial out is an error.
+        measure_anew: whether recordings are measured by this program, whatever is archived of them.
     """
 
     __test__ = False  # it is not one of pytest's
@@ -46,6 +48,7 @@ class TestView:
     run: Path = field(default=Path(), repr=False)
     damaged: tuple[Damage, ...] = field(default=(), repr=False)
     strict: bool = field(default=False, repr=False)
+    measure_anew: bool = field(default=False, repr=False)
 
     @property
     def trials(self) -> pd.DataFrame:
@@ -73,7 +76,10 @@ class TestView:
         def analyse(trials: Trials) -> Result:
             return result_of(experiment, TestData(self.name, self.kind, self.options, trials))
 
-        result, _, found = without_damaged(self.run, self.archived, analyse)
+        trials = self.archived
+        if self.measure_anew:
+            trials = tuple(trial.unmeasured() for trial in trials)
+        result, _, found = without_damaged(self.run, trials, analyse)
         damaged = tuple(dict.fromkeys((*self.damaged, *found)))
         left_out = [damage for damage in damaged if damage.trial]
         tell(self.run, left_out, strict=self.strict)
@@ -87,6 +93,21 @@ class TestView:
         """
         result, damaged = self._analysed
         return {table.key: result_table(table, damaged) for table in result.tables}
+
+    @property
+    def findings(self) -> pd.DataFrame:
+        """The numbers of the analysis (SI), one row each, with interval or the reason for none."""
+        result, damaged = self._analysed
+        return findings_table(result.findings, damaged)
+
+    @property
+    def metrics(self) -> pd.DataFrame:
+        """What was measured in each recording when it was executed (SI), one row per number.
+
+        After the number of the trial, the columns are those of `findings`; the last one says which
+        code measured it. Empty where nothing was.
+        """
+        return metrics_table(self.archived, self.damaged)
 
     def __iter__(self) -> Iterator[TrialView]:
         return (TrialView(archived, damaged=self.damaged) for archived in self.archived)

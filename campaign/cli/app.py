@@ -24,6 +24,7 @@ from campaign.cli.parameters import (
     SetOption,
     SignOption,
     TemplatesOption,
+    TruthOption,
     WorkersOption,
     YesOption,
 )
@@ -70,13 +71,14 @@ def plan(
     port: PortOption = None,
     source: FromOption = None,
     allow_large: LargeOption = False,
+    truth: TruthOption = "",
 ) -> None:
     """Show the trials, their time and limits, and what would be written; execute nothing."""
     from campaign.cli.plan import show_plan
     from campaign.cli.prepare import Request, short_settings
 
     settings = (*(changes or ()), *short_settings(port, source, results))
-    request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
+    request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
     raise typer.Exit(show_plan(request, results, as_json=as_json))
 
 
@@ -105,6 +107,7 @@ def run(
     clear_stop: ClearStopOption = None,
     sign: SignOption = None,
     allow_large: LargeOption = False,
+    truth: TruthOption = "",
     check_step: Annotated[
         bool,
         typer.Option(
@@ -127,7 +130,7 @@ def run(
 
     settings = (*(changes or ()), *short_settings(port, source, results))
     settings += (SETTING,) if check_step else ()
-    request = Request(protocol, tuple(only or ()), settings, backend, allow_large)
+    request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
     remarks = Remarks(operator, note, tuple(tags or ()))
     raise typer.Exit(
         run_protocol(
@@ -248,11 +251,20 @@ def report(
     ] = None,
     templates: TemplatesOption = None,
     open_it: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+    measure_anew: Annotated[
+        bool,
+        typer.Option(
+            "--measure-anew",
+            help="Measure the recordings by this program, not as they were when executed.",
+        ),
+    ] = False,
 ) -> None:
     """Write report.html, its tables and its figures, from an archive alone."""
     from campaign.cli.report import report_run
 
-    page, code = report_run(run, results, output, templates, open_it=open_it)
+    page, code = report_run(
+        run, results, output, templates, open_it=open_it, measure_anew=measure_anew
+    )
     typer.echo(page)
     raise typer.Exit(code)
 
@@ -337,12 +349,16 @@ def list_command(
 def show(
     run: NewestRunArgument = None,
     results: ResultsOption = RESULTS,
+    metrics: Annotated[
+        bool,
+        typer.Option("--metrics", help="Also what each recording says by itself, with intervals."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """Show what a run was, how it ended, and all that did not go as planned."""
     from campaign.cli.show import show_archive
 
-    raise typer.Exit(show_archive(run, results, as_json=as_json))
+    raise typer.Exit(show_archive(run, results, as_json=as_json, metrics=metrics))
 
 
 @app.command()
@@ -436,8 +452,22 @@ def warmup() -> None:
 @app.command()
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Made when it is not there.")],
+    bench: Annotated[
+        str,
+        typer.Option(
+            "--bench",
+            metavar="BENCH",
+            help="Write protocols for this bench instead: a TOML file, or a shipped bench's name.",
+            show_default=False,
+        ),
+    ] = "",
 ) -> None:
-    """Copy the shipped protocols, benches and templates into DIR, to start from."""
+    """Copy the shipped protocols, benches and templates into DIR, or write a bench its own."""
+    if bench:
+        from campaign.cli.rig_protocols import init_for_bench
+
+        init_for_bench(folder, bench)
+        return
     from campaign.cli.archives import init_folder
 
     init_folder(folder)

@@ -16,6 +16,7 @@ from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
 from campaign.protocol import PlannedTest
 from campaign.protocol.loop_check import sought_instability
+from campaign.protocol.stages import most_of
 from campaign.trial import Trial
 
 GLANCE = 0.2
@@ -77,6 +78,11 @@ def motion_summary(
         worst = max(limits.get(name, ()), key=lambda use: use.margin.fraction, default=None)
         share = f", {worst.margin.fraction:.0%} of the {worst.margin.limit} limit" if worst else ""
         lines.append(f"  {name}: {count} trials{share}")
+    for test in tests:
+        if test.stages and test.name in {trial.test for trial in trials}:
+            most = most_of(test.stages)
+            after = f"at most {most.trials} more trials, {clock(most.duration)}, may follow"
+            lines.append(f"  {test.name}: {after} from what it finds")
     steps = dict.fromkeys(step for trial in trials for step in trial.setup)
     return [*lines, *(f"  you will be asked to: {step}" for step in steps)]
 

@@ -43,6 +43,22 @@ def check(
 
 
 @app.command()
+def fingerprint(
+    bench: Annotated[
+        str,
+        typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name."),
+    ],
+    check: Annotated[
+        bool, typer.Option("--check", help="Only say whether the bench is the one described.")
+    ] = False,
+) -> None:
+    """State in a bench's file that what is known of it is said of the bench as it is now."""
+    from campaign.cli.fingerprint import fingerprint_bench
+
+    raise typer.Exit(fingerprint_bench(bench, check=check))
+
+
+@app.command()
 def device(
     bench: Annotated[
         str,

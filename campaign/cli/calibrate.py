@@ -13,6 +13,7 @@ from rich.text import Text
 
 from campaign.archive.files import why, write_atomically
 from campaign.calibration.document import bench_text, interruption, result_text
+from campaign.calibration.known_values import known_entries
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
 from campaign.calibration.search import Display, Progress, agreeing
@@ -41,6 +42,11 @@ def calibrate_protocol(
     for warning in problem.warnings:
         print_note(warning, style="yellow")
     result, bench = _files(path, results, output)
+    fitted, document = shortest(problem.targets, problem.published), _document(protocol, bench)
+    source, space = problem.calibration.bench, problem.space
+    # Hours later is too late to learn that the bench's file cannot be edited.
+    unknown = {path: {"origin": "fitted"} for p in space.parameters for path, _ in p.fields}
+    bench_text(source, space, space.values(space.present), {"fitted": fitted, "values": unknown})
     with _display(error_console()) as display:
         outcome = calibrate(
             problem,
@@ -49,14 +55,21 @@ def calibrate_protocol(
             display=display,
             leave_out=leave_out,
         )
-    fitted = shortest(problem.targets, problem.published)
-    source = problem.calibration.bench
-    _write(bench, bench_text(source, problem.space, outcome.values, fitted))
+    known = known_entries(outcome, fitted, document)
+    _write(bench, bench_text(source, space, outcome.values, known))
     _write(result, result_text(outcome, bench.name))
     _say(outcome)
     print_note(f"bench: {bench}")
     print_line(str(result))
     return ExitCode.INTERRUPTED if outcome.interrupted else ExitCode.DONE
+
+
+def _document(protocol: Protocol, bench: Path) -> str:
+    """The published values as the bench names them: a path relative to its own file."""
+    if protocol.published == "thesis":
+        return protocol.published
+    file = protocol.path.parent / protocol.published
+    return Path(os.path.relpath(file, bench.parent)).as_posix()
 
 
 def _published(protocol: Protocol) -> Published:

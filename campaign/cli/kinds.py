@@ -20,6 +20,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
 from campaign.plugins import Kinds, stray_entries
+from campaign.protocol.stages import FIRST
 from campaign.unit_grammar import listed
 from campaign.units import convert
 
@@ -73,6 +74,12 @@ def show_kind(name: str) -> None:
         options = getattr(kind, "options", None)  # an export format has none
         _show(room.room, name, f"{kind.summary}{_whose(room, name)}", options)
         if isinstance(kind, Experiment):
+            if kind.fit is not None:
+                print_line()
+                print_line(
+                    "Values that a test does not write follow from its bench where a default does "
+                    "not suit it: `campaign plan` shows them, and why."
+                )
             _show_needs(kind)
 
 
@@ -85,13 +92,17 @@ def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -
 
 
 def _show_needs(experiment: Experiment) -> None:
-    """The channels that its analysis reads."""
+    """The channels that its analysis reads, and the stages that it may have."""
     required, optional = experiment.requires.items(), experiment.can_use.items()
     rows = [(name, "required", f"for {what}") for name, what in required]
     rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
     if rows:
         print_line()
         print_table(("channel", "", "what it is for"), rows)
+    stages = [(f"{n}, {stage.name}", stage.why) for n, stage in enumerate(experiment.stages, FIRST)]
+    if stages:
+        print_line()
+        print_table(("stage", "why it may follow"), stages)
 
 
 def _show_channels() -> None:

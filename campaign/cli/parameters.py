@@ -100,6 +100,15 @@ FromOption = Annotated[
         show_default=False,
     ),
 ]
+TruthOption = Annotated[
+    str,
+    typer.Option(
+        "--truth",
+        metavar="BENCH",
+        help="What sim simulates in place of each test's bench; plan and analysis are not told.",
+        show_default=False,
+    ),
+]
 SignOption = Annotated[
     Path | None,
     typer.Option(

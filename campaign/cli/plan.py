@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
+from campaign.cli.chosen import chosen_lines
 from campaign.cli.cost import Cost, cost_lines, costs
 from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
@@ -20,6 +21,7 @@ from campaign.experiments.interface import lost_without
 from campaign.policy import Policy, Response
 from campaign.protocol import (
     Plan,
+    PlannedStage,
     PlannedTest,
     as_tree,
     check_limits,
@@ -28,7 +30,8 @@ from campaign.protocol import (
 )
 from campaign.protocol.limit_check import in_display_units, one_count
 from campaign.protocol.loop_check import in_words
-from campaign.trial import Role, Trial
+from campaign.protocol.stages import most_of
+from campaign.trial import Most, Role, Trial
 
 NOTES = 5
 """of a test that are shown; the others are in the JSON."""
@@ -86,11 +89,27 @@ def _print(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
         f"{prepared.kind.name}; would write {archive}, at most {bytes_text(plan.size)}"
     )
+    if (most := plan.following).trials:
+        print_line(f"later stages add {in_short(most)}, in the size above")
     for line in policy_lines(plan.policy):
         print_line(line)
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
         print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+
+
+def in_short(most: Most) -> str:
+    """E.g. `at most 14 trials, 0:42 of bench time`."""
+    trials = "1 trial" if most.trials == 1 else f"{most.trials} trials"
+    return f"at most {trials}, {clock(most.duration)} of bench time"
+
+
+def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
+    """Each later stage of a test, over all points of its matrix."""
+    for number in sorted({stage.number for stage in stages}):
+        own = [stage for stage in stages if stage.number == number]
+        points = f" at {len(own)} points" if len(own) > 1 else ""
+        yield f"stage {number}, {own[0].name}: {in_short(most_of(own))}{points}: {own[0].why}"
 
 
 def print_low_margins(plan: Plan) -> None:
@@ -142,6 +161,13 @@ def _row(test: PlannedTest) -> tuple[str, ...]:
     return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
 
 
+def _print_chosen(test: PlannedTest) -> None:
+    if test.chosen:
+        print_line("  not written, and chosen for this bench:")
+    for line in chosen_lines(test):
+        print_line(f"    {line}")
+
+
 def _print_details(
     plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]], cost: Cost | None
 ) -> None:
@@ -161,6 +187,7 @@ def _print_details(
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
+    _print_chosen(test)
     for loss in losses:
         print_line(f"  without {loss['channel']}: no {loss['no']}")
     if test.loops:
@@ -171,6 +198,8 @@ def _print_details(
         print_line(
             f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
         )
+    for line in stage_lines(test.stages):
+        print_line(f"  {line}")
     for line in () if cost is None else cost_lines(cost):
         print_line(f"  {line}")
     notes = Counter(trial.note for trial in trials if trial.note)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from campaign.archive import find_run
 from campaign.backends import backends
-from campaign.backends.interface import Backend, BackendKind
+from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
 from campaign.channels import explained, missing
 from campaign.cli.damage import archive_of
 from campaign.errors import ArchiveError, UsageError
@@ -22,7 +22,7 @@ from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
 from campaign.protocol.overrides import parse_overrides
 from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
-from campaign.trial import Trial
+from campaign.trial import Tree, Trial
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Request:
     Attributes:
         changes: every `--set`, those of the backend included.
         seed: for tests without their own; drawn when None.
+        truth: a bench that is simulated in place of each test's; empty: what the tests say.
     """
 
     protocol: str
@@ -40,6 +41,7 @@ class Request:
     backend: str = "sim"
     allow_large: bool = False
     seed: int | None = None
+    truth: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Prepared:
 
     def open_backend(self) -> Backend:
         """A backend that accepts every trial of the plan. Raises UsageError when it does not."""
-        return open_backend(self.kind, self.options, self.plan.trials)
+        return open_backend(self.kind, self.options, self.plan.trials, self.plan.truths)
 
 
 def prepare(request: Request) -> Prepared:
@@ -63,20 +65,40 @@ def prepare(request: Request) -> Prepared:
     ours = tuple(text for text in request.changes if _is_backend_setting(text))
     theirs = tuple(text for text in request.changes if text not in ours)
     options = backend_options(kind, ours)
-    protocol = load_protocol(path, experiments(), overrides=theirs, shipped=protocols_folder())
+    protocol = load_protocol(
+        path,
+        experiments(),
+        overrides=theirs,
+        shipped=protocols_folder(),
+        truth=request.truth,
+    )
     plan = make_plan(
         protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
     )
     return Prepared(path, plan, kind, options)
 
 
-def open_backend(kind: BackendKind, options: Options, trials: Sequence[Trial]) -> Backend:
+def open_backend(
+    kind: BackendKind,
+    options: Options,
+    trials: Sequence[Trial],
+    truths: Mapping[str, Tree] | None = None,
+) -> Backend:
     """A backend that accepts every one of `trials`, not yet connected.
+
+    `truths`: the plants that the trials name, for a backend that simulates them.
 
     Raises UsageError when it does not, or is known not to record what one of them requires;
     ArchiveError when it does not and the run that it serves is damaged.
     """
     backend = kind.open(options)
+    if isinstance(backend, SimulatesTruth):
+        backend.simulate_instead(truths or {})
+    elif kind.source is not Source.RECORDING and (named := [t for t in trials if t.truth]):
+        raise UsageError(
+            f"the test {named[0].test!r} has a truth, and only a simulation can have one that is "
+            f"chosen: leave it out, or take another backend than {kind.name!r}"
+        )
     source = archive_of(backend)
     refusal = ArchiveError if source is not None and source.damaged else UsageError
     for trial in trials:

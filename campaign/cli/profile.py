@@ -17,6 +17,7 @@ FASTER = {
     "(`backend.longest_step`); the fastest sine and the stiffest contact make steps short",
     Work.SAMPLES: "a lower sample_rate records less",
     Work.TRIAL_FILES: "a lower sample_rate, or fewer and longer trials; a faster disk",
+    Work.MEASURING: "a lower sample_rate records less to be looked at",
     Work.WAITING: "more `--workers`, if processors were idle; a bench that moves sets its own pace",
     Work.SEALING: "a lower sample_rate, or fewer and longer trials; a faster disk",
     Work.REPORT: "leave --report out; `campaign report` makes it at any time",

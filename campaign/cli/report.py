@@ -23,6 +23,7 @@ def report_run(
     templates: Path | None,
     *,
     open_it: bool,
+    measure_anew: bool = False,
 ) -> tuple[Path, ExitCode]:
     """Build the report of the run that `name` means; its page, and whether all could be read."""
     path = find_run(results, name)
@@ -33,6 +34,7 @@ def report_run(
         experiments=experiments(),
         packaged_templates=templates_folder(),
         templates=templates,
+        measure_anew=measure_anew,
     )
     code = say_damaged(path, report.damaged)
     for problem in report.problems:

@@ -25,6 +25,7 @@ from campaign.cli.session import Session, execute
 from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.comparison import changes, differences
+from campaign.physics import truth
 from campaign.physics.bench import Bench
 from campaign.physics.engine_version import (
     DRY_ERRORS,
@@ -36,7 +37,7 @@ from campaign.physics.engine_version import (
 )
 from campaign.physics.friction import is_dry
 from campaign.policy import Policy
-from campaign.trial import Recording, Trial, trial_number
+from campaign.trial import Recording, trial_number
 
 SIM = "sim"
 TIMES = 10
@@ -53,7 +54,8 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     tree = run.header.backend_options if simulated else {}
     options = kind.options.model_validate(tree, context={"si": True})
     trial = archived.trial.model_copy(update={"number": 1})  # it is the only one of its run
-    backend = open_backend(kind, options, [trial])
+    truths = run.header.truth.plants
+    backend = open_backend(kind, options, [trial], truths)
     now = datetime.now(UTC)
     stem = f"rerun-{archived.trial.name}-{run.header.protocol_name or 'run'}"
     with reserved_name(results, stem, now) as lock:
@@ -71,7 +73,10 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
         )
     (again,) = open_run(outcome.archive).trials
     engine = int(run.header.versions.get("engine", FIRST)) if simulated else ENGINE
-    say = _say if engine == ENGINE else partial(_say_change, engine, trial)
+    bench = Bench.model_validate(trial.bench, context={"si": True})
+    if trial.truth:
+        bench = truth.simulated(truths[trial.truth], bench)
+    say = _say if engine == ENGINE else partial(_say_change, engine, bench)
     same = say(f"{archived.trial.name} of {run.name}", before, again.recording())
     print_line(str(outcome.archive))
     return worst_exit_code([same, ExitCode.ARCHIVE if run.damaged else ExitCode.DONE])
@@ -106,11 +111,10 @@ def _say(what: str, before: Recording, again: Recording) -> ExitCode:
 
 
 def _say_change(
-    engine: int, trial: Trial, what: str, before: Recording, again: Recording
+    engine: int, bench: Bench, what: str, before: Recording, again: Recording
 ) -> ExitCode:
     """Another engine has other samples: how much they changed, beside the older one's error."""
     older, found = min(engine, ENGINE), changes(before, again)
-    bench = Bench.model_validate(trial.bench, context={"si": True})
     dry = any(is_dry(each) for each in bench.friction.values())
     bounds = {name: TIMES * _error(older, name, dry=dry) for name in found}
     beyond = [name for name, change in found.items() if not change <= bounds[name]]
@@ -158,9 +162,10 @@ def _header(
             "tests": tuple(test for test in was.tests if test.get("name") == trial.test),
             "only": (trial.test,),
             "backend": SIM,
+            "source": "simulation",
             "backend_options": options,
             "versions": provenance.versions(),
-            "plugins": provenance.plug_ins([trial], SIM),
+            "plugins": provenance.plug_ins([trial], SIM, was.truth.plants.values()),
             "host": provenance.host(),
             "command": provenance.command(),
             "protocol_path": "",

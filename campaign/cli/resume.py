@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,20 +27,26 @@ from campaign.execution.resume import (
     archived_conditions,
     check_resumable,
     differences,
+    followed,
     listed,
     not_repeated,
     same_list,
+    stages_of,
     trial_differences,
 )
 from campaign.options import Options
 from campaign.policy import Policy
-from campaign.protocol import PlannedTest, check_limits, check_loops
-from campaign.trial import Trial
+from campaign.protocol import PlannedStage, PlannedTest, check_limits, check_loops
+from campaign.protocol.bench_file import names_file
+from campaign.trial import Tree, Trial
 
 
 @dataclass(frozen=True)
 class Remade:
-    """The plan as it would be executed today, and how it differs from the archived one."""
+    """The plan as it would be executed today, and how it differs from the archived one.
+
+    Its trials are those of the first stage; what followed from them is in the archive.
+    """
 
     kind: BackendKind
     options: Options
@@ -48,6 +54,8 @@ class Remade:
     tests: tuple[PlannedTest, ...]
     policy: Policy
     changes: tuple[str, ...]
+    stages: tuple[PlannedStage, ...]
+    truths: Mapping[str, Tree]
 
 
 def resume_run(
@@ -73,13 +81,15 @@ def resume_run(
     check_resumable(run)
     with compiling_meanwhile(run.header.backend) as compiling:
         remade = remake(run, port)
+        _check_truth(run, remade.trials)
         _check_changes(run, remade.changes, accepted=accept_changes)
         finished = not_repeated(run)
-        left = [trial for trial in remade.trials if trial.number not in finished]
+        trials = (*remade.trials, *followed(run, remade.trials, finished))
+        left = [trial for trial in trials if trial.number not in finished]
         workers = choose_workers(remade.kind, len(left), workers)
         if sign is not None:
             rehearse_signing(sign)
-        backend = open_backend(remade.kind, remade.options, left)
+        backend = open_backend(remade.kind, remade.options, left, remade.truths)
         wait_until_compiled(compiling)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
     allow_motion(remade.kind, left, remade.tests, yes=yes)
@@ -101,7 +111,7 @@ def resume_run(
     session = Session(
         remade.kind,
         backend,
-        remade.trials,
+        trials,
         remade.policy,
         workers,
         run.name,
@@ -109,6 +119,8 @@ def resume_run(
         clear_stop,
         finished,
         checks_step=is_checked(remade.options),
+        stages=remade.stages,
+        asked=run.stages,
     )
     code = conduct(session, open_archive, report=report, sign=sign)
     return worst_exit_code([code, read])
@@ -118,7 +130,10 @@ def remake(run: RunReader, port: str | None = None) -> Remade:
     """Plan again from the protocol's file; from the archive when that is gone."""
     if port is not None:
         run = _at_port(run, port)
-    protocol = Path(run.header.protocol_path)
+    protocol, truth = Path(run.header.protocol_path), run.header.truth.option
+    if names_file(truth) and not Path(truth).exists():
+        print_warning(f"the truth {truth} is gone: going on with the plan that is in the archive")
+        return _from_archive(run)
     if run.header.protocol_path and protocol.exists():
         return _from_protocol(run, protocol)
     where = f"the protocol {protocol} is gone" if run.header.protocol_path else "no protocol's file"
@@ -148,6 +163,7 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
         backend=header.backend,
         allow_large=True,
         seed=header.seed,
+        truth=header.truth.option,
     )
     prepared = prepare(request)
     plan = prepared.plan
@@ -156,21 +172,28 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
         prepared.kind.name,
         prepared.options.model_dump(mode="json"),
         provenance.versions(),
-        provenance.plug_ins(plan.trials, prepared.kind.name),
+        provenance.plug_ins(plan.trials, prepared.kind.name, plan.truths.values()),
     )
     changes = differences(archived_conditions(run), now)
-    if not same_list(run.plan, plan.trials):
+    if not same_list(run.first_stage, plan.trials):
         why = f":\n{listed(changes)}" if changes else ""
         raise UsageError(
-            f"{run.name}: its {len(run.plan)} trials are not those that {protocol} makes today "
-            f"({len(plan.trials)}){why}\nstart a new run"
+            f"{run.name}: its {len(run.first_stage)} trials are not those that {protocol} makes "
+            f"today ({len(plan.trials)}){why}\nstart a new run"
         )
     check_limits(plan)
     check_loops(plan)
     print_low_margins(plan)
-    changes = changes or trial_differences(run.plan, plan.trials)
+    changes = changes or trial_differences(run.first_stage, plan.trials)
     return Remade(
-        prepared.kind, prepared.options, plan.trials, plan.tests, plan.policy, tuple(changes)
+        prepared.kind,
+        prepared.options,
+        plan.trials,
+        plan.tests,
+        plan.policy,
+        tuple(changes),
+        plan.stages,
+        plan.truths,
     )
 
 
@@ -180,15 +203,30 @@ def _from_archive(run: RunReader) -> Remade:
     options = kind.options.model_validate(header.backend_options, context={"si": True})
     was = archived_conditions(run)
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
-    trials = tuple(run.full_plan.trials())
+    trials = tuple(run.full_plan.trial(planned.number) for planned in run.first_stage)
     now = Conditions(
         was.normalised,
         kind.name,
         options.model_dump(mode="json"),
         provenance.versions(),
-        provenance.plug_ins(trials, kind.name),
+        provenance.plug_ins(trials, kind.name, header.truth.plants.values()),
     )
-    return Remade(kind, options, trials, (), policy, tuple(differences(was, now)))
+    changes = tuple(differences(was, now))
+    truths = header.truth.plants
+    return Remade(kind, options, trials, (), policy, changes, stages_of(header), truths)
+
+
+def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:
+    """What is simulated in place of a bench is archived when a run begins, and stays what it is."""
+    truths = {trial.truth for trial in trials} - {""}
+    had = run.header.truth.plants.keys()
+    if truths <= had and bool(truths) == bool(had):
+        return
+    what = "has no truth today" if not truths else "was begun with another truth, or with none"
+    raise UsageError(
+        f"{run.name}: {what}: its trials would be others, also with --accept-changes; start a new "
+        "run, or give the truth back what it was"
+    )
 
 
 def _check_changes(run: RunReader, changes: Sequence[str], *, accepted: bool) -> None:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, reserved_name
+from campaign.archive.header import Truth
 from campaign.cli.ask import allow_motion
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_low_margins
@@ -18,6 +19,7 @@ from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.protocol import as_tree, check_limits, check_loops
+from campaign.protocol.bench_file import names_file
 from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
 
@@ -86,6 +88,7 @@ def run_protocol(
             clear_stop,
             checks_step=is_checked(prepared.options),
             timing=timing,
+            stages=plan.stages,
         )
         code = conduct(session, open_archive, report=report, sign=sign)
     if stopwatch is not None:
@@ -107,23 +110,33 @@ def run_header(
         protocol_name=prepared.path.stem,
         protocol_path=str(prepared.path.resolve()),
         sources=dict(plan.sources),
+        truth=Truth(
+            option=_absolute(request.truth),
+            sources=dict(plan.truth_sources),
+            plants=dict(plan.truths),
+        ),
         normalised={**plan.normalised, "published": plan.published, "policy": policy},
         tests=tuple(as_tree(plan)["tests"]),
         seed=plan.seed,
         versions=provenance.versions(),
-        plugins=provenance.plug_ins(plan.trials, prepared.kind.name),
+        plugins=provenance.plug_ins(plan.trials, prepared.kind.name, plan.truths.values()),
         host=provenance.host(),
         command=provenance.command(),
         operator=remarks.operator or plan.operator,
         notes="\n".join(filter(None, (plan.notes, remarks.note))),
         tags=tuple(dict.fromkeys((*plan.tags, *remarks.tags))),
         backend=prepared.kind.name,
+        source=prepared.kind.source.value,
         backend_options=prepared.options.model_dump(mode="json"),
         overrides={path: value for path, _, value in map(_parted, request.changes)},
         only=plan.only,
         git_revision=provenance.git_revision(prepared.path),
         fingerprint=plan.fingerprint,
     )
+
+
+def _absolute(truth: str) -> str:
+    return str(Path(truth).resolve()) if names_file(truth) else truth
 
 
 def _parted(change: str) -> tuple[str, str, str]:

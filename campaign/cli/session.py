@@ -12,6 +12,7 @@ from pathlib import Path
 
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.header import SEALED
+from campaign.archive.journal import TrialsFollowed
 from campaign.backends.interface import Backend, BackendKind, StoppedOutside, Timed
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
@@ -22,6 +23,7 @@ from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
+from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.runner import run_plan
@@ -33,10 +35,13 @@ from campaign.execution.safety import (
     safe_at_once,
     safe_when_broken_off,
 )
+from campaign.execution.stages import Stages, refusal_of
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
+from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
+from campaign.protocol import PlannedStage
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Outcome, Trial
 
@@ -46,7 +51,7 @@ class Session:
     """Trials, and the backend that accepts them, not yet connected.
 
     Attributes:
-        trials: the whole plan.
+        trials: the whole plan, and what had followed from it before it is gone on with.
         finished: those that are not executed (again), by number.
         run: the name that the run has or will have.
         yes: whether nobody is asked anything.
@@ -54,6 +59,8 @@ class Session:
         checks_step: whether it is told afterwards what half the step has changed.
         repeats: the run whose trial is repeated; a backend that serves a run says so itself.
         timing: told what takes how long.
+        stages: what may follow from the trials.
+        asked: those of the stages that were asked before, as the journal tells.
     """
 
     kind: BackendKind
@@ -68,6 +75,8 @@ class Session:
     checks_step: bool = False
     repeats: RunReader | None = None
     timing: Timing = UNTIMED
+    stages: tuple[PlannedStage, ...] = ()
+    asked: tuple[TrialsFollowed, ...] = ()
 
     @property
     def source(self) -> RunReader | None:
@@ -183,7 +192,17 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             policy=session.policy,
             attendance=attendance_of(session.kind, display, yes=session.yes),
             supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
+            measure=Measuring(experiments(), session.timing),
             finished=session.finished,
+            stages=Stages(
+                session.stages,
+                session.trials,
+                writer,
+                experiments(),
+                refusal_of(backend),
+                finished=session.finished,
+                asked=session.asked,
+            ),
         )
 
 

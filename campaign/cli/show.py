@@ -4,27 +4,45 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.damage import Damage
-from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialFinished
+from campaign.archive.header import Truth
+from campaign.archive.journal import (
+    Decision,
+    OperatorStep,
+    RunResumed,
+    TrialFinished,
+    TrialsFollowed,
+)
+from campaign.archive.record import plain
 from campaign.archive.signature_file import has_signature, signature_path
 from campaign.archive.story import Lines, read_lines
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table
 from campaign.errors import ExitCode
+from campaign.estimate import Estimate
+from campaign.report.text import interval, pretty_unit
 from campaign.trial import Outcome, Tree
 
 
-def show_archive(name: str | None, results: Path, *, as_json: bool) -> ExitCode:
-    """What a run was, how it ended, its tests, and all that did not go as planned."""
+def show_archive(
+    name: str | None, results: Path, *, as_json: bool, metrics: bool = False
+) -> ExitCode:
+    """What a run was, how it ended, its tests, and all that did not go as planned.
+
+    `metrics`: also what was measured in each recording when it was executed.
+    """
     run = open_run(find_run(results, name))
     story = read_lines(run.journal.encode())
     if as_json:
         print_json(_tree(run, story))
     else:
         _print(run, story)
+        if metrics:
+            _print_metrics(run)
     return say_damaged(run.path, run.damaged)
 
 
@@ -41,8 +59,25 @@ def _print(run: RunReader, story: Lines) -> None:
     _section(("trial", "attempt", "outcome", "reason"), [_attempt(a) for a in _repeated(story)])
     _section(("when", "trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
     _section(("trial", "operator step", "answer"), [_step(s) for s in story.all(OperatorStep)])
+    _section(("stage", "trials", "refused"), [_stage(stage) for stage in run.stages])
     _section(("resumed", "changes"), [(r.at, "; ".join(r.changes)) for r in story.all(RunResumed)])
     _section(("damaged", "why"), [_damage(damage) for damage in run.damaged])
+
+
+def _print_metrics(run: RunReader) -> None:
+    rows = [
+        (trial.trial.name, trial.trial.label, *_metric(found))
+        for trial in run.trials
+        for found in trial.estimates
+    ]
+    _section(("trial", "what", "quantity", "value (95 %)", "unit", "without, because"), rows)
+    if not rows:
+        print_line("no metrics are archived with this run")
+
+
+def _metric(found: Estimate) -> tuple[str, ...]:
+    value = interval(found.value, *found.combined)
+    return found.name, value, pretty_unit(found.unit), found.reason
 
 
 def _section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -74,6 +109,13 @@ def _step(step: OperatorStep) -> tuple[str, ...]:
     return (_name(step.trial), step.step, step.answer)
 
 
+def _stage(stage: TrialsFollowed) -> tuple[str, ...]:
+    numbers = [trial.number for trial in stage.trials]
+    trials = f"{_name(numbers[0])} to {_name(numbers[-1])}" if numbers else "none"
+    refused = "; ".join(f"{each.label}: {each.why}" for each in stage.refused)
+    return (stage.title, trials, stage.reason or refused)
+
+
 def _damage(damage: Damage) -> tuple[str, ...]:
     return (damage.place or "the file", damage.reason)
 
@@ -82,7 +124,9 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
     """Everything that is known without a sample, SI."""
     return {
         "path": str(run.path),
-        "header": run.header.model_dump(mode="json", exclude={"sources"}),
+        "header": run.header.model_dump(
+            mode="json", exclude={"sources": True, "truth": {"sources"}}
+        ),
         "status": run.status,
         "reason": run.reason,
         "safe_state": run.safe_state,
@@ -98,6 +142,8 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
                 "safe_state": trial.ending.safe_state,
                 "started": trial.started,
                 "ended": trial.ended,
+                "metrics": [plain(asdict(found)) for found in trial.estimates],
+                "measured_by": trial.measured_by,
             }
             for trial in run.trials
         ],
@@ -105,6 +151,13 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
         "decisions": [d.model_dump(mode="json", exclude={"event"}) for d in story.all(Decision)],
         "operator_steps": [
             s.model_dump(mode="json", exclude={"event"}) for s in story.all(OperatorStep)
+        ],
+        "stages": [
+            {
+                **s.model_dump(mode="json", exclude={"event", "trials", "trees"}),
+                "trials": [trial.number for trial in s.trials],
+            }
+            for s in run.stages
         ],
         "resumed": [r.model_dump(mode="json", exclude={"event"}) for r in story.all(RunResumed)],
         "damaged": [vars(damage) for damage in run.damaged],
@@ -126,6 +179,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("protocol", header.protocol_name),
         ("backend", header.backend),
         ("only", ", ".join(header.only)),
+        ("truth", _truth(header.truth)),
         ("set", "; ".join(f"{path}={value}" for path, value in header.overrides.items())),
         ("operator", header.operator),
         ("notes", header.notes),
@@ -135,6 +189,14 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
         ("plug-ins", "; ".join(map(_plug_in, header.plugins))),
         ("fingerprint", header.fingerprint),
     ]
+
+
+def _truth(truth: Truth) -> str:
+    """What was simulated in place of the stated benches."""
+    names = ", ".join(dict.fromkeys(str(plant.get("name")) for plant in truth.plants.values()))
+    return f"{names} ({', '.join(truth.sources)}), simulated in place of what is stated" * bool(
+        names
+    )
 
 
 def _signature(run: RunReader) -> str:

@@ -11,14 +11,24 @@ from pydantic import ValidationError
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.damage import Damage
 from campaign.archive.damage_words import of_test
+from campaign.archive.journal import RunResumed, TrialFinished
 from campaign.archive.sound_samples import Trials, without_damaged
+from campaign.archive.story import read_lines
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
+from campaign.published.provenance import NOTHING_ALTERED, Provenance, provenance_of
 from campaign.published.scoreboard import Evidence, evidence_of
 from campaign.published.values import Published, published_values
 from campaign.result import Result
 from campaign.trial import Outcome, Tree
+
+FORMER_SOURCES = {"sim": "simulation", "serial": "hardware", "replay": "recording"}
+"""By backend: where samples came from when archives did not say so themselves."""
+MOVES_NOTHING = ("name", "description", "limits")
+"""Tables and fields of a bench that may be changed within a run: they act on no motion."""
+GONE_ON = "the run was gone on with on a changed bench"
+MEASURE_ANEW = "; `campaign report --measure-anew` does without the metrics that are archived"
 
 
 @dataclass(frozen=True)
@@ -33,6 +43,8 @@ class AnalysedTest:
         experiment, bench: None when this program does not know the kind, or nothing was executed.
         problem: why there is no result, in one line; empty when there is one.
         damaged: what is damaged of its trials; those that cannot be read are not among `trials`.
+        source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
+        provenance: whether its trials ran on the bench that was described.
     """
 
     name: str
@@ -47,6 +59,8 @@ class AnalysedTest:
     result: Result
     problem: str = ""
     damaged: tuple[Damage, ...] = ()
+    source: str = ""
+    provenance: Provenance = NOTHING_ALTERED
 
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
@@ -54,14 +68,26 @@ class AnalysedTest:
 
     def evidence(self) -> Evidence:
         """What it brings to the scoreboard."""
-        found = evidence_of(self.name, self.reproduces, self.result.findings, self.bench)
+        found = evidence_of(
+            self.name,
+            self.reproduces,
+            self.result.findings,
+            self.bench,
+            source=self.source,
+            provenance=self.provenance,
+        )
         lost = any(not math.isfinite(finding.value) for finding in found.findings)
         return replace(found, failed=lost or bool(self.failed or self.problem or self.damaged))
 
 
-def analyse_run(run: RunReader, experiments: Mapping[str, Experiment]) -> tuple[AnalysedTest, ...]:
-    """Analyse every test of a run, in the protocol's order; a failing analysis is one problem."""
-    return tuple(_analyse(run, test, experiments) for test in run.header.tests)
+def analyse_run(
+    run: RunReader, experiments: Mapping[str, Experiment], *, measure_anew: bool = False
+) -> tuple[AnalysedTest, ...]:
+    """Analyse every test of a run, in the protocol's order; a failing analysis is one problem.
+
+    `measure_anew`: measure the recordings by this program, whatever is archived with them.
+    """
+    return tuple(_analyse(run, test, experiments, measure_anew) for test in run.header.tests)
 
 
 def published_of(run: RunReader) -> Published:
@@ -83,10 +109,14 @@ def one_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}"[:300]
 
 
-def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) -> AnalysedTest:
+def _analyse(
+    run: RunReader, test: Tree, experiments: Mapping[str, Experiment], measure_anew: bool
+) -> AnalysedTest:
     name, kind = str(test.get("name", "")), str(test.get("kind", ""))
     options, reproduces = test.get("options"), test.get("reproduces")
     trials = run.trials_of(name)
+    if measure_anew:
+        trials = tuple(trial.unmeasured() for trial in trials)
     experiment, unusable = _experiment(kind, experiments)
     data = TestData(name, kind, options if isinstance(options, dict) else {}, trials)
 
@@ -113,7 +143,52 @@ def _analyse(run: RunReader, test: Tree, experiments: Mapping[str, Experiment]) 
         result=result,
         problem=unusable or problem,
         damaged=tuple(dict.fromkeys((*damaged, *found))),
+        source=run.header.source or FORMER_SOURCES.get(run.header.backend, ""),
+        provenance=provenance_of(
+            (archived.trial for archived in trials),
+            perturbs_bench=experiment is not None and experiment.perturbs_bench,
+            described=_described(run, name),
+            changed=_gone_on(run, name),
+        ),
     )
+
+
+def _described(run: RunReader, test: str) -> Tree | None:
+    """The bench of a test as the protocol has it, with `--set` and without the sweep."""
+    tests = run.header.normalised.get("tests")
+    for tree in tests if isinstance(tests, list) else []:
+        if isinstance(tree, dict) and tree.get("name") == test:
+            bench = tree.get("bench")
+            return bench if isinstance(bench, dict) else None
+    return None
+
+
+def _gone_on(run: RunReader, test: str) -> str:
+    """Why a test had two benches: trials of it were executed after its bench was changed.
+
+    What one resume accepted lasts until the next, which is compared with the beginning again.
+    """
+    numbers = {archived.trial.number for archived in run.trials_of(test)}
+    changed = False
+    for entry in read_lines(run.journal.encode()).entries:
+        if isinstance(entry, RunResumed):
+            changed = any(_is_of_bench(change, test) for change in entry.changes)
+        elif isinstance(entry, TrialFinished) and changed and entry.trial in numbers:
+            return GONE_ON
+    return ""
+
+
+def _is_of_bench(change: str, test: str) -> bool:
+    """Whether an accepted change, as `execution.resume.differences` has it, is of a test's bench.
+
+    Of a bench that several tests share, the first test is named; any test may be another of them.
+    """
+    path, others, _ = change.partition(": ")[0].partition(" (and in ")
+    name, *keys = path.split(".")
+    if keys[:1] == ["matrix"]:
+        keys = keys[1:]
+    moves = keys[:1] == ["bench"] and "".join(keys[1:2]) not in MOVES_NOTHING
+    return moves and (name == test or bool(others))
 
 
 def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Experiment | None, str]:
@@ -134,7 +209,8 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
     except ArchiveError:
         raise
     except Exception as error:  # noqa: BLE001 (one bad analysis must not cost the other tests)
-        return Result(), f"the analysis failed: {one_line(error)}"
+        hint = MEASURE_ANEW if any(trial.estimates for trial in data.trials) else ""
+        return Result(), f"the analysis failed: {one_line(error)}{hint}"
 
 
 def _bench(trials: tuple[ArchivedTrial, ...]) -> Bench | None:

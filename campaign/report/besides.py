@@ -12,13 +12,15 @@ from dataclasses import dataclass
 
 from campaign.archive import RunReader
 from campaign.archive.damage import Damage
-from campaign.archive.journal import Decision, OperatorStep, RunResumed
+from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
 from campaign.archive.story import Lines, read_lines
 from campaign.report import page, tables
 from campaign.report.drift import drift_figure, drift_table, drifts_of
 from campaign.report.figures import draw
 from campaign.report.low_margins import low_margin_table
 from campaign.result import Column, Figure, Table, Value
+
+BY_THE_BACKEND = "the backend says one number of each trial"
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ def besides(run: RunReader, folder: page.Folder) -> Besides:
     told = read_lines(run.journal.encode())
     drifts, problems, damaged = drifts_of(run)
     loops, loop_problems = low_margin_table(run)
-    found = [_decisions(told), _steps(told), _attempts(told), _faults(run), loops]
+    found = [_decisions(told), _steps(told), _attempts(told), _stages(told), _faults(run), loops]
     found += [drift_table(drift) for drift in drifts]
     shown = tuple(_shown(table, folder) for table in found if table.rows)
     figures = tuple(_drawn(drift_figure(drift), folder) for drift in drifts)
@@ -70,7 +72,7 @@ def _decisions(told: Lines) -> Table:
             rows.append({**row, "reason": entry.reason})
     columns = (
         Column("at", "When"),
-        Column("trial", "Trial"),
+        Column("trial", "Trial", exact=True),
         Column("what", "Decision"),
         Column("reason", "Reason"),
     )
@@ -84,7 +86,7 @@ def _steps(told: Lines) -> Table:
     ]
     columns = (
         Column("at", "When"),
-        Column("trial", "Before trial"),
+        Column("trial", "Before trial", exact=True),
         Column("step", "Step"),
         Column("answer", "Answer"),
     )
@@ -106,8 +108,8 @@ def _attempts(told: Lines) -> Table:
         if often[entry.trial] > 1
     ]
     columns = (
-        Column("trial", "Trial"),
-        Column("attempt", "Attempt"),
+        Column("trial", "Trial", exact=True),
+        Column("attempt", "Attempt", exact=True),
         Column("at", "Ended"),
         Column("outcome", "Outcome"),
         Column("reason", "Reason"),
@@ -115,6 +117,26 @@ def _attempts(told: Lines) -> Table:
     )
     note = "The last attempt is the trial; the earlier ones are kept and not analysed."
     return Table("attempts", "Trials executed more than once", columns, tuple(rows), note=note)
+
+
+def _stages(told: Lines) -> Table:
+    rows: list[dict[str, Value]] = []
+    for stage in told.all(TrialsFollowed):
+        first = stage.trials[0].number if stage.trials else None
+        refused = "; ".join(f"{each.label}: {each.why}" for each in stage.refused)
+        count, why = len(stage.trials), stage.reason or refused
+        rows.append(
+            {"at": stage.at, "stage": stage.title, "trials": count, "first": first, "why": why}
+        )
+    columns = (
+        Column("at", "When"),
+        Column("stage", "Stage"),
+        Column("trials", "Trials that follow", exact=True),
+        Column("first", "First of them", exact=True),
+        Column("why", "Refused or failed"),
+    )
+    note = "Trials that follow from what others found are numbered after all planned ones."
+    return Table("stages", "Trials that followed", columns, tuple(rows), note=note)
 
 
 def _faults(run: RunReader) -> Table:
@@ -130,13 +152,17 @@ def _faults(run: RunReader) -> Table:
         fault = ending.fault.value if ending.fault else ""
         rows.append({"trial": trial.trial.number, "fault": fault, "why": ending.reason, **telling})
     columns = (
-        Column("trial", "Trial"),
+        Column("trial", "Trial", exact=True),
         Column("fault", "Fault"),
         Column("why", "Reason"),
-        *(Column(name, name.replace("_", " ").replace(".", ", ")) for name in names),
+        *(Column(name, _label(name), reason=BY_THE_BACKEND) for name in names),
     )
     note = "What the backend measured of its own work has its unit in the name."
     return Table("faults", "Faults, and the work of the backend", columns, tuple(rows), note=note)
+
+
+def _label(name: str) -> str:
+    return name.replace("_", " ").replace(".", ", ")
 
 
 def _scalars(telemetry: Mapping[str, object], prefix: str = "") -> dict[str, Value]:

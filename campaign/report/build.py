@@ -15,16 +15,18 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Scoreboard, score
-from campaign.report import page, tables
+from campaign.report import lines, page, tables
 from campaign.report.analysis import analyse_run, one_line, published_of
 from campaign.report.besides import besides
 from campaign.report.damage_notice import told_on_page
 from campaign.report.output import replaced_folder
 from campaign.report.palette import variables
+from campaign.report.truth import truth_tables
 from campaign.trial import Outcome
 
 FAILED = 200
 """Most failed trials that are listed; the archive has them all."""
+ANEW = "the program that made this page, whatever is archived"
 DAMAGED = 200
 """Most damage that is listed on the page; `tables/damaged.csv` has all."""
 
@@ -51,14 +53,19 @@ def build_report(
     experiments: Mapping[str, Experiment],
     packaged_templates: Path,
     templates: Path | None = None,
+    measure_anew: bool = False,
 ) -> Report:
     """Write `report.html`, `tables/` and `figures/` of `run` into the folder `output`.
 
     The same archive gives the same bytes. A template in `templates` wins over the packaged one of
-    the same name. Raises UsageError when `output` is no report of ours or cannot be written, or
-    when a template is wrong; an older report is then left as it was.
+    the same name. `measure_anew`: as for `analyse_run`.
+
+    Raises UsageError when `output` is no report of ours or cannot be written, or when a template is
+    wrong; an older report is then left as it was.
     """
-    html, folder, report = render(run, output, experiments, packaged_templates, templates)
+    html, folder, report = render(
+        run, output, experiments, packaged_templates, templates, measure_anew
+    )
     with replaced_folder(output) as new:
         for name, text in {"report.html": html, **folder.files}.items():
             path = new / name
@@ -73,15 +80,17 @@ def render(
     experiments: Mapping[str, Experiment],
     packaged_templates: Path,
     templates: Path | None = None,
+    measure_anew: bool = False,
 ) -> tuple[str, page.Folder, Report]:
     """The page's text, the other files, and what there is to say of them; nothing is written."""
     published = published_of(run)
-    tests = analyse_run(run, experiments)
+    tests = analyse_run(run, experiments, measure_anew=measure_anew)
     scoreboard = score(published, [test.evidence() for test in tests])
     folder = page.Folder()
     download = page.scoreboard_download(scoreboard, folder)
     picture = page.overview(scoreboard, folder)
-    sections = page.lay_out(tests, scoreboard, published, folder)
+    truths = truth_tables(run, tests)
+    sections = page.lay_out(tests, scoreboard, published, folder, truths)
     happened = besides(run, folder)
     found = [damage for test in tests for damage in test.damaged]
     damaged = tuple(dict.fromkeys((*run.damaged, *found, *happened.damaged)))
@@ -96,20 +105,22 @@ def render(
         "colours": variables(),
         "agreement": tables.agreement(scoreboard),
         "picture": picture,
-        "scoreboard": [page.shown_line(line) for line in scoreboard.lines],
+        "scoreboard": [lines.shown_line(line) for line in scoreboard.lines],
         "scoreboard_download": download,
-        "statuses": page.statuses(scoreboard),
+        "statuses": lines.statuses(scoreboard),
+        "altered": scoreboard.altered,
         "sections": sections,
         "besides": happened,
         "anchors": page.anchors(sections),
         "failed": _failed(run.trials),
         "failed_count": sum(t.ending.outcome is not Outcome.COMPLETED for t in run.trials),
-        "contradictions": page.contradictions(scoreboard),
+        "contradictions": lines.contradictions(scoreboard),
         "sources": _sources_of(scoreboard, published),
         "problems": (*(f"damaged: {line}" for line in listed(damaged, DAMAGED)), *problems),
         "damage": told_on_page(run, damaged, folder) if damaged else None,
         "command": _command(run),
         "seeds": _seeds(run.trials),
+        "measured_by": ANEW if measure_anew else _measured_by(run.trials),
         "lost": len(lost_trials(run)),
         "not_executed": max(0, len(run.plan) - len(run.trials) - len(lost_trials(run))),
     }
@@ -155,6 +166,11 @@ def _seeds(trials: tuple[ArchivedTrial, ...]) -> str:
     return f"{len(seeds)} seeds from {seeds[0]} to {seeds[-1]}, one per trial in the archive"
 
 
+def _measured_by(trials: tuple[ArchivedTrial, ...]) -> str:
+    """Whose code found what each recording says by itself, when it was executed."""
+    return "; ".join(sorted({trial.measured_by for trial in trials if trial.measured_by}))
+
+
 def _command(run: RunReader) -> str:
     """What repeats this run, where its protocol lies."""
     return shlex.join(_command_words(run))
@@ -167,5 +183,7 @@ def _command_words(run: RunReader) -> Iterator[str]:
         yield from ("--backend", header.backend)
     for test in header.only:
         yield from ("--only", test)
+    if header.truth.option:
+        yield from ("--truth", Path(header.truth.option).name)
     for path, value in sorted(header.overrides.items()):
         yield from ("--set", f"{path}={value}")

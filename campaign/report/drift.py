@@ -22,6 +22,8 @@ from campaign.report.analysis import one_line
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table, Value
 from campaign.trial import Outcome, Recording, Role, Task
 
+ONE_EACH = "one recording each: how they scatter from one to the next is what this table shows"
+
 
 @dataclass(frozen=True)
 class Drift:
@@ -106,11 +108,13 @@ def drift_table(drift: Drift) -> Table:
         for item, rms in zip(drift.trials, drift.rms, strict=True)
     ]
     columns = (
-        Column("trial", "Trial"),
+        Column("trial", "Trial", exact=True),
         Column("role", "Role"),
         Column("started", "Started"),
-        Column("rms", f"RMS of the {_lower(drift.label)}", drift.unit, drift.display),
-        Column("change", "Change from the first", "", "percent"),
+        Column(
+            "rms", f"RMS of the {_lower(drift.label)}", drift.unit, drift.display, reason=ONE_EACH
+        ),
+        Column("change", "Change from the first", "", "percent", reason=ONE_EACH),
     )
     title = f"The same trial of {drift.test} again and again"
     return Table(f"drift-{drift.test}", title, columns, tuple(rows))

@@ -33,6 +33,10 @@ FIGURE_POINTS = 40_000
 """Most points of a figure's lines together; many curves share them."""
 DENSE = 2_000
 """From here on a scatter is drawn as an image: thousands of signs would outweigh the page."""
+LONGEST_BAR = 1.0
+"""Span of a panel's numbers beyond which the bars of their intervals are cut."""
+OUT_OF_SIGHT = 1e-6
+"""of a number: where a bar ends that a logarithmic axis has no end for."""
 FLAT = 1e-4
 """Share of its level that a curve must vary by to be drawn as varying."""
 
@@ -181,13 +185,22 @@ def _draw_panel(ax: Axes, panel: Panel, chosen: dict[str, Look], points: int) ->
     scale_x, scale_y = _scale(panel.x), _scale(panel.y)
     shown = [_prepare(curve, panel, scale_x, scale_y) for curve in panel.curves]
     empty = not any(np.isfinite(y).any() for _, y, _ in shown)
-    for curve, (x, y, y_low) in zip(panel.curves, shown, strict=True):
-        _draw_curve(ax, curve, chosen[_series(curve)], x, y, y_low, points)
+    intervals = [
+        _interval(curve, panel, y) for curve, (_, y, _) in zip(panel.curves, shown, strict=True)
+    ]
+    for curve, (x, y, y_low), ends in zip(panel.curves, shown, intervals, strict=True):
+        look = chosen[_series(curve)]
+        if ends is not None:
+            _draw_interval(ax, curve, ends, look, x, y, points)
+        _draw_curve(ax, curve, look, x, y, y_low, points)
     for set_scale, axis in ((ax.set_xscale, panel.x), (ax.set_yscale, panel.y)):
         if axis.scale == "log" and not empty:
             set_scale("log")
+    ends_shown = [ends for ends in intervals if ends is not None]
+    drawn = [y for _, y, _ in shown]
+    _limit_intervals(ax, np.concatenate([np.empty(0), *drawn]), ends_shown)
     if panel.y.scale == "linear":
-        _spare_rounding_errors(ax, [y for _, y, _ in shown])
+        _spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
     _label_axes(ax, panel, scale_x, scale_y)
     for mark in panel.marks:
         _draw_mark(ax, mark, scale_x, scale_y)
@@ -211,6 +224,70 @@ def _showable(values: Array, axis: Axis, scale: float) -> Array:
     shown = np.asarray(values, dtype=float).ravel() * scale
     shown = np.where(np.isfinite(shown), shown, np.nan)
     return np.where(shown > 0, shown, np.nan) if axis.scale == "log" else shown
+
+
+def _draw_interval(
+    ax: Axes, curve: Curve, ends: tuple[Array, Array], look: Look, x: Array, y: Array, points: int
+) -> None:
+    """The 95 % interval of a curve: bars on points, a band behind a line."""
+    low, high = ends
+    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(low) & np.isfinite(high)
+    if not known.any():
+        return
+    if curve.style not in ("points", "line+points"):
+        some = np.unique(np.linspace(0, len(x) - 1, min(len(x), points)).astype(int))
+        x, low, high = x[some], low[some], high[some]
+        ax.fill_between(x, low, high, color=look.light, alpha=0.18, linewidth=0)
+        return
+    below, above = np.maximum(y - low, 0.0)[known], np.maximum(high - y, 0.0)[known]
+    ax.errorbar(
+        x[known],
+        y[known],
+        yerr=np.vstack([below, above]),
+        fmt="none",
+        ecolor=look.light,
+        elinewidth=0.9,
+        capsize=2.0,
+        capthick=0.9,
+    )
+
+
+def _interval(curve: Curve, panel: Panel, y: Array) -> tuple[Array, Array] | None:
+    """Low and high in display units, each shape (n,); None for a curve that has none.
+
+    A logarithmic axis has no place for a lower end that is not positive: its bar goes out of sight.
+    """
+    if curve.low is None or curve.high is None:
+        return None
+    scale = _scale(panel.y)
+    low, high = (_showable(end, panel.y, scale)[: len(y)] for end in (curve.low, curve.high))
+    if panel.y.scale == "log":
+        given = np.isfinite(np.asarray(curve.low, dtype=float).ravel()[: len(y)])
+        low = np.where(np.isnan(low) & given, OUT_OF_SIGHT * y, low)
+    return low, high
+
+
+def _limit_intervals(ax: Axes, values: Array, ends: Sequence[tuple[Array, Array]]) -> None:
+    """Bars that are far longer than what the points tell are cut, so that those can be told apart.
+
+    `values` are all that is drawn besides the intervals `ends`.
+    """
+    finite = values[np.isfinite(values)]
+    reach = np.concatenate([np.empty(0), *(np.concatenate(pair) for pair in ends)])
+    reach = reach[np.isfinite(reach)]
+    if not finite.size or not reach.size:
+        return
+    bottom, top = float(finite.min()), float(finite.max())
+    if ax.get_yscale() == "log":
+        seen = reach[reach > 10.0 * OUT_OF_SIGHT * bottom]
+        if len(seen) < len(reach):
+            ax.set_ylim(bottom=0.5 * min(bottom, float(seen.min(initial=bottom))))
+        return
+    spare = LONGEST_BAR * max(top - bottom, 0.5 * max(abs(top), abs(bottom)))
+    if reach.min() < bottom - spare or reach.max() > top + spare:
+        low, high = max(bottom - spare, reach.min()), min(top + spare, reach.max())
+        margin = 0.05 * (high - low)
+        ax.set_ylim(min(low, bottom) - margin, max(high, top) + margin)
 
 
 def _draw_curve(

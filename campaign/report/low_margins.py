@@ -15,6 +15,7 @@ from campaign.report.analysis import one_line
 from campaign.result import Column, Table, Value
 from campaign.trial import Task, canonical_json
 
+COMPUTED = "computed from the description of the bench, and not measured"
 NOTE = (
     "The loop is opened at the rate error, or under a torque command at the compensation torque, "
     "for small motions: stuck, with every interface in presliding, and in fast sliding. Below 20° "
@@ -38,14 +39,14 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
         rows += [{"test": test, **_row(use)} for use in low]
     columns = (
         Column("test", "Test"),
-        Column("trial", "Trial"),
+        Column("trial", "Trial", exact=True),
         Column("compensation", "Compensation"),
         Column("regime", "Regime"),
         Column("state", "Loop"),
-        Column("crossover", "Crossover", "rad/s", "rad/s"),
-        Column("phase", "Phase margin", "rad", "deg"),
-        Column("gain", "Gain margin (dB)"),
-        Column("growth", "Fastest pole (1/s)"),
+        Column("crossover", "Crossover", "rad/s", "rad/s", reason=COMPUTED),
+        Column("phase", "Phase margin", "rad", "deg", reason=COMPUTED),
+        Column("gain", "Gain margin (dB)", reason=COMPUTED),
+        Column("growth", "Fastest pole (1/s)", reason=COMPUTED),
     )
     table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=NOTE)
     return table, problems

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.scoreboard import Line, Scoreboard, Status
 from campaign.published.values import Cell
 from campaign.report.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS
@@ -66,7 +66,7 @@ def _draw_table(
     ax.text(-0.015, above, heading.capitalize(), weight="bold", fontsize=8, **text)
     ax.axhline(rows[0] - gap, color=HAIRLINE.light, linewidth=0.6, zorder=0)
     for line, y in zip(group, rows, strict=True):
-        look = STATUS[line.status]
+        look = STATUS[line.status or Status.SIMULATED]
         deviation = line.deviation or 0.0
         ax.plot([0, deviation], [y, y], color=look.light, linewidth=1.0, alpha=0.55)
         ax.plot(

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from campaign.experiments.swept_tables import table_names
 from campaign.options import Options
 from campaign.plain_text import on_a_page
-from campaign.published.scoreboard import Line, Scoreboard, Status, to_csv
+from campaign.published.scoreboard import Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
 from campaign.report import tables
 from campaign.report.analysis import AnalysedTest, one_line
 from campaign.report.figures import draw, inline
+from campaign.report.lines import ShownLine, shown_line
 from campaign.report.names import Names, figure_name, stood_for
-from campaign.report.overview import cell_name, draw_overview
-from campaign.report.palette import STATUS
-from campaign.report.text import minus, number, percent, pretty_unit
+from campaign.report.overview import draw_overview
+from campaign.report.text import number, pretty_unit
 from campaign.result import Figure, Table
 from campaign.trial import canonical_json
 from campaign.units import Quantity, convert
@@ -26,7 +26,6 @@ LINKED = 300_000
 """Characters of a CSV file up to which the page carries it; a longer one is only a file."""
 LISTED = 12
 """Most values of a sweep that are written out."""
-SIGNS = {"o": "●", "D": "◆", "s": "■", "P": "✚", "v": "▼", "X": "✖", "x": "✕"}
 
 
 @dataclass(frozen=True)
@@ -64,24 +63,6 @@ class ShownTable:
 
 
 @dataclass(frozen=True)
-class ShownLine:
-    """A published cell beside what the run found, as text."""
-
-    table: str
-    name: str
-    unit: str
-    published: str
-    reproduced: str
-    deviation: str
-    status: str
-    css: str
-    sign: str
-    agrees: bool | None
-    notes: tuple[str, ...]
-    test: str
-
-
-@dataclass(frozen=True)
 class Comparison:
     """A published table beside what the run found."""
 
@@ -91,13 +72,15 @@ class Comparison:
     title: str
     source: str
     lines: tuple[ShownLine, ...]
-    missing: tuple[str, ...]
     download: Download
 
 
 @dataclass(frozen=True)
 class Section:
-    """One test on the page; `left_out` are those of the `problems` that are damaged trials."""
+    """One test on the page; `left_out` are those of the `problems` that are damaged trials.
+
+    `truth`: what it found beside what is true, where that is known.
+    """
 
     anchor: str
     test: AnalysedTest
@@ -107,6 +90,7 @@ class Section:
     comparisons: tuple[Comparison, ...]
     problems: tuple[str, ...]
     left_out: tuple[str, ...] = ()
+    truth: ShownTable | None = None
 
 
 @dataclass
@@ -147,15 +131,26 @@ class Folder:
 
 
 def lay_out(
-    tests: Sequence[AnalysedTest], scoreboard: Scoreboard, published: Published, folder: Folder
+    tests: Sequence[AnalysedTest],
+    scoreboard: Scoreboard,
+    published: Published,
+    folder: Folder,
+    truths: Mapping[str, Table] | None = None,
 ) -> tuple[Section, ...]:
-    """Sections in the protocol's order; each published table stands with its first test."""
+    """Sections in the protocol's order; each published table stands with its first test.
+
+    `truths`: by test, what is true beside what it found, where that is known.
+    """
     spoken: set[str] = set()
     sections = []
     for place, test in enumerate(tests, start=1):
         mine = [n for n in published if n in test.reproduces and n not in spoken]
         spoken.update(mine)
-        sections.append(_section(place, test, scoreboard, [published[n] for n in mine], folder))
+        section = _section(place, test, scoreboard, [published[n] for n in mine], folder)
+        truth = (truths or {}).get(test.name)
+        if truth is not None:
+            section = replace(section, truth=_table(test, truth, folder))
+        sections.append(section)
     return tuple(sections)
 
 
@@ -176,47 +171,11 @@ def overview(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
 
 
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
-    """`tables/scoreboard.csv`."""
-    return folder.table(to_csv(scoreboard.lines), "scoreboard")
-
-
-def shown_line(line: Line) -> ShownLine:
-    """A line of the scoreboard as text."""
-    cell, look = line.cell, STATUS[line.status]
-    claim = {"near": "≈ ", "at most": "≤ ", "at least": "≥ "}.get(cell.relation, "")
-    return ShownLine(
-        table=cell.table,
-        name=cell_name(line.cell),
-        unit=pretty_unit(cell.unit),
-        published=claim + minus(cell.printed),
-        reproduced=number(line.reproduced, decimals=cell.decimals or 0),
-        deviation=percent(line.deviation),
-        status=str(line.status),
-        css=look.name,
-        sign=SIGNS[look.marker],
-        agrees=line.agrees,
-        notes=tuple(note for note in (cell.reason, *cell.notes) if note),
-        test=line.test,
-    )
-
-
-def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
-    """Status, its CSS name, its sign and how many lines have it; those that occur."""
-    counts = {s: sum(line.status is s for line in scoreboard.lines) for s in Status}
-    return tuple(
-        (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], count)
-        for status, count in counts.items()
-        if count
-    )
-
-
-def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], str], ...]:
-    """Per table and reason: the cells where the document contradicts itself."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for line in scoreboard.lines:
-        if line.status is Status.INCONSISTENT:
-            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
-    return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())
+    """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
+    download = folder.table(to_csv(scoreboard.lines), "scoreboard")
+    if scoreboard.further:
+        folder.table(to_csv(scoreboard.further, tests=True), "scoreboard-runs")
+    return download
 
 
 def _section(
@@ -304,7 +263,6 @@ def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -
         title=table.title,
         source=table.source,
         lines=tuple(shown_line(line) for line in lines),
-        missing=tuple(cell_name(cell) for cell in scoreboard.missing if cell.table == table.name),
         download=folder.table(tables.published_csv(lines), table.slug),
     )
 
@@ -317,6 +275,8 @@ def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
             "Bench",
             test.bench.name + (f": {test.bench.description}" if test.bench.description else ""),
         )
+    if test.source:
+        yield "Samples from", test.source
     count = f"{len(test.trials)} executed"
     yield "Trials", count + (f", {len(test.failed)} not completed" if test.failed else "")
     points: dict[str, dict[str, Any]] = {}

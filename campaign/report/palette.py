@@ -44,6 +44,7 @@ _RED = ("#b3202c", "#ff8087")
 _PURPLE = ("#8a3f9c", "#d69be6")
 _OLIVE = ("#7a6a00", "#d9c84a")
 _CYAN = ("#0b7a8c", "#54cfe0")
+_BROWN = ("#8f4a12", "#e0a878")
 _PINK = ("#b8347c", "#f58fc4")
 
 SERIES = {
@@ -74,7 +75,9 @@ STATUS = {
     Status.PREDICTED: Look("st-predicted", *_GREEN, (), "D"),
     Status.RECOVERED: Look("st-recovered", *_CYAN, (), "s"),
     Status.RECOMPUTED: Look("st-recomputed", *_PURPLE, (), "P"),
+    Status.SELECTED: Look("st-selected", *_PINK, (), "*"),
     Status.CALIBRATED: Look("st-calibrated", *_OLIVE, (), "v"),
+    Status.ALTERED: Look("st-altered", *_BROWN, (), "^"),
     Status.INCONSISTENT: Look("st-inconsistent", *_RED, (), "X"),
     Status.NOT_REPRODUCIBLE: Look("st-not-reproducible", *_GREY, (), "x"),
 }

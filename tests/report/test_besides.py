@@ -7,16 +7,25 @@ from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
+import pytest
 
+import campaign.report.besides
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.archive.journal import Decision, OperatorStep
+from campaign.archive.journal import (
+    Decision,
+    OperatorStep,
+    TrialFinished,
+    TrialRefused,
+    TrialsFollowed,
+)
 from campaign.errors import ArchiveError
 from campaign.report.besides import besides
 from campaign.report.build import render
 from campaign.report.drift import drift_table, drifts_of
 from campaign.report.low_margins import low_margin_table
-from campaign.report.page import Folder
-from campaign.trial import Channel, Ending, Fault, Outcome, Recording, Role
+from campaign.report.page import Folder, ShownTable
+from campaign.result import Table
+from campaign.trial import Channel, Ending, Fault, Outcome, Recording, Role, SafeState
 
 
 class InMemory(ArchivedTrial):
@@ -67,6 +76,23 @@ def test_the_journal_and_the_faults(made_up: ModuleType, tmp_path: object) -> No
     assert "Preload it" in folder.files["tables/besides-operator-steps.csv"]
     assert "drive" in folder.files["tables/besides-faults.csv"]
     assert "7" in folder.files["tables/besides-faults.csv"].splitlines()[1]
+
+
+def test_stages_are_told_with_what_was_refused_and_why(made_up: ModuleType, tmp_path: object):
+    run = made_up.made_up_run(tmp_path)
+    refused = (TrialRefused(label="sea [speed=9]", why="too fast"),)
+    at, point = "2026-11-21T10:00:00Z", {"compensation": "none"}
+    lines = [
+        TrialsFollowed(at=at, test="sea", stage=2, name="more", point=point, refused=refused),
+        TrialsFollowed(at=at, test="sea", stage=3, name="again", reason="ValueError: no slope"),
+    ]
+    journal = "".join(line.model_dump_json() + "\n" for line in lines)
+    folder = Folder()
+    besides(replace(run, journal=run.journal + journal), folder)
+    _, first, second = folder.files["tables/besides-stages.csv"].splitlines()
+    assert "sea at compensation = none, stage 2 (more)" in first
+    assert "sea [speed=9]: too fast" in first
+    assert "ValueError: no slope" in second
 
 
 def test_a_damaged_check_is_left_out_of_the_drift_and_told(
@@ -149,3 +175,52 @@ def test_a_bench_that_cannot_be_read_is_a_problem_and_no_more(
     table, problems = low_margin_table(run)
     assert not table.rows
     assert problems[0].startswith("the loops of ")
+
+
+def test_every_number_besides_has_an_interval_or_says_why_not(
+    made_up: ModuleType, tmp_path: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables: list[Table] = []
+
+    def keep(table: Table, folder: Folder) -> ShownTable:
+        tables.append(table)
+        return shown(table, folder)
+
+    shown = campaign.report.besides._shown
+    monkeypatch.setattr(campaign.report.besides, "_shown", keep)
+    hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE, telemetry={"ring": {"fill_max": 7}})
+    run = with_gain(on_platform(made_up, tmp_path), 26.0)
+    checks = [of(run, n, Role.CHECK, Ending(Outcome.COMPLETED)) for n in (21, 42)]
+    attempts = [finished(1, attempt) for attempt in (1, 2)]
+    lines = [Decision(at="2026-11-21T10:00:00Z", trial=3, decision="retry", reason="hot")]
+    lines += [OperatorStep(at="2026-11-21T10:01:00Z", trial=4, step="Preload it", answer="done")]
+    journal = "".join(line.model_dump_json() + "\n" for line in (*lines, *attempts))
+    trials = (*run.trials, *checks, of(run, 9, Role.MEASUREMENT, hot))
+    besides(replace(run, journal=journal, trials=trials), Folder())
+    assert {table.key.partition("-")[0] for table in tables} == {
+        "decisions",
+        "operator",
+        "attempts",
+        "faults",
+        "low",
+        "drift",
+    }
+    for table in tables:
+        for column in table.columns:
+            cells = [row.get(column.name) for row in table.rows]
+            numbers = [c for c in cells if isinstance(c, int | float) and not isinstance(c, bool)]
+            assert not numbers or column.exact or column.reason, (table.key, column.name)
+
+
+def finished(trial: int, attempt: int) -> TrialFinished:
+    return TrialFinished(
+        at="2026-11-21T10:00:00Z",
+        trial=trial,
+        attempt=attempt,
+        file=f"trial-0000{trial}.nxs",
+        sha256="0" * 64,
+        bytes=1,
+        outcome=Outcome.COMPLETED,
+        reason="",
+        safe_state=SafeState.CONFIRMED,
+    )

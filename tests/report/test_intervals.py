@@ -1,0 +1,246 @@
+"""Intervals as a reader meets them: in text, in tables, in their files and in figures."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.report import figures
+from campaign.report.tables import REASONS, remarks, show, table_csv
+from campaign.report.text import interval
+from campaign.result import Axis, Cell, Column, Curve, Figure, Panel, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "text"),
+    [
+        (3.87, 3.75, 3.99, "3.87 ± 0.12"),
+        (3.8712, 3.8612, 3.8812, "3.871 ± 0.010"),
+        (-3.87, -3.99, -3.75, "−3.87 ± 0.12"),
+        (0.0, -0.5, 0.5, "0.00 ± 0.50"),
+        (123.0, 111.0, 135.0, "123 ± 12"),
+        (12345.0, 12000.0, 12690.0, "12345 ± 345"),
+        (5.0, 4.9004, 5.0996, "5.00 ± 0.10"),  # 0.0996 has two digits as 0.10
+        (3.87, 3.8, 4.1, "3.87 (3.80 to 4.10)"),
+        (-3.87, -4.1, -3.8, "−3.87 (−4.10 to −3.80)"),
+        (2.0, 2.0, 3.0, "2.00 (2.00 to 3.00)"),
+        (2.0, 1.5, None, "2 (≥ 1.5)"),
+        (2.0, None, 2.5, "2 (≤ 2.5)"),
+        (2.0, None, None, "2"),
+        (2.0, -math.inf, math.inf, "2"),
+        (math.nan, 1.0, 2.0, "–"),
+        (None, None, None, "–"),
+        (7.0, 7.0, 7.0, "7 ± 0"),
+        (1.0, 1.0 - 1e-15, 1.0 + 1e-15, "1 ± 0"),  # rounding errors are no interval
+        (1.4804747, 1.4804747 - 2e-10, 1.4804747 + 2e-10, "1.4804747 ± 2.0 × 10⁻¹⁰"),
+        (1.5e-7, 1.4e-7, 1.6e-7, "1.50 × 10⁻⁷ ± 1.0 × 10⁻⁸"),
+        (1.5e-7, 1.4e-7, 1.9e-7, "1.50 × 10⁻⁷ (1.40 × 10⁻⁷ to 1.90 × 10⁻⁷)"),
+        (0.0, -2e-7, 2e-7, "0 ± 2.0 × 10⁻⁷"),
+    ],
+)
+def test_a_number_is_shown_with_its_interval(
+    value: float | None, low: float | None, high: float | None, text: str
+) -> None:
+    assert interval(value, low, high) == text
+
+
+def test_what_is_shown_holds_what_was_found() -> None:
+    """Ends of 2 000 random intervals are shown within 6 % of a half-width."""
+    draw = np.random.default_rng(911)
+    for _ in range(2000):
+        half = 10.0 ** draw.uniform(-4, 4)
+        value = float(draw.normal() * half * 10.0 ** draw.uniform(-1, 4))
+        low, high = value - half * draw.uniform(0.5, 1), value + half * draw.uniform(0.5, 1)
+        told = interval(value, low, high).replace("−", "-")
+        assert "×" not in told or abs(value) > 1e5
+        numbers = [float(part) for part in re.findall(r"-?\d+(?:\.\d+)?", told)]
+        if "×" in told or "to" not in told:
+            continue
+        wide = 0.5 * (high - low)
+        assert numbers[1] == pytest.approx(low, abs=0.06 * wide)
+        assert numbers[2] == pytest.approx(high, abs=0.06 * wide)
+
+
+# Tables
+
+
+def estimate(value: float = 1.0, half: float | None = 0.1, **more: object) -> Estimate:
+    low, high = (None, None) if half is None else (value - half, value + half)
+    return replace(Estimate("x", value, "N m", low, high, 0.95), **more)
+
+
+def table(columns: dict[str, list[Cell]], **how: dict[str, object]) -> Table:
+    length = max(map(len, columns.values()))
+    rows = tuple({name: cells[k] for name, cells in columns.items()} for k in range(length))
+    described = tuple(
+        Column(name, name.upper(), "N m", "mN m", **how.get(name, {})) for name in columns
+    )
+    return Table("key", "Title", described, rows)
+
+
+ALONE = estimate(half=None, reason="a single trial")
+WIDE = estimate(half=3.0, origin=Origin.NOT_DETERMINED, reason="its interval is too wide")
+LOST = Estimate.without_interval("x", math.nan, "N m", "it never slid")
+BOUND = estimate(half=None, kind="at least")
+
+
+@pytest.mark.parametrize(
+    ("columns", "how", "said"),
+    [
+        ({"a": [estimate()]}, {}, []),
+        ({"a": [BOUND]}, {}, []),
+        ({"a": ["text", None]}, {}, []),
+        ({"a": [1.0]}, {"a": {"exact": True}}, []),
+        ({"a": [True]}, {"a": {"reason": "never said of truths"}}, []),
+        ({"a": [1.0], "b": [estimate()]}, {"a": {"reason": "of ranks"}}, ["A (of ranks)."]),
+        (
+            {"a": [ALONE, estimate()], "b": [ALONE, ALONE]},
+            {},
+            ["A (1 of 2 rows: a single trial); B (a single trial)."],
+        ),
+        ({"a": [ALONE], "b": [ALONE], "c": [estimate()]}, {}, ["A, B (a single trial)."]),
+        ({"a": [ALONE], "b": [ALONE]}, {}, ["all numbers (a single trial)."]),
+        ({"a": [ALONE], "b": [3]}, {"b": {"exact": True}}, ["A (a single trial)."]),
+    ],
+)
+def test_each_reason_for_no_interval_is_said_once(
+    columns: dict[str, list[Cell]], how: dict[str, dict[str, object]], said: list[str]
+) -> None:
+    assert list(remarks(table(columns, **how))) == [f"Without an interval: {s}" for s in said]
+
+
+def test_what_is_not_determined_is_said_apart() -> None:
+    found = remarks(table({"a": [WIDE, ALONE], "b": [LOST, estimate()]}))
+    assert list(found) == [
+        "Without an interval: A (1 of 2 rows: a single trial).",
+        (
+            "Not determined: A (1 of 2 rows: its interval is too wide); "
+            "B (1 of 2 rows: it never slid)."
+        ),
+    ]
+
+
+def test_systematic_parts_that_nobody_has_sized_are_named() -> None:
+    """Of what has an interval: where there is none, none can lack them."""
+    loose = estimate(systematic=(Systematic("inertia"), Systematic("torque constant", 0.1)))
+    bare = replace(ALONE, systematic=(Systematic("inertia"),))
+    found = remarks(table({"a": [loose, loose], "b": [loose, bare]}))
+    assert list(found) == [
+        "Without an interval: B (1 of 2 rows: a single trial).",
+        "Of unknown size, and in no interval: inertia.",
+    ]
+
+
+def test_many_reasons_are_not_all_said() -> None:
+    cells: list[Cell] = [estimate(half=None, reason=f"{n} samples") for n in range(20)]
+    (said,) = remarks(table({"a": cells}))
+    assert said.count("samples") == REASONS - 1
+    assert said.endswith(f"and others, for {20 - REASONS + 1} more reasons.")
+
+
+def test_cells_have_interval_bound_and_origin_in_display_units() -> None:
+    assumed = estimate(2.0, None, origin=Origin.ASSUMED, reason="a damping ratio of one")
+    shown = show(table({"a": [estimate(0.0102, 0.0003), BOUND, WIDE, LOST, assumed, 1.0]}))
+    assert [row[0].text for row in shown.rows] == [
+        "10.20 ± 0.30",
+        "≥ 1000",
+        "1000 ± 3000 (not determined)",
+        "–",
+        "2000 (assumed)",
+        "1000",
+    ]
+    assert all(row[0].number for row in shown.rows)
+
+
+def test_the_file_has_the_ends_behind_its_old_columns() -> None:
+    """With the systematic part: 0.1 and 1.959964 times 0.2 in squares is 0.404547."""
+    shifted = estimate(1.0, 0.1, systematic=(Systematic("inertia", 0.2),))
+    text = table_csv(table({"a": [shifted, ALONE], "b": [1.0, 2.0]}))
+    head, first, second = text.splitlines()
+    assert head == "a_mN_m,b_mN_m,a_mN_m_low,a_mN_m_high"
+    numbers = [float(cell) for cell in first.split(",")]
+    assert numbers == pytest.approx([1000.0, 1000.0, 595.453, 1404.547], abs=0.01)
+    assert second == "1000.0,2000.0,,"
+
+
+# Figures
+
+
+def drawn(curve: Curve, monkeypatch: pytest.MonkeyPatch, scale: str = "linear") -> Axes:
+    """The axes of a panel with one curve, in mN m."""
+    found: list[Axes] = []
+    original: Callable[..., None] = figures._draw_panel
+
+    def keep(ax: Axes, *rest: object) -> None:
+        original(ax, *rest)
+        found.append(ax)
+
+    monkeypatch.setattr(figures, "_draw_panel", keep)
+    y = Axis("Torque", "N m", "mN m", scale=scale)  # type: ignore[arg-type]
+    panel = Panel(Axis("Rate"), y, [curve])
+    figures.draw(Figure("key", "Title", "Caption", "Alt", (panel,)))
+    return found[0]
+
+
+def bars(ax: Axes) -> list[tuple[float, float]]:
+    """Lower and upper end of every bar, by its x."""
+    lines = [line for collection in ax.collections for line in collection.get_segments()]  # type: ignore[attr-defined]
+    return [(float(line[0][1]), float(line[1][1])) for line in sorted(lines, key=lambda s: s[0][0])]
+
+
+X = np.array([1.0, 2.0, 3.0])
+
+
+def test_points_have_bars_where_there_is_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    lopsided = replace(estimate(0.003, 0.0), low=0.0025, high=0.005)
+    found = [estimate(0.002, 0.0005), ALONE, lopsided]
+    found[1] = replace(found[1], value=0.001)
+    ax = drawn(Curve.of(X, found, "a", "lugre"), monkeypatch)
+    assert np.array(bars(ax)) == pytest.approx(np.array([(1.5, 2.5), (2.5, 5.0)]))
+
+
+def test_a_line_has_a_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    curve = Curve.of(X, [estimate(v, 0.1) for v in (1.0, 2.0, 3.0)], "a", "lugre", "line")
+    (band,) = drawn(curve, monkeypatch).collections
+    reach = band.get_datalim(band.axes.transData)  # type: ignore[union-attr]
+    assert (reach.y0, reach.y1) == pytest.approx((900.0, 3100.0))
+
+
+def test_the_systematic_part_is_in_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    shifted = estimate(1.0, 0.3, systematic=(Systematic("inertia", 0.4 / 1.959964),))
+    ax = drawn(Curve.of(X[:1], [shifted], "a", "lugre"), monkeypatch)
+    assert bars(ax)[0] == pytest.approx((500.0, 1500.0))
+
+
+def test_bars_are_in_sight_unless_they_would_hide_the_points(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wide = drawn(Curve.of(X, [estimate(7.0, 1.0)] * 3, "a", "lugre"), monkeypatch)
+    low, high = wide.get_ylim()
+    assert low < 6000.0 < 8000.0 < high  # although the numbers are all the same
+    found = [estimate(1.0, 0.1), estimate(2.0, 900.0), estimate(3.0, 0.1)]
+    cut = drawn(Curve.of(X, found, "a", "lugre"), monkeypatch)
+    low, high = cut.get_ylim()
+    assert -3000.0 < low < 900.0
+    assert 3100.0 < high < 7000.0
+
+
+def test_a_logarithmic_axis_shows_a_bar_that_reaches_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = [estimate(0.1, 0.05), estimate(0.01, 0.02), estimate(1.0, 0.1)]
+    ax = drawn(Curve.of(X, found, "a", "lugre"), monkeypatch, "log")
+    bottom, top = ax.get_ylim()
+    assert bottom == pytest.approx(5.0)
+    assert top > 1000.0
+    ends = bars(ax)
+    assert ends[1][0] < bottom
+    assert ends[1][1] == pytest.approx(30.0)
