@@ -20,6 +20,7 @@ def open(  # noqa: A001 (it is `campaign.open`, as there are `gzip.open` and `h5
     results: str | PathLike[str] = "results",
     *,
     strict: bool = False,
+    measure_anew: bool = False,
 ) -> RunView:
     """Open an archived run; samples are read only when they are asked for.
 
@@ -28,10 +29,12 @@ def open(  # noqa: A001 (it is `campaign.open`, as there are `gzip.open` and `h5
         results: the folder in which names are looked up.
         strict: whether damage that need not keep the rest from being used is an error all the
             same; else it is an `ArchiveWarning`, here and where an analysis leaves a trial out.
+        measure_anew: whether analyses measure the recordings anew, by this program, and leave aside
+            what was measured and archived when they were executed.
 
     Raises UsageError when there is no such run, ArchiveError when it cannot be read; both are
     `campaign.errors.CampaignError`.
     """
     from campaign.access import open_view
 
-    return open_view(run, results, strict=strict)
+    return open_view(run, results, strict=strict, measure_anew=measure_anew)

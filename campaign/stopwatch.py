@@ -27,6 +27,7 @@ class Work(StrEnum):
     ENGINE = "engine"
     SAMPLES = "samples and limits"
     TRIAL_FILES = "trial files and journal"
+    MEASURING = "metrics of recordings"
     WAITING = "waiting for trials"
     SEALING = "sealed file"
     REPORT = "report"

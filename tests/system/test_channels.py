@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,7 +23,7 @@ from campaign.resources import protocols_folder
 from campaign.trial import Ending, Role, SafeState, Trial
 from tests.system.user import SEA, write
 
-ALL = SimBackend.channels(None, None)  # type: ignore[arg-type]
+ALL = SimBackend.channels(None, SimpleNamespace(truth=""))  # type: ignore[arg-type]
 TWO = f"""{SEA}
 [[test]]
 name = "map"
@@ -74,12 +75,14 @@ def planned(folder: Path, text: str) -> tuple[Trial, ...]:
 def test_a_trial_says_what_its_analysis_requires_and_can_use(tmp_path: Path):
     plain, compensated, warm_up, *speeds = planned(tmp_path, TWO)
     assert plain.requires == compensated.requires == ("pointing_error",)
-    assert plain.can_use == ("base_rate", "friction_torque", "relative_rate")
-    assert compensated.can_use == ("base_rate", "compensation_torque", "relative_rate")
+    sensors = {"base_rate", "gyro_rate", "relative_angle", "relative_rate"}
+    assert set(plain.can_use) == {*sensors, "friction_torque"}
+    assert set(compensated.can_use) == {*sensors, "compensation_torque"}
     assert warm_up.role is Role.WARM_UP
     assert warm_up.requires == warm_up.can_use == ()
     for trial in speeds:
-        assert (trial.requires, trial.can_use) == (("drive_torque", "gyro_rate"), ("command",))
+        assert trial.requires == ("drive_torque", "gyro_rate")
+        assert trial.can_use == ("command", "relative_angle")
     bare = plain.model_copy(update={"requires": (), "can_use": ()})
     assert Trial.model_validate(bare.model_dump()).fingerprint == plain.fingerprint
 

@@ -38,11 +38,12 @@ def test_the_scoreboard_reproduces_the_published_stabilization_error(quickstart)
         lines = list(csv.DictReader(file))
     assert list(lines[0]) == [
         *("table", "row", "column", "unit", "published", "reproduced"),
-        *("deviation_percent", "status"),
+        *("deviation_percent", "status", "low", "high", "verdict", "source"),
     ]
     none = [line for line in lines if (line["table"], line["row"]) == ("5.2", "none")]
     assert [float(line["published"]) for line in none] == [0.4844]
     assert float(none[0]["reproduced"]) == pytest.approx(0.48841, rel=0.01)
+    assert (none[0]["status"], none[0]["source"]) == ("selected", "simulation")
 
 
 def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart, tmp_path: Path):
@@ -121,6 +122,43 @@ def test_init_gives_a_folder_to_start_from_and_never_overwrites(tmp_path: Path):
     refused = campaign(tmp_path, "init", "lab", code=2)
     assert "nothing was written" in refused.err
     assert (lab / "protocols" / "quickstart.toml").read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_init_writes_protocols_that_fit_a_bench_of_ones_own(tmp_path: Path):
+    shipped = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
+    small = shipped.replace('angle = "120 deg"', 'angle = "4 deg"')
+    assert small != shipped
+    write(tmp_path, small, "small-rig.toml")
+    said = campaign(tmp_path, "init", "lab", "--bench", "small-rig.toml")
+    lab = tmp_path / "lab"
+    assert "of bench time" in said.out
+    assert not said.err
+    assert (lab / "benches" / "small-rig.toml").read_text("utf-8") == small
+    plan = json.loads(campaign(lab, "plan", "identify.toml", "--json").out)
+    assert {test["kind"] for test in plan["tests"]} >= {"velocity_map", "breakaway"}
+    (chosen,) = [test["chosen"] for test in plan["tests"] if test["kind"] == "velocity_map"]
+    assert chosen["max_travel"] == "80 % of the angle limit"
+    assert "80 % of the angle limit" in (lab / "identify.toml").read_text("utf-8")
+    campaign(lab, "plan", "stabilize.toml")
+    write(lab, "# mine\n", "identify.toml")
+    refused = campaign(tmp_path, "init", "lab", "--bench", "small-rig.toml", code=2)
+    assert "nothing was written" in refused.err
+
+
+def test_init_for_a_bench_that_cannot_move_writes_nothing(tmp_path: Path):
+    shipped = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
+    write(tmp_path, shipped.replace('torque = "2500 N m"', 'torque = "20 N m"'), "weak.toml")
+    said = campaign(tmp_path, "init", "lab", "--bench", "weak.toml", code=2).err
+    assert "nothing would move" in said
+    assert not (tmp_path / "lab").exists()
+    write(tmp_path, '[[test]]\nname = "m"\nkind = "velocity_map"\nbench = "weak.toml"\n', "p.toml")
+    assert "p.toml:1:1: test 'm'" in campaign(tmp_path, "plan", "p.toml", code=2).err
+
+
+def test_init_for_a_bench_that_is_wrong_writes_nothing(tmp_path: Path):
+    write(tmp_path, 'name = "half"\n', "half.toml")
+    assert "half.toml" in campaign(tmp_path, "init", "lab", "--bench", "half.toml", code=2).err
+    assert not (tmp_path / "lab").exists()
 
 
 def test_kinds_show_unit_default_and_meaning(tmp_path: Path):

@@ -130,7 +130,9 @@ def test_a_plug_in_that_never_returns_leaves_a_sealed_run(tmp_path: Path) -> Non
 def test_a_host_that_sleeps_does_not_take_that_for_the_silence_of_the_bench(tmp_path: Path) -> None:
     """Longer than the silence that ends a trial; the controller keeps what it has measured."""
     write(tmp_path, MOVE)
-    with controller(bench="simulink") as port, subprocess.Popen(
+    # Shorter than the sleep, and longer than a busy machine lets the relay wait for its turn.
+    patient = ("--heartbeat-timeout", "4")
+    with controller(*patient, bench="simulink") as port, subprocess.Popen(
         command(
             "run", "protocol.toml", "--backend", "serial", "--port", port, "--yes",
             "--set", "home.angle=60 deg",

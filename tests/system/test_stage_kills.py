@@ -1,0 +1,178 @@
+"""A run with stages that is killed in any gap of its journal goes on to the same end."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import RunStatus, find_run, open_run
+from campaign.archive.verification import verify_run
+from tests.archive.test_resuming import content, documented_differences
+from tests.system.user import environment, write
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+
+PROTOCOL = """\
+[[test]]
+name = "sweep"
+kind = "frequency_response"
+bench = "simulink"
+seed = 5
+frequencies = ["5 Hz", "8 Hz", "12 Hz", "18 Hz", "30 Hz"]
+cycles = 2
+settle_cycles = 1
+settle_time = "0 s"
+refine = true
+
+[test.matrix]
+compensation = ["none", "lugre"]
+"""
+PLANNED, FOLLOWING = 10, 14
+LINES = PLANNED + FOLLOWING + 3
+"""of the journal after its first: every trial, two stages, the end."""
+STAGES = (6, 19)
+"""Which of them tell of the stages: each follows its point's five trials."""
+
+# The program is imported once; each life is a fork of it. In the journal line of the number that it
+# is told, it is killed: before it is written, after half of it, or when it is on the disk.
+NURSERY = """
+import os, signal, sys
+import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file, campaign.archive.sealing
+import campaign.archive.unsealing, campaign.physics.simulate, campaign.backends.sim
+from campaign.archive.journal import Journal
+from campaign.cli import main
+
+def dies(where, number):
+    append, lines = Journal.append, []
+    def dying(journal, entry):
+        lines.append(entry)
+        if len(lines) == number and where == "before":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if len(lines) == number and where == "torn":
+            os.write(journal._descriptor, entry.model_dump_json().encode()[:40])
+            os.kill(os.getpid(), signal.SIGKILL)
+        append(journal, entry)
+        if len(lines) == number and where == "after":
+            os.kill(os.getpid(), signal.SIGKILL)
+    Journal.append = dying
+
+for line in sys.stdin:
+    where, number, *arguments = line.split()
+    child = os.fork()
+    if child == 0:
+        dies(where, int(number))
+        sys.argv = ["campaign", *arguments]
+        main()
+        os._exit(0)
+    print("ended", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+class Nursery:
+    """Lives of the program in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        write(folder, PROTOCOL)
+        self.process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", NURSERY],
+            cwd=folder,
+            env=environment(),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        assert self.live("run protocol.toml --results whole") == 0
+        self.whole = content(find_run(folder / "whole"))
+        self.fingerprints = [t.fingerprint for t in open_run(find_run(folder / "whole")).plan]
+
+    def live(self, arguments: str, where: str = "never", number: int = 0) -> int:
+        """The exit code of a command, or -9 when it was killed."""
+        print(where, number, arguments, "--workers 1", file=self.process.stdin, flush=True)
+        for line in self.process.stdout:
+            if line.startswith("ended "):
+                return int(line.split()[1])
+        raise AssertionError("the nursery has closed")
+
+    def goes_on(self, results: str, where: str, number: int, again: int = 0) -> None:
+        """Killed at a line, gone on with (and killed at line `again` of that), and compared."""
+        assert self.live(f"run protocol.toml --results {results}", where, number) == -9
+        killed = open_run(find_run(self.folder / results))
+        assert killed.damaged == ()
+        assert [trial.fingerprint for trial in killed.plan] == self.fingerprints[: len(killed.plan)]
+        resume = f"resume {killed.name} --results {results}"
+        if again:
+            self.live(resume, "after", again)
+        if find_run(self.folder / results).is_dir():
+            assert self.live(resume) == 0
+        path = find_run(self.folder / results)
+        run = open_run(path)
+        assert (run.status, len(run.plan)) == (RunStatus.COMPLETE, PLANNED + FOLLOWING)
+        assert [trial.fingerprint for trial in run.plan] == self.fingerprints
+        assert verify_run(path).problems == ()
+        assert [stage.point["compensation"] for stage in run.stages] == ["none", "lugre"]
+        ours, missing = content(path), object()
+        differing = {
+            name
+            for name in ours.keys() | self.whole.keys()
+            if str(ours.get(name, missing)) != str(self.whole.get(name, missing))
+        }
+        allowed = documented_differences()
+        drawn = {"/run/provenance/seed", "/run/provenance/seed@sha256"}  # the test has its own
+        assert {name for name in differing - drawn if not allowed.fullmatch(name)} == set()
+
+
+@pytest.fixture(scope="module")
+def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
+    nursery = Nursery(tmp_path_factory.mktemp("kills"))
+    yield nursery
+    nursery.process.stdin.close()
+    nursery.process.wait(60)
+    nursery.process.stdout.close()
+
+
+def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):
+    run = open_run(find_run(nursery.folder / "whole"))
+    lines = run.journal.splitlines()[1:]
+    assert len(lines) == LINES
+    told = [n for n, line in enumerate(lines, start=1) if "trials followed" in line]
+    assert tuple(told) == STAGES
+
+
+@pytest.mark.parametrize(
+    ("where", "number"),
+    [
+        ("torn", STAGES[0]),  # asked, and not journalled
+        ("after", STAGES[0]),  # journalled, and none executed
+        ("after", STAGES[0] + 3),  # between its trials
+    ],
+)
+def test_a_kill_in_a_gap_around_a_stage_changes_nothing(nursery: Nursery, where: str, number: int):
+    nursery.goes_on(f"{where}-{number}", where, number)
+
+
+def test_a_stage_that_is_journalled_is_not_asked_again(nursery: Nursery):
+    assert nursery.live("run protocol.toml --results once", "after", STAGES[0]) == -9
+    run = open_run(find_run(nursery.folder / "once"))
+    assert nursery.live(f"resume {run.name} --results once") == 0
+    run = open_run(find_run(nursery.folder / "once"))
+    assert run.journal.count("trials followed") == 2
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("where", ["before", "torn", "after"])
+def test_a_kill_in_any_gap_changes_nothing(nursery: Nursery, where: str):
+    for number in range(1, LINES + 1):
+        nursery.goes_on(f"all-{where}-{number}", where, number)
+
+
+@pytest.mark.soak
+def test_a_second_kill_while_it_is_gone_on_with_changes_nothing(nursery: Nursery):
+    for number in (STAGES[0] - 1, STAGES[0], STAGES[1] - 1):
+        for again in range(1, 8):
+            nursery.goes_on(f"twice-{number}-{again}", "after", number, again)

@@ -1,0 +1,163 @@
+"""A protocol with stages, from plan to report: run, stopped, gone on with, replayed."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+import campaign as program
+from campaign.archive import RunReader, find_run, open_run
+from campaign.archive.verification import verify_run
+from campaign.backends.sim import SimBackend
+from campaign.cli.prepare import Request
+from campaign.cli.resume import resume_run
+from campaign.cli.run import run_protocol
+from campaign.errors import ExitCode, UsageError
+from tests.system.test_stage_kills import FOLLOWING, PLANNED, PROTOCOL
+from tests.system.user import campaign, write
+
+ROOT = Path(__file__).parents[2]
+BENCH = (ROOT / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
+ALL = PLANNED + FOLLOWING
+
+
+class Lab:
+    """A folder with a protocol and its own bench; runs go on in this process."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder, self.patch = folder, monkeypatch
+        self.protocol = write(folder, PROTOCOL.replace('"simulink"', '"bench.toml"'))
+        write(folder, BENCH, "bench.toml")
+
+    def run(self, results: str = "results", workers: int = 1) -> RunReader:
+        run_protocol(
+            Request(str(self.protocol)), self.folder / results, workers=workers, report=False
+        )
+        return open_run(find_run(self.folder / results))
+
+    def stopped_in(self, number: int) -> RunReader:
+        """A run that Ctrl-C meets in a trial."""
+        execute = SimBackend.execute
+
+        def stop(backend, trial, recorder, stopped):
+            if trial.number == number:
+                signal.raise_signal(signal.SIGINT)
+            return execute(backend, trial, recorder, stopped)
+
+        with self.patch.context() as patch:
+            patch.setattr(SimBackend, "execute", stop)
+            run = self.run()
+        assert run.status == "interrupted"
+        return run
+
+    def resume(self, run: RunReader, *, accept: bool = False) -> RunReader:
+        code = resume_run(
+            str(run.path), run.path.parent, accept_changes=accept, workers=1, report=False,
+            port=None, yes=False,
+        )  # fmt: skip
+        assert code is ExitCode.DONE
+        return open_run(find_run(run.path.parent))
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
+    return Lab(tmp_path, monkeypatch)
+
+
+def samples(run: RunReader) -> dict[int, tuple[str, bytes]]:
+    return {
+        each.trial.number: (each.trial.fingerprint, each.recording()["gyro_rate"].tobytes())
+        for each in run.trials
+    }
+
+
+def test_two_workers_find_number_and_record_what_one_does(lab: Lab):
+    one, two = lab.run("one"), lab.run("two", workers=2)
+    assert len(one.trials) == ALL
+    assert samples(one) == samples(two)
+    assert [stage.point for stage in two.stages] == [stage.point for stage in one.stages]
+
+
+@pytest.mark.parametrize("number", [3, 14])
+def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, number: int):
+    stopped = lab.stopped_in(number)
+    assert len(stopped.plan) > len(stopped.trials) or len(stopped.plan) == PLANNED
+    resumed = lab.resume(stopped)
+    assert samples(resumed) == samples(lab.run("whole"))
+    assert verify_run(resumed.path).problems == ()
+
+
+@pytest.mark.parametrize("number", [3, 14])
+def test_a_protocol_that_is_gone_leaves_its_stages_in_the_archive(lab: Lab, number: int):
+    whole = samples(lab.run("whole"))
+    stopped = lab.stopped_in(number)
+    lab.protocol.unlink()
+    assert samples(lab.resume(stopped)) == whole
+
+
+def test_what_followed_on_one_bench_does_not_move_a_changed_one(lab: Lab):
+    stopped = lab.stopped_in(14)
+    write(lab.folder, BENCH.replace('angle = "', 'angle = "1', 1), "bench.toml")
+    before = stopped.path.read_bytes()
+    with pytest.raises(UsageError, match=r"follows from what was found before sweep was changed"):
+        lab.resume(stopped, accept=True)
+    assert stopped.path.read_bytes() == before
+
+
+def test_a_change_before_anything_followed_is_accepted(lab: Lab):
+    stopped = lab.stopped_in(1)
+    assert stopped.stages == ()
+    write(lab.folder, BENCH.replace('angle = "', 'angle = "1', 1), "bench.toml")
+    resumed = lab.resume(stopped, accept=True)
+    assert len(resumed.trials) == ALL
+    limits = [each.trial.bench["limits"]["angle"] for each in resumed.trials[-FOLLOWING:]]
+    changed = resumed.trials[PLANNED - 1].trial  # the first may have ended before the stop
+    assert set(limits) == {changed.bench["limits"]["angle"]}
+    assert limits[0] > stopped.planned(1).bench["limits"]["angle"]
+
+
+def test_a_user_sees_the_stages_before_during_and_after(lab: Lab):
+    folder = lab.folder
+    planned = campaign(folder, "plan", "protocol.toml").out
+    assert "stage 2, refinement: at most 42 trials," in planned
+    assert "at 2 points: bandwidth and gain margin are read between frequencies" in planned
+    assert "later stages add at most 42 trials," in planned
+    tree = json.loads(campaign(folder, "plan", "protocol.toml", "--json").out)
+    assert tree["following"]["trials"] == 42
+    assert [stage["point"]["compensation"] for stage in tree["tests"][0]["stages"]] == [
+        "none", "lugre",
+    ]  # fmt: skip
+    ran = campaign(folder, "run", "protocol.toml", "--report", "--workers", "1")
+    assert "sweep at compensation = none, stage 2 (refinement): 7 trials follow" in ran.err
+    assert f"complete: {ALL} trials done" in ran.err
+    shown = campaign(folder, "show").out
+    assert "trial-00011 to trial-00017" in shown
+    stages = json.loads(campaign(folder, "show", "--json").out)["stages"]
+    assert [stage["trials"] for stage in stages] == [list(range(11, 18)), list(range(18, 25))]
+    assert f"\t{ALL}\t" in campaign(folder, "list").out
+    page = next((folder / "results").glob("*-report/report.html")).read_text(encoding="utf-8")
+    assert "not executed" not in page
+
+
+def test_they_are_trials_for_whoever_opens_the_run(lab: Lab):
+    run = lab.run()
+    assert f"{ALL} of {ALL} trials executed" in repr(program.open(str(run.path)))
+    swept = [float(str(each.trial.point["frequency"])) for each in run.trials_of("sweep")]
+    assert len(set(swept)) == 5 + FOLLOWING
+    # Around the -3 dB crossing of each: seven within 12 % of it.
+    for first, last in ((PLANNED, PLANNED + 7), (PLANNED + 7, ALL)):
+        assert swept[last - 1] / swept[first] == pytest.approx(1.12 / 0.88)
+
+
+def test_a_replay_finds_the_same_trials_and_serves_them(lab: Lab):
+    first = lab.run()
+    again = campaign(
+        lab.folder, "run", "protocol.toml", "--backend", "replay", "--from", str(first.path),
+        "--results", "replayed",
+    )  # fmt: skip
+    assert f"complete: {ALL} trials done" in again.err
+    replayed = open_run(find_run(lab.folder / "replayed"))
+    assert samples(replayed) == samples(first)
