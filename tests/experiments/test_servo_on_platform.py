@@ -25,7 +25,7 @@ KIND = "frequency_response"
 NEAR_3_DB = (5.0, 5.4, 5.8, 6.2, 6.5, 6.8, 7.1, 7.4, 7.7, 8.0, 8.4)
 NEAR_HALF_TURN = (100.0, 125.0, 150.0, 165.0, 180.0, 195.0, 210.0, 225.0, 240.0, 270.0, 300.0)
 SWEEP = (2.0, *NEAR_3_DB, *NEAR_HALF_TURN)
-TRUE = {"bandwidth": 7.191, "phase_margin": np.deg2rad(71.342), "gain_margin": 30.891}
+TRUE = {"bandwidth": 7.157, "phase_margin": np.deg2rad(71.031), "gain_margin": 30.975}
 """Hz, rad, dB; `test_the_truth` finds them again."""
 
 

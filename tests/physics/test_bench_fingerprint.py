@@ -17,13 +17,13 @@ from campaign.physics.bench_fingerprint import fingerprint, why_altered
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
 
 
-def tree(name: str) -> dict[str, Any]:
-    return tomllib.loads((BENCHES / f"{name}.toml").read_text(encoding="utf-8"))
+def tree(name: str, folder: Path = BENCHES) -> dict[str, Any]:
+    return tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def changed(name: str, path: str, value: Any) -> Bench:
+def changed(name: str, path: str, value: Any, folder: Path = BENCHES) -> Bench:
     """A shipped bench with one value written otherwise; None takes it away."""
-    bench = copy.deepcopy(tree(name))
+    bench = copy.deepcopy(tree(name, folder))
     *above, last = path.split(".")
     table = bench
     for key in above:
@@ -49,9 +49,9 @@ def test_the_shipped_benches_are_the_ones_they_describe(name: str) -> None:
         ("platform", "description", "another"),
         ("platform", "axis.name", "elevation"),
         ("platform", "limits.torque", "9 N m"),
-        ("platform", "known.seen", ["5.13", "5.7", "5.12"]),  # in another order
-        ("platform", "known.values", {}),
-        ("platform", "axis.inertia", "68779.6 g m^2"),  # the same in another unit
+        ("platform", "known.seen", ["5.13", "5.7", "5.3/gain_margin", "5.12"]),  # in another order
+        ("platform", "known.correlations", []),
+        ("platform", "axis.inertia", "69177.3 g m^2"),  # the same in another unit
         ("platform", "appendage.frequency", "0.011 kHz"),
         ("platform", "gear.preload.torque", "50 N m"),  # operating
         ("platform", "variation.day", 3),
@@ -124,9 +124,12 @@ def test_a_bench_made_from_no_cells_has_the_hash_that_it_had_before_they_counted
     name: str, hashed: str
 ) -> None:
     """Hashes of the shipped benches when no list of cells was part of them."""
+    kept_benches = Path(__file__).parent / "kept"
     kept = ("document", "operating", "values", "correlations")
-    entries = {key: value for key, value in tree(name)["known"].items() if key in kept}
-    assert fingerprint(changed(name, "known", entries)).bench == hashed
+    entries = {
+        key: value for key, value in tree(name, kept_benches)["known"].items() if key in kept
+    }
+    assert fingerprint(changed(name, "known", entries, kept_benches)).bench == hashed
 
 
 def test_an_optional_field_of_a_later_program_alters_nothing(

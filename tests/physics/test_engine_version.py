@@ -15,7 +15,8 @@ from campaign.protocol.bench_file import load_bench
 from campaign.signals import Polyline, Sine
 from campaign.trial import MemoryRecorder, Task, Trial
 
-KEPT = Path(__file__).parent / "kept" / "engine.json"
+BENCHES = Path(__file__).parent / "kept"
+KEPT = BENCHES / "engine.json"
 CHANNELS = ("gyro_rate", "pointing_error", "motor_current", "friction_torque")
 DIGITS = 9  # platforms agree on them: the sums of a library differ in the last of sixteen
 
@@ -43,7 +44,7 @@ TRIALS = {
 def trajectory(name: str) -> dict[str, list[float]]:
     """Some samples of each channel, rounded."""
     bench, mode, compensation, signals = TRIALS[name]
-    on = load_bench(bench)
+    on = load_bench(str(BENCHES / f"{bench}.toml"))
     task = Task(
         mode=mode, compensation=compensation, duration=0.4, window=(0.0, 0.4), sample_rate=1000.0,
         **signals,

@@ -41,7 +41,7 @@ def test_in_the_unit_people_read(desk: Desk) -> None:
     text = "{acceleration} {frequency} {cycles} {gain} {style} {flag} {bench.axis.inertia}"
     step = f'acceleration = "1 rad/s^2"\n[[test.operator]]\ntext = "{text}"\n'
     ((shown,),) = setups(desk, TEST + step)
-    assert shown == "57.2958 deg/s^2 0.24 Hz 2 1 slow false 68.7796 kg m^2"
+    assert shown == "57.2958 deg/s^2 0.24 Hz 2 1 slow false 69.1773 kg m^2"
 
 
 def test_without_placeholders_it_holds_for_the_whole_test(desk: Desk) -> None:

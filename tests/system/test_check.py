@@ -16,12 +16,14 @@ from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.resources import protocols_folder
 
 PLATFORM = protocols_folder() / "benches" / "platform.toml"
+GAIN = "198.913"
+"""The proportional gain of the platform's rate loop."""
 
 
 def too_fast(folder: Path) -> Path:
     """The platform with its gain in A s/rad typed as if it were in A s/deg."""
     path = folder / "wrong.toml"
-    text = PLATFORM.read_text().replace('"199.692 A s/rad"', '"199.692 A s/deg"')
+    text = PLATFORM.read_text().replace(f'"{GAIN} A s/rad"', f'"{GAIN} A s/deg"')
     path.write_text(text)
     return path
 
@@ -87,7 +89,7 @@ def with_gain(gain: str) -> Request:
 def test_plan_and_run_refuse_an_unstable_loop(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    request = with_gain("199.692 A s/deg")
+    request = with_gain(f"{GAIN} A s/deg")
     with pytest.raises(LimitError, match="A s/deg given as A s/rad"):
         show_plan(request, tmp_path / "results", as_json=False)
     assert "loop: UNSTABLE" in capsys.readouterr().out  # it is shown all the same
@@ -99,9 +101,9 @@ def test_plan_and_run_refuse_an_unstable_loop(
 def test_plan_tells_the_worst_loop_and_warns_of_a_low_margin(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    show_plan(with_gain("199.692 A s/rad"), tmp_path, as_json=False)
+    show_plan(with_gain(f"{GAIN} A s/rad"), tmp_path, as_json=False)
     fine = capsys.readouterr()
-    assert "  loop: 5.86 Hz crossover, 69.2 deg, 30.9 dB (observer, sliding)" in fine.out
+    assert "  loop: 5.82 Hz crossover, 68.9 deg, 31 dB (observer, sliding)" in fine.out
     assert "low margin" not in fine.err
     show_plan(with_gain("5300 A s/rad"), tmp_path, as_json=True)
     low = capsys.readouterr()
