@@ -11,11 +11,11 @@ import numpy as np
 
 from campaign.calibration.leave_out import deviations
 from campaign.calibration.outcome import CalibrationOutcome
-from campaign.calibration.search import agreeing
 from campaign.calibration.space import Parameter, Space
 from campaign.calibration.targets import Target, shortest
-from campaign.calibration.uncertainty import strong
 from campaign.errors import CampaignError
+from campaign.identification.linear_uncertainty import strong
+from campaign.identification.multi_start import agreeing
 from campaign.protocol.bench_edit import with_known
 from campaign.protocol.files import Source
 from campaign.units import convert, split_quantity
@@ -126,19 +126,24 @@ def _summary(percent: np.ndarray[Any, np.dtype[np.float64]]) -> Iterator[tuple[s
 
 def _parameter(outcome: CalibrationOutcome, index: int) -> Iterator[tuple[str, Any]]:
     parameter = outcome.problem.space.parameters[index]
-    share = float(outcome.shares[index])
+    unknown, share = parameter.unknown, float(outcome.shares[index])
     yield "name", parameter.name
     yield "paths", [path for path, _ in parameter.fields]
     if any(factor != 1.0 for _, factor in parameter.fields):
         yield "factors", [factor for _, factor in parameter.fields]
-    yield "value", parameter.text(parameter.value(share))
+    yield "value", parameter.text(unknown.value(share))
     certainty = outcome.uncertainty
     half = float(certainty.half_width[index]) if certainty is not None else math.nan
     if math.isfinite(half) and half < 10.0:  # ten times the range says nothing
-        ends = (parameter.value(share - half), parameter.value(share + half))
+        ends = (unknown.value(share - half), unknown.value(share + half))
         yield "interval_95", [parameter.text(end) for end in ends]
-    yield "before", parameter.text(parameter.present)
-    yield "bounds", [parameter.text(parameter.lower), parameter.text(parameter.upper)]
+        if certainty is not None and any(certainty.bound):
+            wide = (float(certainty.low[index]), float(certainty.high[index]))
+            yield "interval_95_wide", [parameter.text(unknown.value(end)) for end in wide]
+    if certainty is not None and math.isfinite(certainty.limit[index]):
+        yield "limit_95", parameter.text(unknown.value(float(certainty.limit[index])))
+    yield "before", parameter.text(unknown.start)
+    yield "bounds", [parameter.text(unknown.lower), parameter.text(unknown.upper)]
     if certainty is not None:
         bound = certainty.bound[index]
         yield "identified", not certainty.open[index] and not bound
@@ -172,8 +177,8 @@ def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, An
     for name, value in (("fitted", found), ("before", before)):
         if value is not None:
             yield name, _short(value)
-    if found is not None and target.cell.value:
-        yield "deviation_percent", _short(100 * (found / target.cell.value - 1))
+    if math.isfinite(percent := target.percent(found)):
+        yield "deviation_percent", _short(percent)
     yield "standard_deviation", target.weight
     yield "residual", _short(target.residual(found))
 

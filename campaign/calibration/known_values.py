@@ -34,22 +34,25 @@ def known_entries(
 
 def _values(outcome: CalibrationOutcome) -> Iterator[tuple[str, dict[str, Any]]]:
     for index, parameter in enumerate(outcome.problem.space.parameters):
-        share, half = float(outcome.shares[index]), _half_width(outcome, index)
-        ends = (parameter.value(share - half), parameter.value(share + half))
+        ends = [parameter.unknown.value(end) for end in _ends(outcome, index)]
         for path, factor in parameter.fields:
             entry: dict[str, Any] = {"origin": "fitted"}
-            if math.isfinite(half):
+            if ends:
                 low, high = sorted(factor * end for end in ends)
                 entry = {"interval": [parameter.text(low), parameter.text(high)], **entry}
             yield path, entry
 
 
-def _half_width(outcome: CalibrationOutcome, index: int) -> float:
-    """Of the 95 % interval, in shares of the range; NaN where the cells determine nothing."""
+def _ends(outcome: CalibrationOutcome, index: int) -> tuple[float, ...]:
+    """Of the 95 % interval, in shares of the range; empty where the cells determine nothing.
+
+    It holds wherever parameters are that ended at a bound.
+    """
     certainty = outcome.uncertainty
     if certainty is None or certainty.bound[index] or certainty.open[index]:
-        return math.nan
-    return float(certainty.half_width[index])
+        return ()
+    ends = float(certainty.low[index]), float(certainty.high[index])
+    return ends if all(map(math.isfinite, ends)) else ()
 
 
 def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
@@ -71,4 +74,4 @@ def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
 def _determined(
     outcome: CalibrationOutcome, index: int, parameter: Parameter
 ) -> tuple[tuple[str, float], ...]:
-    return parameter.fields if math.isfinite(_half_width(outcome, index)) else ()
+    return parameter.fields if _ends(outcome, index) else ()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.calibration.search import Search
+from campaign.calibration.objective import Simulation
+from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import Target
+from campaign.identification.multi_start import Display, Settings, fit_from
+from campaign.identification.objective import Objective
 
 Array = NDArray[np.float64]
 
@@ -29,9 +32,17 @@ class LeftOut:
     found: tuple[float | None, ...]
 
 
-def leave_one_out(search: Search, targets: Sequence[Target], optimum: Array) -> list[LeftOut]:
+def leave_one_out(
+    problem: CalibrationProblem,
+    simulation: Simulation,
+    objective: Objective,
+    settings: Settings,
+    display: Display,
+    optimum: Array,
+) -> list[LeftOut]:
     """Refit from `optimum` without each value of the condition in turn, and predict its cells."""
-    condition = search.options.leave_out
+    condition, targets = problem.options.leave_out, problem.targets
+    settings = replace(settings, max_evaluations=problem.options.leave_out_evaluations)
     groups: dict[float | int | str, list[int]] = {}
     for index, target in enumerate(targets):
         value = target.cell.conditions.get(condition)
@@ -46,9 +57,9 @@ def leave_one_out(search: Search, targets: Sequence[Target], optimum: Array) -> 
         if mask.sum() < len(optimum):
             continue
         phase = f"without {condition} {number} of {len(groups)}"
-        end, _, _ = search.fit(optimum, phase, search.options.leave_out_evaluations, mask)
-        found = search.simulation.evaluate(search.space.values(end)).found
-        search.evaluations += 1
+        end = fit_from(objective, optimum, settings, phase, display, used=mask).end
+        found = simulation.evaluate(problem.space.values(end)).found
+        objective.evaluations += 1
         results.append(
             LeftOut(
                 value,
@@ -60,15 +71,8 @@ def leave_one_out(search: Search, targets: Sequence[Target], optimum: Array) -> 
 
 
 def deviations(targets: Sequence[Target], found: Sequence[float | None]) -> Array:
-    """Deviations in percent; NaN for a cell that was not found, or is zero."""
-    return np.array(
-        [
-            100 * (value / target.cell.value - 1)
-            if value is not None and target.cell.value
-            else np.nan
-            for target, value in zip(targets, found, strict=True)
-        ]
-    )
+    """Deviations in percent; NaN where that means nothing (`Target.percent`)."""
+    return np.array([t.percent(value) for t, value in zip(targets, found, strict=True)])
 
 
 def _order(item: tuple[float | int | str, list[int]]) -> tuple[bool, float | str]:

@@ -25,7 +25,8 @@ from campaign.experiments.interface import (
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test
-from campaign.published.scoreboard import Evidence, evidence_of, score
+from campaign.published.evidence import Evidence, evidence_of
+from campaign.published.scoreboard import score
 from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
 
 Array = NDArray[np.float64]
@@ -82,7 +83,7 @@ class Simulation:
 
     def check(self) -> Evaluation:
         """What the bench reproduces as it is. Raises UsageError when a cell cannot be found."""
-        present = [p.present for p in self._problem.space.parameters]
+        present = self._problem.space.present
         try:
             groups = [trials for _, trials in self._planned(present)]
         except PointError as error:
@@ -104,7 +105,7 @@ class Simulation:
 
     def trials(self) -> int:
         """How many trials one evaluation takes."""
-        present = [p.present for p in self._problem.space.parameters]
+        present = self._problem.space.present
         return sum(len(trials) for _, trials in self._planned(present))
 
     def residuals(self, values: Sequence[float]) -> Array:

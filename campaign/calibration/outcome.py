@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from campaign.calibration.leave_out import LeftOut, leave_one_out
 from campaign.calibration.objective import Evaluation, Simulation
 from campaign.calibration.problem import CalibrationProblem
-from campaign.calibration.search import Display, Search, Start
-from campaign.calibration.uncertainty import Array, Uncertainty, uncertainty
 from campaign.experiments.interface import Experiment
+from campaign.identification.linear_uncertainty import Uncertainty
+from campaign.identification.multi_start import Display, Settings, Start, search
+from campaign.identification.objective import Objective
+from campaign.protocol.calibration import CalibrationOptions
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -60,31 +67,41 @@ def calibrate(
     """
     simulation = Simulation(problem, experiments, workers)
     before = simulation.check()
-    search = Search(simulation, problem.space, problem.options, display)
-    cost_before = search.begin(problem.space.present)
-    certainty: Uncertainty | None = None
+    objective = Objective(
+        problem.space.unknowns,
+        simulation.residuals,
+        simulation.residuals_of_all,
+        step=problem.options.difference_step,
+    )
+    settings = _settings(problem.options)
+    found = search(objective, settings, display)
     left: list[LeftOut] = []
-    interrupted = False
-    try:
-        search.run()
-        shares = search.best[1]
-        jacobian = search.jacobian(shares, central=True)
-        certainty = uncertainty(jacobian, search.residuals(shares), shares, problem.options.loss)
-        if leave_out and problem.options.leave_out:
-            left = leave_one_out(search, problem.targets, shares)
-    except KeyboardInterrupt:
-        interrupted = True
-    shares = search.best[1]
+    interrupted = found.interrupted
+    if leave_out and problem.options.leave_out and not interrupted:
+        try:
+            left = leave_one_out(problem, simulation, objective, settings, display, found.shares)
+        except KeyboardInterrupt:
+            interrupted = True
     return CalibrationOutcome(
         problem=problem,
-        shares=shares,
-        cost=search.best[0],
-        cost_before=cost_before,
-        fitted=simulation.evaluate(problem.space.values(shares)),
+        shares=found.shares,
+        cost=found.cost,
+        cost_before=found.cost_before,
+        fitted=simulation.evaluate(problem.space.values(found.shares)),
         before=before,
-        starts=tuple(search.starts),
-        uncertainty=certainty,
+        starts=found.starts,
+        uncertainty=found.uncertainty,
         left_out=tuple(left),
-        evaluations=search.evaluations,
+        evaluations=objective.evaluations,
         interrupted=interrupted,
+    )
+
+
+def _settings(options: CalibrationOptions) -> Settings:
+    return Settings(
+        starts=options.starts,
+        seed=options.seed,
+        loss=options.loss,
+        tolerance=options.tolerance,
+        max_evaluations=options.max_evaluations,
     )

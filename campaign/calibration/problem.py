@@ -15,6 +15,7 @@ from campaign.calibration.targets import (
     weight_of,
 )
 from campaign.errors import Problem, ProtocolError, UsageError
+from campaign.identification.unknowns import Unknown
 from campaign.physics.bench import Bench
 from campaign.protocol import Protocol
 from campaign.protocol.calibration import Calibration, CalibrationOptions, CalibrationParameter
@@ -151,7 +152,10 @@ class _Reader:
     def check_bounds(self, parameters: tuple[Parameter, ...]) -> None:
         """A bound must be a value that the bench accepts, all else being as it is."""
         for index, parameter in enumerate(parameters):
-            for side, value in (("lower", parameter.lower), ("upper", parameter.upper)):
+            for side, value in (
+                ("lower", parameter.unknown.lower),
+                ("upper", parameter.unknown.upper),
+            ):
                 tree = Space((parameter,)).bench(self._written, (value,))
                 faults = find_faults(Bench, tree)
                 for keys, _, message in faults if isinstance(faults, list) else ():
@@ -215,16 +219,8 @@ class _Reader:
             self._report(("parameter", index, "lower"), message)
             return None
         unit = split_quantity(entry.lower)[1] if isinstance(entry.lower, str) else ""
-        return Parameter(
-            entry.name,
-            tuple(zip(entry.fields, factors, strict=True)),
-            quantity,
-            lower,
-            upper,
-            present,
-            unit,
-            entry.scale == "log",
-        )
+        unknown = Unknown(entry.name, lower, upper, present, entry.scale == "log")
+        return Parameter(unknown, tuple(zip(entry.fields, factors, strict=True)), quantity, unit)
 
     def _may_be_fitted(self, place: Keys, path: str) -> bool:
         """Whether the bench writes a number there, and no test sweeps it; said when not."""

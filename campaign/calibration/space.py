@@ -1,8 +1,7 @@
-"""The unknowns of a bench, and the unit cube in which a fit moves."""
+"""The unknowns of a bench: which of its fields they drive, and how people are told them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.identification.unknowns import Unknown, values_at
 from campaign.protocol.schema import replaced
 from campaign.units import Quantity, convert
 
@@ -18,35 +18,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown.
+    """One unknown of a bench.
 
     Attributes:
+        unknown: its name, bounds and scale; it starts at what the bench says now.
         fields: dotted path of each field of the bench it drives, with its factor.
         quantity: None for a number without a unit.
-        lower, upper, present: SI; `present` is what the bench says now.
         unit: in which people are told it; "" without one.
     """
 
-    name: str
+    unknown: Unknown
     fields: tuple[tuple[str, float], ...]
     quantity: Quantity | None
-    lower: float
-    upper: float
-    present: float
     unit: str
-    logarithmic: bool
 
-    def value(self, share: float) -> float:
-        """SI value at a share of the way from lower (0) to upper (1); beyond them, too."""
-        if self.logarithmic:
-            return self.lower * math.exp(share * math.log(self.upper / self.lower))
-        return self.lower + share * (self.upper - self.lower)
-
-    def share(self, value: float) -> float:
-        """Inverse of `value`."""
-        if self.logarithmic:
-            return math.log(value / self.lower) / math.log(self.upper / self.lower)
-        return (value - self.lower) / (self.upper - self.lower)
+    @property
+    def name(self) -> str:
+        """What the result calls it."""
+        return self.unknown.name
 
     def text(self, value: float) -> str | float:
         """An SI value as a TOML file has it: text with its unit, to six digits."""
@@ -57,22 +46,23 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Space:
-    """All unknowns; a vector is their shares, shape (n,)."""
+    """All unknowns; a vector is the shares of their ranges, shape (n,)."""
 
     parameters: tuple[Parameter, ...]
 
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What an optimiser needs to know of them."""
+        return tuple(parameter.unknown for parameter in self.parameters)
+
     def values(self, shares: Array) -> tuple[float, ...]:
         """SI values."""
-        return tuple(p.value(float(s)) for p, s in zip(self.parameters, shares, strict=True))
-
-    def shares(self, values: Sequence[float]) -> Array:
-        """Inverse of `values`."""
-        return np.array([p.share(v) for p, v in zip(self.parameters, values, strict=True)])
+        return values_at(self.unknowns, shares)
 
     @property
-    def present(self) -> Array:
-        """Where the bench is now."""
-        return self.shares([p.present for p in self.parameters])
+    def present(self) -> tuple[float, ...]:
+        """SI values that the bench has now."""
+        return tuple(unknown.start for unknown in self.unknowns)
 
     def bench(self, tree: Mapping[str, Any], values: Sequence[float]) -> dict[str, Any]:
         """A bench as written with `values` put in as exact text."""

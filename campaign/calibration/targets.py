@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from campaign.published import patterns
 from campaign.published.values import Cell, Published
+from campaign.published.verdicts import CLAIMS
 from campaign.units import convert, split_quantity
 
 WORST = 100.0
@@ -52,6 +53,16 @@ class Target:
         elif self.cell.relation == "at least":
             deviation = min(0.0, deviation)
         return min(max(deviation, -self.worst), self.worst)
+
+    def percent(self, found: float | None) -> float:
+        """Deviation in percent of the cell; NaN where that means nothing, as on the scoreboard.
+
+        That is so of what was not found, a printed zero, a place in an order, a claim that is met.
+        """
+        claim = self.cell.relation in CLAIMS and self.residual(found) == 0.0
+        if found is None or not self.cell.value or claim or self.cell.relation == "rank":
+            return math.nan
+        return 100 * (found / self.cell.value - 1)
 
     @property
     def worst(self) -> float:

@@ -16,12 +16,12 @@ from campaign.calibration.document import bench_text, interruption, result_text
 from campaign.calibration.known_values import known_entries
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
-from campaign.calibration.search import Display, Progress, agreeing
 from campaign.calibration.targets import shortest
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
+from campaign.identification.multi_start import Display, Progress, agreeing
 from campaign.interrupts import unwinding
 from campaign.protocol import Protocol, load_protocol
 from campaign.published.values import Published, published_values
@@ -46,7 +46,7 @@ def calibrate_protocol(
     source, space = problem.calibration.bench, problem.space
     # Hours later is too late to learn that the bench's file cannot be edited.
     unknown = {path: {"origin": "fitted"} for p in space.parameters for path, _ in p.fields}
-    bench_text(source, space, space.values(space.present), {"fitted": fitted, "values": unknown})
+    bench_text(source, space, space.present, {"fitted": fitted, "values": unknown})
     with _display(error_console()) as display:
         outcome = calibrate(
             problem,
@@ -151,15 +151,18 @@ def _say(outcome: CalibrationOutcome) -> None:
 def _rows(outcome: CalibrationOutcome) -> Iterator[tuple[str, ...]]:
     certainty = outcome.uncertainty
     for index, parameter in enumerate(outcome.problem.space.parameters):
-        share = float(outcome.shares[index])
+        unknown, share = parameter.unknown, float(outcome.shares[index])
         interval, note = "", ""
         if certainty is not None:
-            half = float(certainty.half_width[index])
+            half, limit = float(certainty.half_width[index]), float(certainty.limit[index])
             if half == half and half < 10.0:
-                ends = (parameter.value(share - half), parameter.value(share + half))
-                interval = " to ".join(str(parameter.text(end)) for end in ends)
+                ends = (float(certainty.low[index]), float(certainty.high[index]))
+                interval = " to ".join(str(parameter.text(unknown.value(end))) for end in ends)
             if certainty.bound[index]:
                 note = f"at its {certainty.bound[index]} bound"
+                if limit == limit:
+                    side = "at most" if certainty.bound[index] == "lower" else "at least"
+                    interval = f"{side} {parameter.text(unknown.value(limit))}"
             elif certainty.open[index]:
                 note = "not determined"
-        yield parameter.name, str(parameter.text(parameter.value(share))), interval, note
+        yield parameter.name, str(parameter.text(unknown.value(share))), interval, note

@@ -1,8 +1,12 @@
-"""Nonlinear least squares: several starts, bounds, covariance, and what the data cannot tell."""
+"""Least squares on arrays: a small search between bounds, covariance, null directions, profiles.
+
+For functions that cost microseconds and know their derivatives; what is costly is fitted from
+several starts by `multi_start`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,42 +20,6 @@ INVOLVED = 0.1
 """Component in a null direction from which on a parameter counts as left open by the data."""
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter to fit: bounds and the values that the starts are built from."""
-
-    name: str
-    lower: float
-    upper: float
-    starts: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A least-squares fit.
-
-    Attributes:
-        values: by parameter name.
-        errors: standard errors by name, for independent residuals; NaN where the data do not
-            determine the parameter.
-        residuals: data minus model, shape (n,), in the data's unit.
-        bic: Bayesian information criterion for Gaussian residuals; lower is better.
-        doubts: sentences naming parameters at a bound, not determined by the data, or less than two
-            standard errors from zero.
-    """
-
-    values: Mapping[str, float]
-    errors: Mapping[str, float]
-    residuals: Array
-    bic: float
-    doubts: tuple[str, ...]
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residuals."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
-
-
 def refuse_too_few(points: int, parameters: int) -> None:
     """ValueError unless there are more points than parameters: else nothing shows the scatter."""
     if points <= parameters:
@@ -59,66 +27,6 @@ def refuse_too_few(points: int, parameters: int) -> None:
             f"{points} points cannot determine {parameters} parameters and their scatter; "
             f"{parameters + 1} are the fewest"
         )
-
-
-def fit(
-    model: Callable[[Array, Mapping[str, float]], Array],
-    x: Array,
-    y: Array,
-    parameters: Sequence[Parameter],
-) -> Fit:
-    """Fit y = model(x, parameters), best of all combinations of starts.
-
-    x, y: shape (n,). Raises ValueError when there are no more points than parameters.
-    """
-    from scipy.optimize import least_squares
-
-    names = [parameter.name for parameter in parameters]
-    refuse_too_few(len(y), len(names))
-    lower = np.array([parameter.lower for parameter in parameters])
-    upper = np.array([parameter.upper for parameter in parameters])
-
-    def residual(vector: Array) -> Array:
-        return y - model(x, dict(zip(names, vector, strict=True)))
-
-    grids = np.meshgrid(*(parameter.starts for parameter in parameters), indexing="ij")
-    starts = np.stack([grid.ravel() for grid in grids], axis=1)
-    solutions = [
-        least_squares(residual, np.clip(start, lower, upper), bounds=(lower, upper), x_scale="jac")
-        for start in starts
-    ]
-    best = min(solutions, key=lambda solution: float(solution.cost))
-    errors, undetermined = _standard_errors(best.jac, best.fun)
-    doubts = [f"{names[i]} is not determined by these data" for i in undetermined]
-    doubts += [
-        f"{name} ended at its bound {value:.4g}"
-        for name, value, side in zip(names, best.x, best.active_mask, strict=True)
-        if side != 0
-    ]
-    doubts += [
-        f"{name} cannot be told from zero: {value:.3g} ± {error:.2g} (1σ)"
-        for name, value, error in zip(names, best.x, errors, strict=True)
-        if error > 0.5 * abs(value)
-    ]
-    n, k = len(y), len(names)
-    mean_square = max(float(np.mean(best.fun**2)), np.finfo(float).tiny)
-    return Fit(
-        values={name: float(value) for name, value in zip(names, best.x, strict=True)},
-        errors={name: float(error) for name, error in zip(names, errors, strict=True)},
-        residuals=best.fun,
-        bic=n * np.log(mean_square) + k * np.log(n),
-        doubts=tuple(doubts),
-    )
-
-
-def _standard_errors(jacobian: Array, residuals: Array) -> tuple[Array, list[int]]:
-    """Standard errors, and which parameters the data leave open (a null direction of J)."""
-    n, k = jacobian.shape
-    variance = float(residuals @ residuals) / (n - k)
-    inverse, undetermined = covariance(jacobian)
-    errors = np.sqrt(variance * np.diag(inverse))
-    errors[undetermined] = np.nan
-    return errors, [int(i) for i in np.flatnonzero(undetermined)]
 
 
 def covariance(

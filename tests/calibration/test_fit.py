@@ -11,9 +11,11 @@ import pytest
 from campaign.calibration.document import result_text
 from campaign.calibration.objective import Simulation
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
-from campaign.calibration.search import Progress
+from campaign.cli.calibrate import _rows
 from campaign.errors import UsageError
 from campaign.experiments import experiments
+from campaign.identification.multi_start import Progress
+from campaign.identification.unknowns import shares_of
 
 from .laboratory import FREQUENCIES, INERTIA, PROTOCOL, VISCOUS, error, problem, table, write
 
@@ -35,7 +37,7 @@ def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
     assert viscous == pytest.approx(VISCOUS, rel=5e-3)
     assert outcome.uncertainty is not None
     for value, share, half in zip(
-        outcome.problem.space.shares((INERTIA, VISCOUS)),
+        shares_of(outcome.problem.space.unknowns, (INERTIA, VISCOUS)),
         outcome.shares,
         outcome.uncertainty.half_width,
         strict=True,
@@ -86,13 +88,24 @@ upper = 1.0
     assert "interval_95" not in by_name["idle"]
     assert by_name["inertia"]["identified"]
     assert "interval_95" in by_name["inertia"]
+    assert "interval_95_wide" not in by_name["inertia"]
 
 
 def test_names_a_parameter_at_its_bound(tmp_path: Path) -> None:
     narrow = PROTOCOL.replace('lower = "20 kg m^2"', 'lower = "45 kg m^2"')
-    result = tomllib.loads(result_text(run(write(tmp_path, narrow)), "b.toml"))
-    inertia = result["parameter"][0]
+    outcome = run(write(tmp_path, narrow))
+    result = tomllib.loads(result_text(outcome, "b.toml"))
+    inertia, viscous = result["parameter"]
     assert "lower bound" in inertia["note"]
+    assert "interval_95" not in inertia
+    assert 45 < float(inertia["limit_95"].split()[0]) < 80
+    low, high, wide_low, wide_high = (
+        float(end.split()[0]) for end in viscous["interval_95"] + viscous["interval_95_wide"]
+    )
+    assert wide_low <= low < high <= wide_high
+    assert (wide_low, wide_high) != (low, high)
+    shown = [row[2] for row in _rows(outcome)]
+    assert shown == [f"at most {inertia['limit_95']}", " to ".join(viscous["interval_95_wide"])]
     assert not inertia["identified"]
     assert inertia["value"] == "45 kg m^2"
 

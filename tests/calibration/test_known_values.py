@@ -13,7 +13,7 @@ import pytest
 from campaign.calibration.known_values import known_entries
 from campaign.calibration.objective import Evaluation
 from campaign.calibration.outcome import CalibrationOutcome
-from campaign.calibration.uncertainty import Uncertainty
+from campaign.identification.linear_uncertainty import Uncertainty
 
 from .laboratory import problem, write
 
@@ -24,9 +24,13 @@ def outcome(folder: Path, **certainty: Any) -> CalibrationOutcome:
     facts: dict[str, Any] = {
         "half_width": np.array([0.1, 0.2]),
         "bound": ("", ""),
+        "low": np.array([0.4, 0.3]),
+        "high": np.array([0.6, 0.7]),
+        "limit": np.full(2, math.nan),
         "open": (False, False),
         "correlation": np.array([[1.0, -0.6], [-0.6, 1.0]]),
         "scatter": 1.0,
+        "freedom": 2,
     }
     nothing = Evaluation({})
     return CalibrationOutcome(
@@ -66,7 +70,7 @@ def test_intervals_and_correlation(tmp_path: Path) -> None:
     [
         {"bound": ("lower", ""), "half_width": np.array([math.nan, 0.2])},
         {"open": (True, False)},
-        {"half_width": np.array([math.nan, 0.2])},
+        {"half_width": np.array([math.nan, 0.2]), "low": np.array([math.nan, 0.3])},
     ],
 )
 def test_what_the_cells_do_not_determine_has_no_interval(
@@ -77,6 +81,14 @@ def test_what_the_cells_do_not_determine_has_no_interval(
     assert found["values"][INERTIA] == {"origin": "fitted"}
     assert "interval" in found["values"][VISCOUS]
     assert "correlations" not in found
+
+
+def test_the_interval_that_holds_beside_a_bound_is_known(tmp_path: Path) -> None:
+    """The other took the first one's bound as known: 5 + 35 times 0.2 and 0.8, not 0.3 and 0.7."""
+    wide = {"low": np.array([math.nan, 0.2]), "high": np.array([math.nan, 0.8])}
+    beside = outcome(tmp_path, bound=("lower", ""), half_width=np.array([math.nan, 0.2]), **wide)
+    found = known_entries(beside, ["A.1"], "thesis")
+    assert found["values"][VISCOUS]["interval"] == ["12 N m s/rad", "33 N m s/rad"]
 
 
 def test_an_interrupted_calibration_knows_no_intervals(tmp_path: Path) -> None:

@@ -1,15 +1,21 @@
-"""How a squared residual counts, as `scipy.optimize.least_squares` has it, for our own sums."""
+"""How a squared residual counts, as `scipy.optimize.least_squares` has it, for our own sums.
+
+Residuals are in standard deviations: at about one the robust losses begin to curb them.
+"""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 
 
-def cost(loss: str, residuals: Array) -> float:
-    """Half the sum of the losses: what a fit makes smallest."""
+def cost(loss: Loss, residuals: Array) -> float:
+    """Half the sum of the losses: what a fit makes smallest. ValueError for an unknown loss."""
     z = residuals**2
     match loss:
         case "linear":
@@ -27,7 +33,7 @@ def cost(loss: str, residuals: Array) -> float:
     return 0.5 * float(np.sum(rho))
 
 
-def weights(loss: str, residuals: Array) -> Array:
+def weights(loss: Loss, residuals: Array) -> Array:
     """Derivative of each loss by its squared residual, 1 where that counts in full; shape (n,)."""
     z = residuals**2
     match loss:
