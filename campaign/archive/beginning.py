@@ -6,7 +6,12 @@ import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.archive.files import PART, sync_folder, write_atomically, write_lines_atomically
+from campaign.archive.files import (
+    PART,
+    sync_folder,
+    write_atomically,
+    write_lines_atomically,
+)
 from campaign.archive.full_plan import write_full_plan
 from campaign.archive.header import FORMAT, PlannedTrial, RunHeader
 from campaign.archive.journal import JOURNAL, Journal, RunStarted

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 from h5py import h5o
 
-from campaign.archive import consistency, guarded, hdf5, nexus
+from campaign.archive import consistency, guarded, nexus, storage
 from campaign.archive.checksums import text_digest
 from campaign.archive.consistency import Executed
 from campaign.archive.damage import DamageList
@@ -32,7 +32,7 @@ from campaign.archive.sealed import NOTES, read_entry, read_not_kept, read_seale
 from campaign.archive.series import series_at
 from campaign.archive.story import Lines, read_lines
 from campaign.archive.trial_file import shown_of
-from campaign.archive.verification import (
+from campaign.archive.verification_result import (
     STRUCTURE,
     UNFINISHED,
     UNREADABLE_HASH,
@@ -239,7 +239,7 @@ class _Check:
         says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
         for name, wanted in says.items():
             with self.problems.noting():
-                guarded.text_at(group, name, text_digest(hdf5.storable(wanted)))
+                guarded.text_at(group, name, text_digest(storage.storable(wanted)))
                 self.datasets += 1
 
     def _members(self, group: h5py.Group, place: str, record: TrialRecord, trees: Trees) -> None:
@@ -312,7 +312,7 @@ class _Check:
                 for name in sorted(set(guarded.names(data)) - told.keys() - {"title"}):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
                 with self.problems.noting():
-                    guarded.text_at(data, "title", text_digest(hdf5.storable(record.label)))
+                    guarded.text_at(data, "title", text_digest(storage.storable(record.label)))
                 for name in sorted(_PLOT - set(data.attrs)):
                     self.problems.add(f"{place}/{inner}@{name}", "is missing")
                 shown = [name for name in told if name != "time"]
@@ -351,6 +351,7 @@ class _Check:
         broken = {damage.place.split(":")[0] for damage in self.problems.found}
         if not any(place.startswith(journal) for place in broken) or story.damaged:
             consistency.check_journal(story, run.header, journal, self.problems)
+            consistency.check_measured(story, journal, self.problems)
             consistency.check_stages(story, run.header, journal, self.problems)
             consistency.check_trials(story, self.trials, self.unreadable, self.problems)
         if not any(place.startswith(plan) for place in broken):

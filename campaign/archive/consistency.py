@@ -13,7 +13,7 @@ from campaign.archive.entries import entry_names
 from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import FullPlan
 from campaign.archive.header import PlannedTrial, RunHeader
-from campaign.archive.journal import RunStarted
+from campaign.archive.journal import RunStarted, TrialFinished, TrialMeasured
 from campaign.archive.story import Lines
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
@@ -70,6 +70,21 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
         found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
     elif started[0].trials != header.trials:
         found.add(place, f"tells of {started[0].trials} trials; {header.trials} are planned")
+
+
+def check_measured(story: Lines, place: str, found: DamageList) -> None:
+    """What was measured was measured of trials that had finished, and of each once."""
+    finished: set[str] = set()
+    measured: set[str] = set()
+    for entry in story.entries:
+        if isinstance(entry, TrialFinished):
+            finished.add(entry.record)
+        elif isinstance(entry, TrialMeasured):
+            if entry.record not in finished:
+                found.add(place, f"has metrics of trial {entry.trial}, which had not finished")
+            if entry.record in measured:
+                found.add(place, f"has metrics of trial {entry.trial} twice")
+            measured.add(entry.record)
 
 
 def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:

@@ -12,6 +12,7 @@ from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.header import PARTIAL, PlannedTrial, RunStatus
 from campaign.archive.journal import JOURNAL, RunStarted, TrialFinished
+from campaign.archive.measured import measured_in, with_metrics
 from campaign.archive.run_folder import (
     PLAN,
     parse_plan,
@@ -34,11 +35,13 @@ def open_folder(folder: Path) -> RunReader:
     damaged = DamageList(folder)
     story = _story(folder, damaged)
     old = read_format(folder) <= 2
+    measured = measured_in(story.entries)
     trials: list[ArchivedTrial] = []
     earlier: dict[int, list[ArchivedTrial]] = {}
     for entry, finished in entry_names(story.attempts).items():
         with damaged.noting():
             archived = _read_trial(folder / finished.file, finished, entry, old)
+            archived = with_metrics(archived, measured.get(finished.record))
             if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
                 earlier.setdefault(finished.trial, []).append(archived)
             else:

@@ -22,8 +22,8 @@ from h5py import h5a, h5d, h5f, h5g, h5o, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.files import why
-from campaign.archive.hdf5 import CHECKSUM, SAMPLE
 from campaign.archive.heaps import heaps_are_sound
+from campaign.archive.storage import CHECKSUM, SAMPLE
 from campaign.errors import ArchiveError
 
 Array = NDArray[np.float64]

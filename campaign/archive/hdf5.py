@@ -22,24 +22,14 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5ds, h5f, h5g, h5o, h5p, h5s, h5t
-from isal import isal_zlib
 from numpy.typing import NDArray
 
-from campaign.archive.checksums import BLOCK, SeriesDigest
+from campaign.archive.checksums import SeriesDigest
+from campaign.archive.storage import CHECKSUM, CHUNK, LEVEL, SAMPLE, pack, storable
 
 Array = NDArray[np.float64]
 
-CHUNK = BLOCK
-"""Samples per chunk, as many as a block of `checksums` has. A power of two (see `preview`); deflate
-looks back 32 768 bytes, which is a byte of each of so many samples: shorter chunks compress worse,
-longer ones hardly better."""
 
-CHECKSUM = "sha256"
-"""Attribute of every text and number: SHA-256 of its raw bytes, little endian (text: UTF-8).
-Samples have theirs in their trial's record."""
-
-SAMPLE = np.dtype("<f8")
-_LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
 _TRIED = 4096  # samples on which both ways of storing a series are tried ...
 _DIFFER = 1024  # ... unless so many of them all differ, as those of no converter do
 _COMPACT = 32_000  # bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes
@@ -106,11 +96,6 @@ def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None
         put_attribute(dataset, key, value)
 
 
-def storable(text: str) -> str:
-    """A text as it can be stored: zeros pad one there, so none can be part of it."""
-    return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
-
-
 def put_integer(group: h5py.Group, name: str, value: int) -> None:
     """A whole number as a 64-bit scalar."""
     number = np.array(value, dtype="<i8")
@@ -148,8 +133,8 @@ def _scalar_plan(compact: bool) -> h5p.PropDCID:
 def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
     """Room for the hash of the file that `group` is in; returns where it stands in the file.
 
-    64 digits `0` until `campaign.archive.sealing` puts the hash over them. The only dataset without
-    a checksum of its own.
+    64 digits `0` until `sealing` puts the hash over them. The only dataset without a checksum
+    of its own.
     """
     digits = np.array(b"0" * 64, dtype="S64")
     dataset = group.create_dataset(name, data=digits, track_times=False)
@@ -316,7 +301,7 @@ def _series_plan(chunk: int, shuffled: bool) -> h5p.PropDCID:
     plan.set_chunk((chunk,))
     if shuffled:
         plan.set_shuffle()
-    plan.set_deflate(_LEVEL)
+    plan.set_deflate(LEVEL)
     return plan
 
 
@@ -329,31 +314,3 @@ def _shuffling_helps(samples: Array) -> bool:
     if len(np.unique(told)) == len(told):
         return True
     return len(pack(samples, shuffled=True)) <= len(pack(samples, shuffled=False))
-
-
-def pack(samples: Array, shuffled: bool) -> bytes:
-    """A chunk as HDF5's deflate filter would leave it, behind its shuffle filter or without."""
-    raw = samples.view(np.uint8)
-    raw = raw.reshape(-1, samples.itemsize).T if shuffled else raw
-    packed: bytes = isal_zlib.compress(raw.tobytes(), _LEVEL)
-    return packed
-
-
-def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
-    """The `count` samples of a chunk that `pack` made; None when it holds something else.
-
-    No more memory is taken than so many samples need, whatever the chunk would expand to.
-    """
-    size = count * SAMPLE.itemsize
-    inflating = isal_zlib.decompressobj()
-    try:
-        raw = inflating.decompress(packed, size)
-        more = b"" if inflating.eof else inflating.decompress(b"", 1)
-    except isal_zlib.error:  # type: ignore[misc] # its types call the class an instance
-        return None
-    if len(raw) != size or more or not inflating.eof or inflating.unused_data:
-        return None
-    if not shuffled:
-        return np.frombuffer(raw, dtype=SAMPLE)
-    planes = np.frombuffer(raw, dtype=np.uint8).reshape(SAMPLE.itemsize, count)
-    return np.ascontiguousarray(planes.T).view(SAMPLE).reshape(count)

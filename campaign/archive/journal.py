@@ -11,17 +11,28 @@ import os
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    field_serializer,
+)
 
 from campaign.archive.files import why
 from campaign.archive.header import PlannedTrial, RunStatus
 from campaign.errors import ArchiveError
+from campaign.estimate import Estimate
 from campaign.trial import Outcome, SafeState, Tree, canonical_json
 
 JOURNAL = "journal.jsonl"
+
+_ESTIMATE = TypeAdapter(Estimate)
 
 
 class _Line(BaseModel):
@@ -132,6 +143,29 @@ class TrialFinished(_Line):
     safe_state: SafeState
 
 
+class TrialMeasured(_Line):
+    """What a recording says by itself, found once its trial was on the disk.
+
+    Attributes:
+        record: digest of the trial's record, which names the samples: of them it is said.
+        by: which code found it, with its version.
+        estimates: each finite, and of another name than the others.
+    """
+
+    event: Literal["trial measured"] = "trial measured"
+    at: str
+    trial: int = Field(ge=1)
+    attempt: int = Field(default=1, ge=1)
+    record: str = Field(pattern=r"^[0-9a-f]{64}$")
+    by: str
+    estimates: tuple[Estimate, ...]
+
+    @field_serializer("estimates")
+    def _as_in_a_record(self, estimates: tuple[Estimate, ...]) -> list[Tree]:
+        """What would say its default is left out."""
+        return [_ESTIMATE.dump_python(e, mode="json", exclude_defaults=True) for e in estimates]
+
+
 class TrialAbandoned(_Line):
     """A trial was begun and nothing of it is kept."""
 
@@ -158,11 +192,17 @@ Entry = Annotated[
     | Decision
     | TrialsFollowed
     | TrialFinished
+    | TrialMeasured
     | TrialAbandoned
     | RunEnded,
     Field(discriminator="event"),
 ]
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
+
+
+def utc_now() -> str:
+    """The wall clock as a journal keeps it: ISO 8601, UTC, to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 class Journal:

@@ -225,7 +225,6 @@ def make_record(
     preview: PreviewRecord | None = None,
     windows: Iterable[Window] = (),
     estimates: Iterable[Estimate] = (),
-    measured_by: str = "",
 ) -> TrialRecord:
     """The record of a trial that has ended.
 
@@ -236,7 +235,7 @@ def make_record(
         times: when it started and ended, ISO 8601.
         events: what happened meanwhile.
         series: length of the recording, digest of its time base, and its channels.
-        preview, windows, estimates, measured_by: see `TrialRecord`.
+        preview, windows, estimates: see `TrialRecord`.
     """
     samples, time, channels = series or (None, "", ())
     return TrialRecord(
@@ -258,7 +257,6 @@ def make_record(
         events=tuple(EventRecord(time=float(e.time), text=e.text) for e in events),
         windows=tuple(windows),
         estimates=tuple(_ESTIMATE.validate_python(plain(asdict(e))) for e in estimates),
-        measured_by=measured_by,
     )
 
 

@@ -17,7 +17,7 @@ from campaign.archive.record import SeriesRecord, Trees, TrialRecord
 from campaign.archive.run_folder import first_line
 from campaign.archive.series import series_at
 from campaign.errors import ArchiveError
-from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording
+from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording, Trial
 
 TIME = ChannelInfo("time", "s", "Time", "s")
 PLOTTED = ("data", "preview")
@@ -151,6 +151,18 @@ def archived_trial(
         raise ArchiveError(f"{path}: /{entry}: its bench or its options cannot be read") from None
     except ValueError as error:
         raise ArchiveError(f"{path}: /{entry}: {first_line(error)}") from None
+    return trial_of_record(trial, path, entry, record, not_kept, sealed_as)
+
+
+def trial_of_record(
+    trial: Trial,
+    path: Path,
+    entry: str,
+    record: TrialRecord,
+    not_kept: str = "",
+    sealed_as: str = "",
+) -> ArchivedTrial:
+    """A trial that is at hand, with what its record says and vouches for."""
     return ArchivedTrial(
         trial=trial,
         ending=record.ending,

@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from campaign.archive import guarded, hdf5
+from campaign.archive import guarded, storage
 from campaign.archive.checksums import text_digest
 from campaign.archive.damage import DamageList
 from campaign.archive.header import FORMAT
@@ -45,7 +45,7 @@ class Seal(BaseModel):
 
 def seal_text(run: str, texts: Mapping[str, str | int]) -> str:
     """The seal of `texts`, which are by their place in `/run`."""
-    digests = {name: text_digest(hdf5.storable(str(text))) for name, text in texts.items()}
+    digests = {name: text_digest(storage.storable(str(text))) for name, text in texts.items()}
     return canonical_json({"format": FORMAT, "run": run, "texts": digests})
 
 

@@ -16,15 +16,16 @@ from campaign.archive.damage import DamageList
 from campaign.archive.entries import ENTRY, entry_names, file_name
 from campaign.archive.followed import planned_in, stages_in
 from campaign.archive.full_plan import FullPlan
-from campaign.archive.hdf5 import storable
 from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.journal import RunStarted, TrialFinished
+from campaign.archive.measured import measured_in, with_metrics
 from campaign.archive.provenance import read_provenance
 from campaign.archive.record import Trees, TrialRecord, parse_trees
 from campaign.archive.recorded import archived_trial, parse_record
 from campaign.archive.run_folder import parse_plan
 from campaign.archive.run_reader import Glance, RunReader
 from campaign.archive.seal import SEAL, SealedTexts
+from campaign.archive.storage import storable
 from campaign.archive.story import Lines, read_lines
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, SafeState, Tree
@@ -192,13 +193,14 @@ class _Trials:
         """The trials that count, and the attempts before them by number; the rest is noted."""
         trials: list[ArchivedTrial] = []
         earlier: dict[int, list[ArchivedTrial]] = {}
+        measured = measured_in(story.entries)
         attempts = self._told(story)
         unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
         if unknown:
             damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
         for entry, told in entry_names(attempts).items():
             with damaged.noting(), guarded.guarded(self.path, f"/{entry}"):
-                archived = self._archived(entry, told)
+                archived = with_metrics(self._archived(entry, told), measured.get(told.record))
                 if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
                     earlier.setdefault(told.trial, []).append(archived)
                 else:

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5t
 
-from campaign.archive import hdf5
+from campaign.archive import storage
 from campaign.archive.checksums import SeriesDigest, series_digest
 from campaign.archive.guarded import own_id
 from campaign.errors import ArchiveError
@@ -48,7 +48,7 @@ class Series:
         """The samples, chunk by chunk. Raises ArchiveError."""
         for start in range(0, self.length, self.chunk):
             skipped, packed = self.dataset.read_direct_chunk((start,))
-            samples = None if skipped else hdf5.unpack(packed, self.chunk, self.shuffled)
+            samples = None if skipped else storage.unpack(packed, self.chunk, self.shuffled)
             if samples is None:
                 raise ArchiveError(f"{self.place}: cannot be read: a chunk is damaged")
             yield samples[: self.length - start]

@@ -22,7 +22,6 @@ from campaign.archive import hdf5
 from campaign.archive.archived_trial import ArchivedTrial
 from campaign.archive.entries import entry_name, file_name
 from campaign.archive.files import PART, publish, sha256_of, why
-from campaign.archive.measured import Measure, Measured
 from campaign.archive.preview import PREVIEW_POINTS, Preview
 from campaign.archive.record import (
     PreviewRecord,
@@ -33,7 +32,7 @@ from campaign.archive.record import (
     shared_trees,
     trees_text,
 )
-from campaign.archive.written import WrittenSamples
+from campaign.archive.recorded import trial_of_record
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, RELATIVE_RATE
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
@@ -64,12 +63,22 @@ Written = tuple[int, str, list[SeriesRecord]]
 
 @dataclass(frozen=True)
 class FinishedFile:
-    """A trial file that is whole and on the disk; `record` is the digest of the trial's record."""
+    """A trial file that is whole and on the disk, under its real name.
 
-    name: str
+    Attributes:
+        archived: the trial as the file has it.
+        sha256: of the file.
+        record: digest of the trial's record.
+    """
+
+    archived: ArchivedTrial
     sha256: str
     bytes: int
     record: str
+
+    @property
+    def name(self) -> str:
+        return self.archived.path.name
 
 
 class TrialFile:
@@ -132,16 +141,10 @@ class TrialFile:
         ended: str,
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
-        measure: Measure | None = None,
     ) -> FinishedFile:
-        """Write the rest, put it on the disk and give the file its real name.
-
-        `measure` is handed the trial once its samples are written; what it finds is kept, too.
-        """
+        """Write the rest, put it on the disk and give the file its real name."""
         with self._writing():
             series, preview = self._finish_samples()
-        measured = self._measured(measure, ending, started, ended, series)
-        with self._writing():
             trial, trees = shared_trees(self._trial)
             record = make_record(
                 trial,
@@ -154,15 +157,15 @@ class TrialFile:
                 series=series,
                 preview=preview,
                 windows=windows,
-                estimates=(*estimates, *measured.estimates),
-                measured_by=measured.by,
+                estimates=estimates,
             )
             write_record(self._entry, record, record.text, trees, self._not_kept)
             write_root(self._file, started, self._entry)
             self._file.close()
             digest, size = sha256_of(self._part), self._part.stat().st_size
             publish(self._part, self._final)
-        return FinishedFile(self._final.name, digest, size, record.sha256)
+        place = self._final, entry_name(self._trial.number), record, self._not_kept
+        return FinishedFile(trial_of_record(self._trial, *place), digest, size, record.sha256)
 
     def discard(self) -> None:
         """Leave nothing of it. Never fails: what cannot be removed is no archive by its name."""
@@ -170,23 +173,6 @@ class TrialFile:
             self._file.close()
         with contextlib.suppress(OSError):
             self._part.unlink(missing_ok=True)
-
-    def _measured(
-        self,
-        measure: Measure | None,
-        ending: Ending,
-        started: str,
-        ended: str,
-        series: Written | None,
-    ) -> Measured:
-        """What is found in the samples that were written, if any were and somebody looks."""
-        if measure is None or series is None or self._not_kept:
-            return Measured()
-        length, time, channels = series
-        events = tuple(self._events)
-        samples = WrittenSamples(self._entry["data"], length, time, tuple(channels), events)
-        place = self._part, self._entry.name.lstrip("/")
-        return measure(ArchivedTrial(self._trial, ending, started, ended, *place, samples))
 
     def _finish_samples(self) -> tuple[Written | None, PreviewRecord | None]:
         """What the record says of the samples, and of their preview where one was written."""

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive.journal import Entry, TrialAbandoned, TrialFinished
+from campaign.archive.files import why
+from campaign.archive.journal import Entry, TrialAbandoned, TrialFinished, utc_now
+from campaign.archive.measured import trial_measured
+from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import ChannelInfo, Ending, Event, Trial
 
 if TYPE_CHECKING:
+    from campaign.archive.archived_trial import ArchivedTrial
     from campaign.archive.measured import Measure
     from campaign.archive.trial_file import TrialFile
 
@@ -41,6 +45,7 @@ class TrialWriter:
         self._note = note
         self._timing = timing
         self._open = True
+        self._kept: tuple[TrialFinished, ArchivedTrial] | None = None
 
     @property
     def attempt(self) -> int:
@@ -70,7 +75,6 @@ class TrialWriter:
         *,
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
-        measure: Measure | None = None,
     ) -> None:
         """Keep the trial. When this returns, no crash can lose it.
 
@@ -78,28 +82,53 @@ class TrialWriter:
             ending: however it ended: a failed trial is kept too.
             started, ended: ISO 8601 with a time zone.
             windows, estimates: what was found of it meanwhile; kept with it.
-            measure: looks at its samples once they are written; what it finds is kept as well.
 
         Raises:
             ArchiveError: it could not be written; nothing of it remains.
         """
         self._open = False
         with self._timing.span(Work.TRIAL_FILES):
-            file = self._file.close(ending, started, ended, windows, estimates, measure)
-            self._note(
-                TrialFinished(
-                    at=ended,
-                    trial=self._trial.number,
-                    attempt=self._attempt,
-                    file=file.name,
-                    sha256=file.sha256,
-                    record=file.record,
-                    bytes=file.bytes,
-                    outcome=ending.outcome,
-                    reason=ending.reason,
-                    safe_state=ending.safe_state,
-                )
+            file = self._file.close(ending, started, ended, windows, estimates)
+            finished = TrialFinished(
+                at=ended,
+                trial=self._trial.number,
+                attempt=self._attempt,
+                file=file.name,
+                sha256=file.sha256,
+                record=file.record,
+                bytes=file.bytes,
+                outcome=ending.outcome,
+                reason=ending.reason,
+                safe_state=ending.safe_state,
             )
+            self._note(finished)
+        self._kept = finished, file.archived
+
+    def measure(self, measure: Measure) -> str:
+        """Keep what `measure` finds in the samples of the trial, which is finished.
+
+        What is kept is a line of the journal: the trial's file is on the disk and stays as it is.
+
+        Returns:
+            Why nothing was measured, in one line; empty when something was, or nobody looked.
+
+        Raises:
+            ArchiveError: the journal cannot be written.
+        """
+        if self._kept is None:
+            raise RuntimeError(f"{self._trial.name}: is measured before it is finished")
+        finished, archived = self._kept
+        if archived.not_kept or not archived.channels():
+            return ""
+        found = measure(archived)
+        try:
+            if found.estimates:
+                self._note(trial_measured(utc_now(), finished, found))
+        except ArchiveError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a plug-in's, of which no line can be made
+            return f"what was measured cannot be kept: {type(error).__name__}: {why(error)}"
+        return found.problem
 
     def abandon(self, at: str, reason: str = "") -> None:
         """Keep nothing of the trial but that it was begun."""

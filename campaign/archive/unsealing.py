@@ -17,7 +17,14 @@ from campaign.archive import guarded, hdf5
 from campaign.archive.checksums import text_digest
 from campaign.archive.damage import DamageList
 from campaign.archive.entries import entry_name, entry_names
-from campaign.archive.files import PART, publish, sha256_of, sync_folder, why, write_atomically
+from campaign.archive.files import (
+    PART,
+    publish,
+    sha256_of,
+    sync_folder,
+    why,
+    write_atomically,
+)
 from campaign.archive.folder import read_trial_file
 from campaign.archive.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.header import PARTIAL

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
@@ -19,8 +18,11 @@ from campaign.archive.journal import (
     RunEnded,
     RunResumed,
     TrialFinished,
+    TrialMeasured,
     TrialsFollowed,
+    utc_now,
 )
+from campaign.archive.measured import measured_in, with_metrics
 from campaign.archive.resuming import reopen
 from campaign.archive.run_lock import RunLock
 from campaign.archive.trial_writer import TrialWriter
@@ -50,6 +52,7 @@ class RunWriter:
         self._lock = threading.Lock()
         self._writers: list[TrialWriter] = []
         self._last: dict[int, TrialFinished] = {}
+        self._measured: dict[str, TrialMeasured] = {}
         self._told: tuple[Entry, ...] = ()
         self._sealer = Sealer(folder)
 
@@ -112,6 +115,7 @@ class RunWriter:
         writer._last = dict(story.finished)
         for finished in story.files:
             writer._sealer.add(finished)
+        writer._measured = measured_in(story.entries)
         writer._told = story.entries
         try:
             journal.append(
@@ -166,14 +170,14 @@ class RunWriter:
         self, decision: str, reason: str, trial: int | None = None, *, at: str = ""
     ) -> None:
         """Note what the run does besides its plan; `at` is now unless it is given."""
-        self._note(Decision(at=at or _now(), trial=trial, decision=decision, reason=reason))
+        self._note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
 
     def trials_followed(self, followed: TrialsFollowed) -> None:
         """Note which trials follow from others, before the first of them is begun."""
         self._note(followed)
 
     def archived(self, number: int) -> ArchivedTrial:
-        """The last finished attempt at a trial of this run, read from its file.
+        """The last finished attempt at a trial of this run, read from its file, with its metrics.
 
         Raises ArchiveError when it cannot be read, LookupError when there is none.
         """
@@ -181,11 +185,13 @@ class RunWriter:
 
         with self._lock:
             finished = self._last[number]
-        return read_trial_file(self._folder / finished.file, finished)
+            measured = self._measured.get(finished.record)
+        archived = read_trial_file(self._folder / finished.file, finished)
+        return with_metrics(archived, measured)
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
         """Note what a person was asked to do before `trial`, and the answer."""
-        self._note(OperatorStep(at=at or _now(), trial=trial, step=step, answer=answer))
+        self._note(OperatorStep(at=at or utc_now(), trial=trial, step=step, answer=answer))
 
     def seal(
         self,
@@ -231,7 +237,6 @@ class RunWriter:
                 self._sealer.add(entry)
             with self.timing.span(Work.SEALING):
                 self._sealer.advance()
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+        elif isinstance(entry, TrialMeasured):
+            with self._lock:
+                self._measured[entry.record] = entry

@@ -17,6 +17,7 @@ from campaign.archive import (
     reserved_name,
 )
 from campaign.archive.damage_words import heading, in_words, lost_trials
+from campaign.archive.header import PARTIAL
 from campaign.archive.sound_samples import whole_recording
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE
 from campaign.cli.output import print_line, print_note
@@ -60,7 +61,8 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     stem = f"rerun-{archived.trial.name}-{run.header.protocol_name or 'run'}"
     with reserved_name(results, stem, now) as lock:
         header = _header(run, archived, lock.name, now, options.model_dump(mode="json"))
-        session = Session(kind, backend, [trial], Policy(), workers=1, run=header.name, repeats=run)
+        folder = results / f"{header.name}{PARTIAL}"
+        session = Session(kind, backend, [trial], Policy(), workers=1, folder=folder, repeats=run)
         outcome, code = execute(session, lambda: RunWriter.create(results, header, [trial], lock))
     if outcome.status is RunStatus.INTERRUPTED:
         print_note("interrupted: nothing was compared")

@@ -8,20 +8,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
+from campaign.archive.header import PARTIAL
+from campaign.archive.journal import utc_now
 from campaign.archive.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
-from campaign.cli.plan import print_low_margins
+from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, choose_workers, conduct, print_warning
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
-from campaign.execution.attempt import utc_now
 from campaign.execution.resume import (
     Conditions,
     archived_conditions,
@@ -114,7 +115,7 @@ def resume_run(
         trials,
         remade.policy,
         workers,
-        run.name,
+        path.with_name(f"{run.name}{PARTIAL}"),
         yes,
         clear_stop,
         finished,
@@ -183,7 +184,7 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
         )
     check_limits(plan)
     check_loops(plan)
-    print_low_margins(plan)
+    print_warnings(plan)
     changes = changes or trial_differences(run.first_stage, plan.trials)
     return Remade(
         prepared.kind,

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, reserved_name
-from campaign.archive.header import Truth
+from campaign.archive.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
-from campaign.cli.plan import print_low_margins
+from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Prepared, Request, prepare
 from campaign.cli.profile import print_profile
 from campaign.cli.session import Session, choose_workers, conduct
@@ -61,7 +61,7 @@ def run_protocol(
             plan = prepared.plan
             check_limits(plan)
             check_loops(plan)
-            print_low_margins(plan)
+            print_warnings(plan)
             workers = choose_workers(prepared.kind, len(plan.trials), workers)
             if sign is not None:
                 rehearse_signing(sign)
@@ -83,7 +83,7 @@ def run_protocol(
             plan.trials,
             plan.policy,
             workers,
-            lock.name,
+            results / f"{lock.name}{PARTIAL}",
             yes,
             clear_stop,
             checks_step=is_checked(prepared.options),

@@ -36,7 +36,7 @@ from campaign.execution.safety import (
     safe_when_broken_off,
 )
 from campaign.execution.stages import Stages, refusal_of
-from campaign.execution.stop import StopSwitch
+from campaign.execution.stop import NOTHING_BEGUN, StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
@@ -53,7 +53,7 @@ class Session:
     Attributes:
         trials: the whole plan, and what had followed from it before it is gone on with.
         finished: those that are not executed (again), by number.
-        run: the name that the run has or will have.
+        folder: of the run, while it is in progress: the one that it has or will have.
         yes: whether nobody is asked anything.
         clear_stop: the count of a stop of the bench from outside that a person has seen.
         checks_step: whether it is told afterwards what half the step has changed.
@@ -68,7 +68,7 @@ class Session:
     trials: Sequence[Trial]
     policy: Policy
     workers: int
-    run: str
+    folder: Path
     yes: bool = False
     clear_stop: int | None = None
     finished: Mapping[int, Outcome] = field(default_factory=dict)
@@ -128,7 +128,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     if isinstance(session.backend, StoppedOutside):
-        session.backend.introduce(session.run)
+        session.backend.introduce(session.folder.stem)
     if isinstance(session.backend, Timed):
         session.backend.timing = session.timing
     try:
@@ -138,6 +138,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             connected(session.backend, print_warning) as backend,
         ):
             stop.make_safe = partial(safe_at_once, backend)
+            note = partial(_what_is_kept, session.folder)
+            stop.kept(note, moves=session.kind.live)  # there may be a folder before it is opened
             with safe_when_broken_off(backend):
                 check_channels(session.kind, backend, session.left)
                 cleared = clear_stop(backend, session.clear_stop, stop)
@@ -147,7 +149,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
                     writer.decision("stop cleared", cleared)
                 if source:
                     note_damaged(writer, source)
-            stop.kept(partial(_what_is_kept, writer.folder), moves=session.kind.live)
+            stop.kept(note, moves=session.kind.live)
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
     except BackendError as error:
@@ -163,6 +165,8 @@ def _what_is_kept(folder: Path) -> str:
     sealed = folder.with_suffix(SEALED)
     if sealed.is_file():
         return f"left at once; the run is in {sealed}"
+    if not folder.exists():
+        return NOTHING_BEGUN
     return f"stopped at once; the finished trials are in {folder}; {how_to_go_on(folder)}"
 
 
@@ -200,6 +204,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
                 writer,
                 experiments(),
                 refusal_of(backend),
+                measure=Measuring(experiments(), session.timing),
                 finished=session.finished,
                 asked=session.asked,
             ),

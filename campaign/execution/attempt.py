@@ -5,10 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
-from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.measured import Measure, Measured
+from campaign.archive.journal import utc_now
+from campaign.archive.measured import Measure
 from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder
@@ -165,20 +164,12 @@ class _Attempt:
         return replace(executed, ending=ending)
 
     def archive(self, executed: Executed) -> Executed:
-        """Keep the trial. Raises what the archive raises."""
+        """Keep the trial, then what its recording says. Raises what the archive raises."""
         executed = replace(executed, unwatched=self.recorder.unwatched)
+        self._file.finish(executed.ending, self._started, utc_now())
         if self._measure is None:
-            self._file.finish(executed.ending, self._started, utc_now())
             return executed
-        measured: list[Measured] = []
-
-        def measure(data: ArchivedTrial) -> Measured:
-            measured.append(look(data))
-            return measured[-1]
-
-        look = self._measure
-        self._file.finish(executed.ending, self._started, utc_now(), measure=measure)
-        return replace(executed, unmeasured="".join(found.problem for found in measured))
+        return replace(executed, unmeasured=self._file.measure(self._measure))
 
     def abandoned(self, safe_state: SafeState) -> Executed:
         """It did not come back, although the bench was made safe over its head."""
@@ -253,8 +244,3 @@ def _made_safe(backend: Backend) -> SafeState:
         return backend.make_safe()
     except Exception:  # noqa: BLE001 - not seen safe; the runner asks again, and says why
         return SafeState.NOT_CONFIRMED
-
-
-def utc_now() -> str:
-    """The wall clock as archives keep it: ISO 8601, UTC, to the millisecond."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,7 +1,7 @@
 """At the end of a trial: what its recording says by itself, as its experiment measures it.
 
-It is archived with the trial, so that an analysis of tomorrow reads what was found today. Nothing
-that goes wrong here costs the trial: an analysis measures whatever is not archived.
+It is archived, so that an analysis of tomorrow reads what was found today. The recording is on the
+disk before: nothing that goes wrong here costs it, and an analysis measures what was not archived.
 """
 
 from __future__ import annotations
@@ -19,15 +19,14 @@ from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
-from campaign.experiments.interface import Experiment
+from campaign.experiments.interface import Experiment, measured
 from campaign.plugins import Kinds
 from campaign.source_hash import digest, sources_of
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Outcome, Role
 
 LIMIT = 60.0
-"""s that one recording may be measured for. Its trial is not published before, and would be lost
-with a program that is killed meanwhile."""
+"""s that one recording may be measured for: the bench waits, and what follows from it."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Measuring:
             experiment = self.experiments.get(data.trial.kind)
             if experiment is None or experiment.measure is None:
                 return Measured()
-            estimates = checked(experiment.measure(data))
+            estimates = checked(measured(experiment, data))
             return Measured(estimates, self._by(data.trial.kind)) if estimates else Measured()
         except (ValueError, UsageError) as error:
             return Measured(problem=_one_line(str(error)))

@@ -15,9 +15,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from campaign.archive.header import RunStatus
+from campaign.archive.journal import utc_now
 from campaign.archive.measured import Measure
 from campaign.backends.interface import Backend
-from campaign.execution.attempt import utc_now
 from campaign.execution.attendance import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger

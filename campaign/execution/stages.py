@@ -8,16 +8,20 @@ and a run that is gone on with knows from the journal which of them were asked.
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Protocol
 
+from campaign.archive import ArchivedTrial
 from campaign.archive.followed import trials_followed
-from campaign.archive.journal import TrialsFollowed
+from campaign.archive.journal import TrialsFollowed, utc_now
+from campaign.archive.measured import Measured
 from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
-from campaign.execution.attempt import utc_now
+from campaign.estimate import Estimate
 from campaign.execution.safety import describe
 from campaign.experiments.interface import (
     Experiment,
@@ -44,6 +48,11 @@ class StageArchive(Protocol):
         """Note a stage's trials. Raises ArchiveError."""
 
 
+UNKNOWN = Estimate.without_interval("nothing", math.nan, "", "the recording tells nothing")
+"""Metrics of a recording that could not be measured."""
+Measure = Callable[[ArchivedTrial], Measured]
+
+
 class Stages:
     """The stages of a run that have not been asked yet. Used from one thread."""
 
@@ -55,6 +64,7 @@ class Stages:
         experiments: Mapping[str, Experiment],
         refusal: Refusal,
         *,
+        measure: Measure | None = None,
         finished: Iterable[int] = (),
         asked: Sequence[TrialsFollowed] = (),
     ) -> None:
@@ -64,6 +74,7 @@ class Stages:
             planned: all stages of the plan.
             trials: all that are known: those of the plan, and those of `asked`.
             refusal: what the backend says of a trial; empty when it can be executed.
+            measure: in a limited time, what an archived trial says by itself; absent: a stage does.
             finished: numbers of the trials that have ended for good.
             asked: the stages of which the journal tells.
         """
@@ -88,6 +99,7 @@ class Stages:
         self._next = max((trial.number for trial in trials), default=0) + 1
         self._archive = archive
         self._experiments = experiments
+        self._measure = measure
         self._refusal = refusal
         self._failures = [text for stage in asked if (text := _failure(stage))]
 
@@ -148,12 +160,22 @@ class Stages:
         first = trials[0]
         experiment = self._experiments[first.kind]
         (declared,) = (each for each in experiment.stages if each.name == stage.name)
-        archived = tuple(self._archive.archived(trial.number) for trial in trials)
+        archived = tuple(self._measured(self._archive.archived(trial.number)) for trial in trials)
         if not _on_benches_of(trials, archived):
             raise UsageError("its trials were executed on different benches")
         data = TestData(first.test, first.kind, first.options, archived)
         requests = declared.trials(options_of(experiment, first.options), bench_of(first), data)
         return follow(stage, experiment, requests, first, self._next, self._refusal)
+
+    def _measured(self, trial: TrialData) -> TrialData:
+        """With what it says by itself, also where nothing could be archived of that.
+
+        A stage is asked while the bench waits: an experiment's `measure` that hung when its trial
+        ended must not hang here, and what says nothing is not measured anew.
+        """
+        if self._measure is None or trial.estimates or not isinstance(trial, ArchivedTrial):
+            return trial
+        return replace(trial, estimates=self._measure(trial).estimates or (UNKNOWN,))
 
 
 def _on_benches_of(trials: Sequence[Trial], archived: Sequence[TrialData]) -> bool:

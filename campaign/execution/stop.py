@@ -28,7 +28,7 @@ _NOTICE = (
     "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
     "seconds; Ctrl-C again leaves it unclosed\n"
 )
-_NOTHING = "stopped at once; nothing was begun"
+NOTHING_BEGUN = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
 _LONGEST = 2000
 """bytes of a note, so that a pipe takes it whole."""
@@ -52,7 +52,7 @@ class StopSwitch:
 
     def __init__(self) -> None:
         self._reason = ""
-        self._note: Callable[[], str] = lambda: _NOTHING
+        self._note: Callable[[], str] = lambda: NOTHING_BEGUN
         self._moves = False
         self._noticed = False
         self._pipe: int | None = None  # to the guardian

@@ -22,12 +22,13 @@ class TrialWriter(Protocol):
 
     def event(self, event: Event) -> None: ...
 
-    def finish(
-        self, ending: Ending, started: str, ended: str, *, measure: Measure | None = None
-    ) -> None:
-        """Keep the trial, whole, and what `measure` finds in its samples.
+    def finish(self, ending: Ending, started: str, ended: str) -> None:
+        """Keep the trial, whole: no crash can lose it then. Raises ArchiveError."""
 
-        Raises ArchiveError when it cannot be written.
+    def measure(self, measure: Measure) -> str:
+        """Keep what `measure` finds in its samples, once it is kept; why nothing was measured.
+
+        Raises ArchiveError.
         """
 
 

@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunWriter
+from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.files import PART, write_atomically
 from campaign.archive.journal import JOURNAL
+from campaign.archive.measured import Measured
+from campaign.estimate import Estimate
 from campaign.trial import ChannelInfo, Ending, Outcome, SafeState, Trial
 from tests.archive.recorded_calls import Call, Calls, recorded
 from tests.archives import _header, plan_of
@@ -70,6 +72,37 @@ def test_a_trial_is_on_the_disk_before_the_journal_says_so(
     (line,) = [call.data for call in calls.listed if call.path == journal and call.data]
     assert json.loads(line)["event"] == "trial finished"
     assert line.endswith(b"\n")
+
+
+def test_a_trial_is_reported_before_it_is_measured(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    """File, name and line are on the disk; what is found is one more line, and no other call."""
+    writer = begun(tmp_path, trials)
+    journal = writer.folder / JOURNAL
+    found = Measured((Estimate("x", 1.0, "", reason="one sample"),), "campaign")
+    before: list[int] = []
+    with recorded() as calls:
+        recorder = writer.begin(trials[0])
+        recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
+        recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
+        recorder.finish(Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED), AT, AT)
+
+        def measure(archived: ArchivedTrial) -> Measured:
+            before.append(end_of(calls))
+            return found
+
+        recorder.measure(measure)
+    writer.close()
+    (start,) = before
+    calls.in_order(("rename", writer.folder / "trial-00001.nxs"), ("fsync", journal))
+    assert calls.synced_before(start, journal)
+    told = [json.loads(call.data)["event"] for call in calls.listed[:start] if call.data]
+    assert told == ["trial finished"]
+    assert [(call.name, call.path) for call in calls.listed[start:]] == [
+        ("write", journal), ("fsync", journal),
+    ]  # fmt: skip
+    assert json.loads(calls.listed[start].data)["event"] == "trial measured"
 
 
 def test_every_line_of_the_journal_is_synced_before_anybody_is_told(

@@ -10,7 +10,8 @@ import pytest
 
 from campaign.archive import RunWriter, open_run
 from campaign.archive.journal import JOURNAL
-from campaign.archive.verification import PER_DATASET, STRUCTURE, UNFINISHED, verify_run
+from campaign.archive.verification import verify_run
+from campaign.archive.verification_result import PER_DATASET, STRUCTURE, UNFINISHED
 from campaign.trial import Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 

@@ -101,9 +101,7 @@ class MemoryTrial(MemoryRecorder):
         super().__init__()
         self.archive, self.trial = archive, trial
 
-    def finish(
-        self, ending: Ending, started: str, ended: str, *, measure: Measure | None = None
-    ) -> None:
+    def finish(self, ending: Ending, started: str, ended: str) -> None:
         assert datetime.fromisoformat(started) <= datetime.fromisoformat(ended)
         with self.archive.lock:
             self.archive.trials[self.trial.number] = self.trial
@@ -111,8 +109,10 @@ class MemoryTrial(MemoryRecorder):
             self.archive.attempts.append((self.trial.number, ending.outcome))
             self.archive.recordings[self.trial.number] = self.recording(ending)
             self.archive.samples[self.trial.number] = len(self.recording(ending).time)
-        if measure is not None:
-            measure(self.archive.archived(self.trial.number))  # type: ignore[arg-type]
+
+    def measure(self, measure: Measure) -> str:
+        found = measure(self.archive.archived(self.trial.number))  # type: ignore[arg-type]
+        return found.problem
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -16,8 +15,8 @@ import pytest
 
 import campaign
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.hdf5 import CHUNK
 from campaign.archive.journal import Decision
+from campaign.archive.storage import CHUNK
 from campaign.archive.story import read_lines
 from campaign.archive.verification import verify_run
 from campaign.backends.sim import SimBackend, SimOptions
@@ -243,6 +242,22 @@ def test_measuring_that_hangs_costs_no_trial(tmp_path: Path) -> None:
     assert verify_run(reader.path).sound
 
 
+def test_a_recording_is_archived_before_it_is_measured(tmp_path: Path) -> None:
+    """Whoever opens the run while it is measured finds it there, whole."""
+    seen: list[int] = []
+
+    def looks(data: TrialData) -> Sequence[Estimate]:
+        (folder,) = tmp_path.glob("*.partial")
+        assert verify_run(folder).sound
+        (there,) = open_run(folder).trials
+        seen.append(len(there.recording().time))
+        return scaled(1.0)(data)
+
+    (trial,) = run_of(tmp_path, looks).trials
+    assert seen == [3000]
+    assert [estimate.name for estimate in trial.estimates] == ["top"]
+
+
 def test_what_was_not_found_is_left_out(tmp_path: Path) -> None:
     def measure(data: TrialData) -> Sequence[Estimate]:
         lost = Estimate.without_interval("lost", math.nan, "s", "it never came to that")
@@ -259,15 +274,16 @@ def test_only_measurements_are_measured(tmp_path: Path) -> None:
 
 
 def test_a_changed_metric_is_found(tmp_path: Path) -> None:
-    """The digest of the record vouches for it: its own checksum made to fit is not enough."""
+    """The seal vouches for it: its own checksum made to fit is not enough."""
     path = run_of(tmp_path, scaled(1.0)).path
     assert verify_run(path).sound
 
     def change(file: h5py.File) -> None:
-        place = "trial_00001/record/json"
-        tree: dict[str, Any] = json.loads(forging.text_of(file, place))
-        tree["estimates"][0]["value"] *= 1.01
-        forging.put_text(file, place, forging.canonical(tree))
+        place = "run/journal/data"
+        lines = [json.loads(line) for line in forging.text_of(file, place).splitlines()]
+        (told,) = [line for line in lines if line["event"] == "trial measured"]
+        told["estimates"][0]["value"] *= 1.01
+        forging.put_text(file, place, "".join(f"{forging.canonical(line)}\n" for line in lines))
 
     with h5py.File(path, "r+") as file:
         change(file)

@@ -34,10 +34,10 @@ __main__.main()
 """As `python -m campaign`. What a signal does to an interpreter that starts is not ours to say."""
 
 
-def started(folder: Path, *more: str, path: str = "") -> subprocess.Popen[str]:
+def started(folder: Path, *more: str, path: str = "", main: str = MAIN) -> subprocess.Popen[str]:
     """A run that listens to signals."""
     process = subprocess.Popen(
-        [sys.executable, "-c", MAIN, "run", "protocol.toml", *more],
+        [sys.executable, "-c", main, "run", "protocol.toml", *more],
         cwd=folder,
         env={**environment(), "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT))))},
         stdout=subprocess.PIPE,
@@ -85,6 +85,34 @@ def check(folder: Path, seed: int, times: int) -> float:
 @pytest.mark.parametrize("seed", range(4))
 def test_at_some_instants(tmp_path: Path, seed: int, times: int) -> None:
     check(tmp_path, seed, times)
+
+
+SLOW_TO_BEGIN = """
+import os, signal, time
+from campaign import __main__, interrupts
+from campaign.archive import RunWriter
+create = RunWriter.create.__func__
+def interrupted(cls, *arguments):
+    create(cls, *arguments)
+    for _ in range(2):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.2)
+    time.sleep(600)
+RunWriter.create = classmethod(interrupted)
+interrupts.listen()
+os.write(1, b"listening\\n")
+__main__.main()
+"""
+
+
+def test_twice_while_the_run_is_begun(tmp_path: Path) -> None:
+    """Its folder is there, and nobody has said so: the last line does."""
+    write(tmp_path, LONG)
+    process = started(tmp_path, main=SLOW_TO_BEGIN)
+    _, err = process.communicate(timeout=120)
+    (partial,) = (tmp_path / "results").glob("*.partial")
+    assert process.returncode == 130, err
+    assert str(Path("results") / partial.name) in err.strip().splitlines()[-1], err
 
 
 @pytest.mark.soak

@@ -31,18 +31,37 @@ refine = true
 [test.matrix]
 compensation = ["none", "lugre"]
 """
-PLANNED, FOLLOWING = 10, 14
-LINES = PLANNED + FOLLOWING + 3
-"""of the journal after its first: every trial, two stages, the end."""
-STAGES = (6, 19)
+MAP = """\
+[[test]]
+name = "map"
+kind = "velocity_map"
+bench = "simulink"
+seed = 6
+pilot = true
+points = 20
+slowest = "0.2 deg/s"
+fastest = "20 deg/s"
+max_time = "8 s"
+settle_angle = "0.75 deg"
+sample_rate = "100 Hz"
+warm_up_cycles = 0
+"""
+"""A pilot of ten trials and the ten that follow."""
+PILOT, MAP_LINES = 21, 42
+"""Which line of its journal tells of the stage, and which of the end; every trial has two lines."""
+PLANNED, FOLLOWING = 10, 28
+LINES = 2 * (PLANNED + FOLLOWING) + 3
+"""of the journal after its first: every trial as finished and as measured, two stages, the end."""
+STAGES = (11, 50)
 """Which of them tell of the stages: each follows its point's five trials."""
 
 # The program is imported once; each life is a fork of it. In the journal line of the number that it
 # is told, it is killed: before it is written, after half of it, or when it is on the disk.
 NURSERY = """
 import os, signal, sys
-import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file, campaign.archive.sealing
-import campaign.archive.unsealing, campaign.physics.simulate, campaign.backends.sim
+import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file
+import campaign.archive.sealing, campaign.archive.unsealing
+import campaign.physics.simulate, campaign.backends.sim
 from campaign.archive.journal import Journal
 from campaign.cli import main
 
@@ -75,9 +94,9 @@ for line in sys.stdin:
 class Nursery:
     """Lives of the program in one folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, protocol: str = PROTOCOL) -> None:
         self.folder = folder
-        write(folder, PROTOCOL)
+        write(folder, protocol)
         self.process = subprocess.Popen(
             [sys.executable, "-W", "ignore", "-c", NURSERY],
             cwd=folder,
@@ -89,7 +108,9 @@ class Nursery:
         )
         assert self.live("run protocol.toml --results whole") == 0
         self.whole = content(find_run(folder / "whole"))
-        self.fingerprints = [t.fingerprint for t in open_run(find_run(folder / "whole")).plan]
+        whole = open_run(find_run(folder / "whole"))
+        self.fingerprints = [trial.fingerprint for trial in whole.plan]
+        self.points = [stage.point for stage in whole.stages]
 
     def live(self, arguments: str, where: str = "never", number: int = 0) -> int:
         """The exit code of a command, or -9 when it was killed."""
@@ -112,10 +133,10 @@ class Nursery:
             assert self.live(resume) == 0
         path = find_run(self.folder / results)
         run = open_run(path)
-        assert (run.status, len(run.plan)) == (RunStatus.COMPLETE, PLANNED + FOLLOWING)
+        assert (run.status, len(run.plan)) == (RunStatus.COMPLETE, len(self.fingerprints))
         assert [trial.fingerprint for trial in run.plan] == self.fingerprints
         assert verify_run(path).problems == ()
-        assert [stage.point["compensation"] for stage in run.stages] == ["none", "lugre"]
+        assert [stage.point for stage in run.stages] == self.points
         ours, missing = content(path), object()
         differing = {
             name
@@ -129,7 +150,15 @@ class Nursery:
 
 @pytest.fixture(scope="module")
 def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
-    nursery = Nursery(tmp_path_factory.mktemp("kills"))
+    yield from lived(Nursery(tmp_path_factory.mktemp("kills")))
+
+
+@pytest.fixture(scope="module")
+def of_a_map(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
+    yield from lived(Nursery(tmp_path_factory.mktemp("maps"), MAP))
+
+
+def lived(nursery: Nursery) -> Iterator[Nursery]:
     yield nursery
     nursery.process.stdin.close()
     nursery.process.wait(60)
@@ -142,6 +171,7 @@ def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):
     assert len(lines) == LINES
     told = [n for n, line in enumerate(lines, start=1) if "trials followed" in line]
     assert tuple(told) == STAGES
+    assert nursery.points == [{"compensation": "none"}, {"compensation": "lugre"}]
 
 
 @pytest.mark.parametrize(
@@ -149,7 +179,8 @@ def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):
     [
         ("torn", STAGES[0]),  # asked, and not journalled
         ("after", STAGES[0]),  # journalled, and none executed
-        ("after", STAGES[0] + 3),  # between its trials
+        ("after", STAGES[0] + 3),  # between a trial and what was measured of it
+        ("after", STAGES[0] + 4),  # between its trials
     ],
 )
 def test_a_kill_in_a_gap_around_a_stage_changes_nothing(nursery: Nursery, where: str, number: int):
@@ -162,6 +193,24 @@ def test_a_stage_that_is_journalled_is_not_asked_again(nursery: Nursery):
     assert nursery.live(f"resume {run.name} --results once") == 0
     run = open_run(find_run(nursery.folder / "once"))
     assert run.journal.count("trials followed") == 2
+
+
+@pytest.mark.parametrize(
+    ("where", "number"), [("torn", PILOT), ("after", PILOT), ("after", PILOT + 5)]
+)
+def test_a_kill_around_a_pilots_stage_changes_nothing(of_a_map: Nursery, where: str, number: int):
+    run = open_run(find_run(of_a_map.folder / "whole"))
+    lines = run.journal.splitlines()[1:]
+    assert (len(of_a_map.fingerprints), len(lines)) == (20, MAP_LINES)
+    assert "trials followed" in lines[PILOT - 1]
+    of_a_map.goes_on(f"{where}-{number}", where, number)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("where", ["before", "torn", "after"])
+def test_a_kill_in_any_gap_of_a_map_changes_nothing(of_a_map: Nursery, where: str):
+    for number in range(1, MAP_LINES + 1):
+        of_a_map.goes_on(f"all-{where}-{number}", where, number)
 
 
 @pytest.mark.soak

@@ -25,7 +25,7 @@ from campaign.archive.opening import open_run
 from campaign.archive.run_folder import HEADER, PLAN, read_format
 from campaign.archive.run_reader import RunReader
 from campaign.archive.story import Lines, read_lines
-from campaign.archive.verification import (
+from campaign.archive.verification_result import (
     PER_DATASET,
     STRUCTURE,
     UNFINISHED,

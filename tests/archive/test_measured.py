@@ -1,0 +1,201 @@
+"""What a recording says is kept beside it once it is on the disk, and costs it nothing."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import pytest
+
+from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
+from campaign.archive.journal import JOURNAL
+from campaign.archive.measured import Measured
+from campaign.archive.verification import verify_run
+from campaign.estimate import Estimate, Systematic
+from campaign.trial import Ending, Outcome
+from tests.archive import forging
+
+TOP = Estimate("top", 0.25, "rad/s", 0.21, 0.29, 0.95, "the largest sample", freedom=7.0)
+LAST = Estimate.without_interval("last", -1.5, "N m", "one sample")
+FOUND = Measured((TOP, LAST), "campaign 0.1.0")
+
+CRASH = """
+import os, signal, sys
+from pathlib import Path
+import importlib.util
+spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
+kit = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(kit)
+from campaign.archive import RunWriter
+from campaign.trial import Ending, Outcome
+trials = [kit.make_trial(1), kit.make_trial(2)]
+writer = RunWriter.create(Path(sys.argv[2]), kit.make_header(fingerprint="", normalised={}), trials)
+recorder = writer.begin(trials[0])
+recorder.start(kit.CHANNELS)
+recorder.append(*kit.make_samples(500))
+recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+recorder.measure(lambda archived: os.kill(os.getpid(), signal.SIGKILL))
+"""
+
+
+def begun(folder: Path, kit, count: int = 2) -> RunWriter:
+    trials = [kit.trial(number) for number in range(1, count + 1)]
+    return RunWriter.create(folder, kit.header(fingerprint="", normalised={}), trials)
+
+
+def finish(writer: RunWriter, kit, number: int = 1):
+    recorder = writer.begin(kit.trial(number))
+    recorder.start(kit.CHANNELS)
+    recorder.append(*kit.samples(500))
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    return recorder
+
+
+def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None:
+    """The trial, its samples and its place, as anybody has them who opens the run meanwhile."""
+    writer = begun(tmp_path, kit)
+    seen: list[ArchivedTrial] = []
+
+    def measure(archived: ArchivedTrial) -> Measured:
+        (there,) = open_run(writer.folder).trials
+        assert (archived.path, archived.entry) == (there.path, there.entry)
+        assert archived.trial == there.trial == kit.trial(1)
+        rate = archived.recording()["gyro_rate"]
+        assert rate.tobytes() == kit.samples(500)[1][1].tobytes()
+        assert there.recording()["gyro_rate"].tobytes() == rate.tobytes()
+        assert verify_run(writer.folder).sound
+        seen.append(archived)
+        return Measured()
+
+    assert finish(writer, kit).measure(measure) == ""
+    assert seen
+    writer.close()
+
+
+def test_a_program_that_dies_while_it_measures_has_lost_no_recording(tmp_path: Path, kit) -> None:
+    script = str(Path(__file__).with_name("conftest.py"))
+    ended = subprocess.run([sys.executable, "-c", CRASH, script, str(tmp_path)], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    (folder,) = tmp_path.glob("*.partial")
+    assert verify_run(folder).sound
+    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": ()}
+    writer = RunWriter.resume(folder, **told)
+    assert writer.finished == {1: Outcome.COMPLETED}  # so it is not executed again
+    (trial,) = open_run(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)).trials
+    assert trial.recording()["gyro_rate"].tobytes() == kit.samples(500)[1][1].tobytes()
+    assert trial.estimates == ()
+
+
+def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit) -> None:
+    """Every field, and only of the attempt that was measured."""
+    full = Estimate(
+        "full", 1e-300, "s", None, 2.0, 0.9, "m", "r", standard_error=0.5, freedom=3.5,
+        systematic=(Systematic("inertia", 0.1), Systematic("alignment")),
+    )  # fmt: skip
+    found = Measured((full, TOP, LAST), "a laboratory's 2.1")
+    writer = begun(tmp_path, kit)
+    finish(writer, kit, 1).measure(lambda archived: FOUND)
+    finish(writer, kit, 1).measure(lambda archived: found)
+    finish(writer, kit, 2)
+
+    def check(first: ArchivedTrial) -> None:
+        assert first.estimates == found.estimates
+        assert first.measured_by == found.by
+
+    check(writer.archived(1))
+    folder = open_run(writer.folder)
+    check(folder.trials[0])
+    assert folder.earlier_attempts[1][0].estimates == FOUND.estimates
+    assert folder.trials[1].estimates == ()
+    sealed = writer.seal(RunStatus.INTERRUPTED, "a person", ended=kit.ENDED)
+    run = open_run(sealed)
+    check(run.trials[0])
+    assert run.earlier_attempts[1][0].estimates == FOUND.estimates
+    assert verify_run(sealed).sound
+    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": ()}
+    resumed = RunWriter.resume(sealed, **told)
+    check(resumed.archived(1))
+    again = resumed.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    check(open_run(again).trials[0])
+    assert verify_run(again).sound
+
+
+def test_a_damaged_journal_costs_metrics_and_no_trial(tmp_path: Path, kit) -> None:
+    writer = begun(tmp_path, kit)
+    finish(writer, kit).measure(lambda archived: FOUND)
+    sealed = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    with h5py.File(sealed, "r+") as file:
+        text = forging.text_of(file, "run/journal/data")
+        assert '"value":0.25' in text
+        forging.put_text(file, "run/journal/data", text.replace('"value":0.25', '"value":0.26'))
+    forging.rehash(sealed)
+    assert not verify_run(sealed).sound
+    (trial,) = open_run(sealed).trials
+    assert trial.estimates == ()
+    assert len(trial.recording().time) == 500
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ({"record": "ab" * 32}, "has metrics of trial 1, which had not finished"),
+        ({}, "has metrics of trial 1 twice"),
+    ],
+)
+def test_metrics_belong_to_one_finished_trial(tmp_path: Path, kit, line, said: str) -> None:
+    writer = begun(tmp_path, kit)
+    finish(writer, kit).measure(lambda archived: FOUND)
+    writer.close()
+    assert verify_run(writer.folder).sound
+    journal = writer.folder / JOURNAL
+    told = json.loads(journal.read_text().splitlines()[-1])
+    assert told["event"] == "trial measured"
+    with journal.open("a") as file:
+        file.write(forging.canonical(told | line) + "\n")
+    assert said in "\n".join(str(problem) for problem in verify_run(writer.folder).problems)
+
+
+def test_what_cannot_be_kept_costs_the_metrics_only(tmp_path: Path, kit) -> None:
+    strange = Estimate("x", 1.0, "", reason="r", systematic=(Systematic("s", float("inf")),))
+    writer = begun(tmp_path, kit)
+    before = (writer.folder / JOURNAL).read_bytes()
+    recorder = finish(writer, kit)
+    after = (writer.folder / JOURNAL).read_bytes()
+    said = recorder.measure(lambda archived: Measured((strange,), "x"))
+    assert "cannot be kept" in said
+    assert (writer.folder / JOURNAL).read_bytes() == after != before
+    alien = SimpleNamespace(name="top", value=1.0)  # of a plug-in: no estimate at all
+    assert "cannot be kept" in recorder.measure(lambda archived: Measured((alien,), "x"))
+    assert (writer.folder / JOURNAL).read_bytes() == after
+    assert recorder.measure(lambda archived: Measured(problem="no samples")) == "no samples"
+    writer.close()
+
+
+def test_without_samples_nobody_looks(tmp_path: Path, kit) -> None:
+    """Where they were not kept, or the trial failed before there were any."""
+
+    def measure(archived: ArchivedTrial) -> Measured:
+        raise AssertionError
+
+    writer = begun(tmp_path, kit)
+    failed = writer.begin(kit.trial(1))
+    failed.finish(Ending(Outcome.FAULT, "no power"), kit.STARTED, kit.ENDED)
+    assert failed.measure(measure) == ""
+    dropped = writer.begin(kit.trial(2), not_kept="a study of seeds")
+    dropped.start(kit.CHANNELS)
+    dropped.append(*kit.samples(500))
+    dropped.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    assert dropped.measure(measure) == ""
+    writer.close()
+
+
+def test_nothing_is_measured_before_it_is_kept(tmp_path: Path, kit) -> None:
+    writer = begun(tmp_path, kit)
+    with pytest.raises(RuntimeError, match="before it is finished"):
+        writer.begin(kit.trial(1)).measure(lambda archived: FOUND)
+    writer.close()
