@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from functools import lru_cache
+from typing import Any, Protocol, TypeVar, cast
+
+from pydantic_core import to_json
 
 from campaign.channels import missing
+from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
+from campaign.experiments.draws import draws_of, merged
 from campaign.experiments.swept_tables import table_names
+from campaign.experiments.unusable import doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.published.draws import SEED
 from campaign.result import Result
 from campaign.trial import Ending, Most, Recording, Tree, Trial, TrialRequest, canonical_json
+
+_Options = TypeVar("_Options", bound=Options)
 
 
 class TrialData(Protocol):
@@ -115,6 +125,9 @@ class Experiment:
             (`TrialRequest.bench`); what it finds is still said of the test's bench.
         stages: further trials of a point, which follow from those of `trials` and of the stages
             before; nothing else may lead to trials that are not in the plan.
+        warnings: what the plan should warn of, with what to do about it: sentences without a full
+            stop, of the options and the bench of a point whose trials were made. What a test's
+            points say alike is told once.
     """
 
     name: str
@@ -129,17 +142,38 @@ class Experiment:
     seeks_instability: bool = False
     perturbs_bench: bool = False
     stages: tuple[Stage, ...] = ()
+    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
+
+
+EMPTY = Result()
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
-    """What the analysis finds, with a note on every channel that it had to do without."""
-    result = experiment.analyse(with_named_tables(data))
+    """What the analysis finds, with a note on every channel that it had to do without.
+
+    Recordings that cannot hold anything are kept from it, and a note says which and why. Of a test
+    that sweeps the seed of its bench's scatter each draw is analysed by itself.
+    """
+    doubts = [doubt(item) for item in data.trials]
+    kept = zip(data.trials, doubts, strict=True)
+    trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
+    result = EMPTY
+    if trials or not data.trials:
+        usable = with_named_tables(replace(data, trials=trials))
+        draws = draws_of(item.trial for item in data.trials)
+        if len(draws) > 1:
+            parts = {seed: _draw(usable, seed) for seed in draws}
+            result = merged(
+                {seed: _of_draw(experiment, part, seed) for seed, part in parts.items()}
+            )
+        else:
+            result = experiment.analyse(usable)
     lacking: dict[str, None] = {}
     for item in data.trials:
         if item.trial.can_use and item.ending.outcome == "completed":
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
     notes = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
-    return replace(result, notes=(*result.notes, *notes))
+    return replace(result, notes=(*result.notes, *notes_on(filter(None, doubts)), *notes))
 
 
 def metrics(
@@ -147,9 +181,27 @@ def metrics(
 ) -> dict[str, Estimate]:
     """What one recording says, by name: as it was archived when the trial ended, or else by now.
 
-    Raises what `measure` raises.
+    What was not determined is not archived, and comes back as such. Raises what `measure` raises.
     """
-    return {found.name: found for found in data.estimates or measure(data)}
+    return Metrics({found.name: found for found in data.estimates or measure(data)})
+
+
+class Metrics(dict[str, Estimate]):
+    """Metrics by name; those that a recording does not tell are not determined."""
+
+    def __missing__(self, name: str) -> Estimate:
+        return Estimate.without_interval(name, math.nan, "", "the recording does not tell it")
+
+
+def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
+    """What a recording says by itself, of an experiment that measures.
+
+    Raises ValueError with a message for the user where it says nothing, or cannot.
+    """
+    wrong = doubt(data)
+    if wrong and wrong.fatal:
+        raise ValueError(wrong.what)
+    return experiment.measure(data) if experiment.measure else ()
 
 
 def with_named_tables(data: TestData) -> TestData:
@@ -158,18 +210,46 @@ def with_named_tables(data: TestData) -> TestData:
     names = table_names(swept)
     if not names:
         return data
-    return replace(data, trials=tuple(_Named(item, names) for item in data.trials))
 
-
-class _Named:
-    """A trial whose point has names in place of tables; all else is as it was."""
-
-    def __init__(self, data: TrialData, names: Mapping[str, str]) -> None:
-        point = {
+    def named(point: Mapping[str, Any]) -> dict[str, Any]:
+        return {
             path: names[canonical_json(value)] if isinstance(value, dict) else value
-            for path, value in data.trial.point.items()
+            for path, value in point.items()
         }
-        self.trial = data.trial.model_copy(update={"point": point})
+
+    return replace(data, trials=tuple(_At(item, named(item.trial.point)) for item in data.trials))
+
+
+def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
+    """What one draw found; one whose analysis fails costs no more than itself."""
+    if not part.trials:
+        return EMPTY
+    try:
+        return experiment.analyse(part)
+    except (ArchiveError, UsageError):
+        raise
+    except Exception as error:  # noqa: BLE001 - a fit may wander with one draw of many
+        told = f"{type(error).__name__}: {error}"
+        return Result(notes=(f"The draw of seed {seed} could not be analysed: {told}.",))
+
+
+def _draw(data: TestData, seed: Any) -> TestData:
+    """The trials of one draw of a random bench, as if nothing but that draw had been executed."""
+    return replace(
+        data,
+        trials=tuple(
+            _At(item, {path: v for path, v in item.trial.point.items() if path != SEED})
+            for item in data.trials
+            if item.trial.point.get(SEED) == seed
+        ),
+    )
+
+
+class _At:
+    """A trial told to be at another point of the sweep; all else is as it was."""
+
+    def __init__(self, data: TrialData, point: Mapping[str, Any]) -> None:
+        self.trial = data.trial.model_copy(update={"point": dict(point)})
         self.ending = data.ending
         self.recording = data.recording
         self.channel_names = data.channel_names
@@ -182,10 +262,24 @@ def lost_without(experiment: Experiment, name: str) -> str:
 
 
 def bench_of(trial: Trial) -> Bench:
-    """The trial's bench as an object."""
-    return Bench.model_validate(trial.bench, context={"si": True})
+    """The trial's bench as an object; of equal benches one, which nobody may change."""
+    return validated(Bench, trial.bench)
 
 
 def options_of(experiment: Experiment, tree: Mapping[str, Any]) -> Any:
-    """Normalised options as an object of the experiment's own class."""
-    return experiment.options.model_validate(tree, context={"si": True})
+    """Normalised options as an object of the experiment's own class; of equal ones one."""
+    return validated(experiment.options, tree)
+
+
+def validated(kind: type[_Options], tree: Mapping[str, Any]) -> _Options:
+    """A normalised tree (SI) as an object. Raises what validation raises.
+
+    The trials of a test share their bench and nearly all options, so objects are kept: by content,
+    as trees can be changed.
+    """
+    return cast("_Options", _validated(kind, to_json(tree)))
+
+
+@lru_cache(maxsize=256)  # of up to 40 kB each
+def _validated(kind: type[Options], content: bytes) -> Options:
+    return kind.model_validate_json(content, context={"si": True})

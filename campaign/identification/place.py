@@ -1,7 +1,7 @@
-"""Where a single value stands among repetitions: a published one among seeds, say.
+"""Where one more value will lie among repetitions.
 
-The interval of a mean says where the mean is. One value out of a document, from one bench on one
-day, scatters as a single trial does; it is to be held against their distribution.
+The interval of a mean says where the mean is. One further value scatters as a single trial does; it
+is to be held against their distribution. (`published.draws` does that for a published value.)
 """
 
 from __future__ import annotations
@@ -17,29 +17,6 @@ from campaign.identification.intervals import LEVEL, exponential, student
 from campaign.identification.sampled import where_it_scatters
 
 Array = NDArray[np.float64]
-
-
-def place_in(values: Sequence[Estimate | float] | Array, published: float) -> Estimate:
-    """Share of all such values that lie below `published`; ties count half.
-
-    With the exact interval of a share of n draws (Clopper and Pearson 1934): [0, 0.31] for the
-    smallest of ten. A published value is an ordinary one where the share may be anything from
-    0.025 to 0.975. Raises ValueError for no values.
-    """
-    from scipy.special import betaincinv
-
-    bare = (one.value if isinstance(one, Estimate) else float(one) for one in values)
-    found = np.array([value for value in bare if math.isfinite(value)])
-    if not len(found):
-        raise ValueError("a place among no values")
-    count, tail = len(found), 0.5 * (1.0 - LEVEL)
-    below = float(np.sum(found < published) + 0.5 * np.sum(found == published))
-    low = float(betaincinv(below, count - below + 1, tail)) if below > 0 else 0.0
-    high = float(betaincinv(below + 1, count - below, 1 - tail)) if below < count else 1.0
-    method = f"share of {count} values below it, Clopper and Pearson"
-    return Estimate(
-        "place", below / count, "", low, high, LEVEL, method, kind="quantile", freedom=count
-    )
 
 
 def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:

@@ -162,6 +162,9 @@ def _wrong_paths(known: KnownOptions, bench: BaseModel) -> Iterator[tuple[Keys, 
     for index, path in enumerate(known.operating):
         if number_at(bench, path) is None:
             yield ("operating", index), f"the bench has no number at '{path}'"
+        elif path in known.values and known.values[path].origin == "fitted":
+            message = f"'{path}' was fitted; a test that changes it is of another bench"
+            yield ("operating", index), message
     for index, (one, other, share) in enumerate(known.correlations):
         for place, path in enumerate((one, other)):
             if path not in known.values:

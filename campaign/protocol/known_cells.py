@@ -13,9 +13,7 @@ from campaign.protocol.files import Origin, UnreadableError, looked_for, read_te
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import nearest, shown
 from campaign.published.patterns import covers
-from campaign.published.values import Published, read_published, thesis
-
-THESIS = "thesis"
+from campaign.published.values import THESIS, Published, read_published, thesis
 
 
 def cell_problems(

@@ -6,13 +6,15 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from statistics import median
 
-from campaign.published.scoreboard import Line, Scoreboard, Status
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
 from campaign.published.values import Cell
 from campaign.published.verdicts import GOOD, Verdict
 
 MOST_FITTED_FIRST = (
     Status.CALIBRATED,
     Status.ALTERED,  # nobody knows what was done to that bench
+    Status.UNDESCRIBED,  # nor what was done to make that one
     Status.SELECTED,
     Status.RECOVERED,
     Status.RECOMPUTED,

@@ -7,12 +7,13 @@ hand edit, `--set` or a matrix changed on the way there shows, and only there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from campaign.physics.bench import Bench
-from campaign.physics.bench_fingerprint import why_altered
+from campaign.physics.bench_fingerprint import STATED, why_altered
+from campaign.published.draws import SEED
 from campaign.result import Value
 from campaign.trial import Role, Tree, Trial, canonical_json
 
@@ -20,6 +21,8 @@ BENCH = "bench."
 """How a swept path of the bench begins, in the point of a trial."""
 OF_A_TRUTH = "its samples are of another bench, the truth"
 """Why a trial that simulated a truth is of no described bench, whatever its stated bench is."""
+DESCRIBED_TWICE = "its trials state different descriptions of their bench"
+"""Why a test has no one bench, whatever each of them is."""
 TOLERANCE = 1e-9
 """Relative; between a point of the sweep and the same number in a finding's conditions."""
 
@@ -30,11 +33,17 @@ class Place:
 
     Attributes:
         altered: why their bench is not the one described; "" when it is.
+        described: whether their bench says at all what it was made from.
+        numbers: those among their options (SI).
+        failed: whether one of them did not complete.
     """
 
     point: Mapping[str, Any]
     compensation: str
     altered: str
+    described: bool = True
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    failed: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,8 +57,20 @@ class Provenance:
 
         All trials count that the conditions do not exclude.
         """
+        return next((place.altered for place in self._behind(conditions) if place.altered), "")
+
+    def is_described(self, conditions: Mapping[str, Value]) -> bool:
+        """Whether every bench behind such a finding says what it was made from."""
+        return all(place.described for place in self._behind(conditions))
+
+    def _behind(self, conditions: Mapping[str, Value]) -> Sequence[Place]:
         behind = [place for place in self.places if _may_be_behind(place, conditions)]
-        return next((place.altered for place in behind or self.places if place.altered), "")
+        return behind or self.places
+
+    @property
+    def seeds(self) -> frozenset[Value]:
+        """Draws of a random bench that were executed, where the test sweeps them."""
+        return frozenset(place.point[SEED] for place in self.places if SEED in place.point)
 
 
 NOTHING_ALTERED = Provenance()
@@ -61,6 +82,7 @@ def provenance_of(
     perturbs_bench: bool = False,
     described: Tree | None = None,
     changed: str = "",
+    failed: Collection[int] = (),
 ) -> Provenance:
     """Hold the benches of a test's executed trials against the fingerprint that they state.
 
@@ -70,21 +92,34 @@ def provenance_of(
             the bench it began with: `described` with what the matrix put into it.
         described: the test's bench before any sweep (SI); None when nobody kept it.
         changed: why the test had more than one bench, whatever each of them is; "" when it had one.
+        failed: numbers of the trials that did not complete.
+
+    A sweep of the seed of the bench's scatter alters nothing where the bench's own is among the
+    draws: they say how draws lie apart. Any other seed in its place may have been chosen by what
+    it gives.
     """
-    known: dict[str, str] = {}
+    measured = [trial for trial in trials if trial.role is Role.MEASUREMENT]
+    if len({canonical_json(_description(trial.bench)) for trial in measured}) > 1:
+        changed = changed or DESCRIBED_TWICE
+    known: dict[str, tuple[str, bool]] = {}
     places: dict[str, Place] = {}
-    for trial in trials:
-        if trial.role is not Role.MEASUREMENT:
-            continue
+    drawn = {trial.point.get(SEED) for trial in measured}
+    own = _own_seed(described)
+    for trial in measured:
         compensation = trial.task.compensation
         tree: Mapping[str, Any] = trial.bench
-        if perturbs_bench and described is not None:
+        if described is not None and perturbs_bench:
             tree = _at_point(described, trial.point)
+        if described is not None and len(drawn) > 1 and own in drawn:
+            tree = _with_seed(tree, own)  # several draws of its scatter are that bench
         key = canonical_json([tree, compensation, trial.truth])
         if key not in known:
-            known[key] = OF_A_TRUTH if trial.truth else _why(tree, compensation)
-        place = Place(dict(trial.point), compensation, known[key])
-        places.setdefault(canonical_json([place.point, compensation, place.altered]), place)
+            why, described_at_all = _why(tree, compensation)
+            known[key] = OF_A_TRUTH if trial.truth else why, described_at_all
+        numbers = {name: v for name, v in trial.options.items() if isinstance(v, int | float)}
+        lost = trial.number in failed
+        place = Place(dict(trial.point), compensation, *known[key], numbers, lost)
+        places.setdefault(canonical_json([place.point, compensation, *known[key], lost]), place)
     found = tuple(places.values())
     if perturbs_bench and described is None and any(not place.altered for place in found):
         # One of its trials is the unperturbed reference, and that is the bench described.
@@ -96,12 +131,13 @@ def provenance_of(
     return Provenance(found)
 
 
-def _why(tree: Mapping[str, Any], compensation: str) -> str:
+def _why(tree: Mapping[str, Any], compensation: str) -> tuple[str, bool]:
+    """Why a bench is not the one described, and whether it says what it was made from."""
     try:
         bench = Bench.model_validate(tree, context={"si": True})
     except ValueError:
-        return "the bench it ran on cannot be read"
-    return why_altered(bench, compensation)
+        return "the bench it ran on cannot be read", False
+    return why_altered(bench, compensation), bench.known.describes
 
 
 def _at_point(tree: Mapping[str, Any], point: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -110,6 +146,27 @@ def _at_point(tree: Mapping[str, Any], point: Mapping[str, Any]) -> Mapping[str,
         if path.startswith(BENCH):
             tree = _replaced(tree, path.removeprefix(BENCH).split("."), value)
     return tree
+
+
+def _description(bench: Mapping[str, Any]) -> Any:
+    """What a bench says it was made from, and of which bench that is said."""
+    known = bench.get("known")
+    if not isinstance(known, Mapping):
+        return None
+    return [known.get(name) for name in (*STATED, "fingerprint")]
+
+
+def _own_seed(described: Tree | None) -> int:
+    variation = (described or {}).get("variation")
+    seed = variation.get("seed") if isinstance(variation, Mapping) else None
+    return seed if isinstance(seed, int) else 0
+
+
+def _with_seed(tree: Mapping[str, Any], seed: int) -> Mapping[str, Any]:
+    variation = tree.get("variation")
+    if not isinstance(variation, Mapping):
+        return tree
+    return {**tree, "variation": {**variation, "seed": seed}}
 
 
 def _replaced(tree: Mapping[str, Any], keys: list[str], value: Any) -> dict[str, Any]:

@@ -5,16 +5,25 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
-from campaign.physics.bench import Bench
-from campaign.published.patterns import covers, overlap
-from campaign.published.provenance import NOTHING_ALTERED, Provenance
+from campaign.estimate import Estimate, Origin
+from campaign.published.attempts import in_vain
+from campaign.published.draws import SEED, but_for_seed, place_in, together
+from campaign.published.evidence import Evidence, same, speaks_to, with_cells
+from campaign.published.status import Status, status_of
 from campaign.published.values import Cell, Published
-from campaign.published.verdicts import Reproduced, Verdict, deviation, judge, reproduced
-from campaign.result import Finding, Value
+from campaign.published.verdicts import (
+    Reproduced,
+    Verdict,
+    deviation,
+    half_digit,
+    judge,
+    reproduced,
+)
+from campaign.result import Finding
+from campaign.trial import canonical_json
 
 COLUMNS = (
     "table",
@@ -29,82 +38,11 @@ COLUMNS = (
     "high",
     "verdict",
     "source",
+    "place",
+    "place_low",
+    "place_high",
+    "draws",
 )
-TOLERANCE = 1e-3
-"""How far a finding's condition may be from a published one, as a share of it."""
-
-
-class Status(StrEnum):
-    """Where a reproduced number comes from. The first that applies."""
-
-    INCONSISTENT = "inconsistent"  # the document contradicts itself there
-    NOT_REPRODUCIBLE = "not reproducible"  # nobody could reproduce it; the reason is given
-    ALTERED = "altered"  # the bench is not the one that was calibrated or described
-    CALIBRATED = "calibrated"  # the bench was fitted to it
-    RECOVERED = "recovered"  # the bench was given this value and the experiment found it again
-    RECOMPUTED = "recomputed"  # derived from other published cells
-    SELECTED = "selected"  # it was looked at while the bench's structure was chosen
-    PREDICTED = "predicted"  # the bench was fitted, but not to this
-    SIMULATED = "simulated"  # nothing was fitted
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What one test brings to the scoreboard.
-
-    Attributes:
-        reproduces: the published tables the test stands for, by name.
-        given, fitted, seen: of its bench: cells (or rows, or tables) it was given, was fitted to,
-            and that were looked at while it was made.
-        known: conditions that hold for every finding which does not state them itself, such as
-            the `domain`.
-        failed: whether trials of the test failed, or its analysis found no number somewhere.
-        source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
-        provenance: whether its trials ran on the bench that was described.
-    """
-
-    test: str
-    reproduces: Sequence[str]
-    findings: Sequence[Finding]
-    given: Sequence[str] = ()
-    fitted: Sequence[str] = ()
-    seen: Sequence[str] = ()
-    known: Mapping[str, Value] = field(default_factory=dict)
-    failed: bool = False
-    source: str = ""
-    provenance: Provenance = NOTHING_ALTERED
-
-
-def evidence_of(
-    test: str,
-    reproduces: Sequence[str],
-    findings: Sequence[Finding],
-    bench: Bench | None,
-    *,
-    source: str = "",
-    provenance: Provenance = NOTHING_ALTERED,
-) -> Evidence:
-    """What a test on `bench` brings; None when nobody knows the bench.
-
-    A table may ask whether a number is from a simulation or from hardware: here that is whether
-    the bench's controller is continuous, or sampled as a real one is. Where the samples themselves
-    come from is the `source`.
-    """
-    if bench is None:
-        return Evidence(test, reproduces, findings, source=source, provenance=provenance)
-    domain = "simulation" if bench.controller.sample_rate is None else "hardware"
-    known = bench.known
-    return Evidence(
-        test,
-        reproduces,
-        findings,
-        known.given,
-        known.fitted,
-        known.seen,
-        {"domain": domain},
-        source=source,
-        provenance=provenance,
-    )
 
 
 @dataclass(frozen=True)
@@ -117,6 +55,9 @@ class Line:
         test: which test found it; empty when none did.
         source: where that test's samples come from.
         why: a sentence on the status, where there is one to say.
+        draws: what each draw of a random bench found, in the printed unit, where there are
+            several; `found` is then their median, and where one more draw would lie.
+        place: the share of such draws that lie below the published value; None without draws.
     """
 
     cell: Cell
@@ -126,6 +67,8 @@ class Line:
     test: str = ""
     source: str = ""
     why: str = ""
+    draws: tuple[float, ...] = ()
+    place: Estimate | None = None
 
     @property
     def reproduced(self) -> float | None:
@@ -144,7 +87,8 @@ class Scoreboard:
 
     Attributes:
         lines: one per cell, found or not.
-        further: cells that another test found again, which do not count.
+        further: cells that were found again, by another test or elsewhere in a sweep, which do not
+            count.
         problems: sentences on what could not be compared.
     """
 
@@ -170,12 +114,13 @@ def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
     """Compare every published cell of the tables that tests stand for with their findings.
 
     Every cell is a line: a cell that was not run, or that a failed trial should have found, must
-    not leave the board. When several tests found a cell, the first one in the order of the
-    protocol counts; one that found a number goes before one that found a bound.
+    not leave the board. When several tests found a cell, or one test at several places of its
+    sweep, the first in the order of the protocol counts; a number goes before a bound.
     """
     lines: list[Line] = []
     further: list[Line] = []
     problems = list(_unknown_tables(published, evidence))
+    evidence = [with_cells(test, published) for test in evidence]
     for table in published.values():
         tests = [test for test in evidence if table.name in test.reproduces]
         for cell in table.cells if tests else ():
@@ -204,8 +149,20 @@ def _row(line: Line) -> tuple[str, ...]:
         for number in (cell.value, line.reproduced, line.deviation, *ends)
     )
     status = "" if line.status is None else str(line.status)
-    place = (cell.table, cell.row, cell.column, cell.unit)
-    return (*place, value, again, off, status, low, high, str(line.verdict), line.source)
+    where = (cell.table, cell.row, cell.column, cell.unit)
+    verdict = (str(line.verdict), line.source)
+    return (*where, value, again, off, status, low, high, *verdict, *place_columns(line))
+
+
+def place_columns(line: Line) -> tuple[str, str, str, str]:
+    """Share of draws below the published value, its interval, and how many; empty without draws."""
+    if line.place is None:
+        return "", "", "", ""
+    share, low, high = (
+        "" if number is None else repr(number)
+        for number in (line.place.value, line.place.low, line.place.high)
+    )
+    return share, low, high, str(len(line.draws))
 
 
 def _unknown_tables(published: Published, evidence: Sequence[Evidence]) -> Iterator[str]:
@@ -218,78 +175,73 @@ def _unknown_tables(published: Published, evidence: Sequence[Evidence]) -> Itera
 
 def _without(cell: Cell, tests: Sequence[Evidence]) -> Line:
     """The line of a cell for which no test found anything."""
-    tried = any(test.failed for test in tests)
+    why = next(filter(None, (_why_not(cell, test) for test in tests)), "")
     status = None if cell.status is None else Status(cell.status)
-    return Line(cell, Verdict.NOT_FOUND if tried else Verdict.NOT_RUN, status)
+    return Line(cell, Verdict.NOT_FOUND if why else Verdict.NOT_RUN, status, why=why)
+
+
+def _why_not(cell: Cell, test: Evidence) -> str:
+    """Why a test found nothing for a cell that it tried; "" where it did not try."""
+    ours = {name: test.known[name] for name in test.known.keys() & cell.conditions.keys()}
+    if not all(same(value, cell.conditions[name]) for name, value in ours.items()):
+        return ""  # a bench with a sampled controller, and a column of simulations
+    if any(speaks_to(finding, cell, test.known) for finding in test.findings):
+        return f"{test.test}: the analysis found no number"
+    if test.failed:
+        return f"{test.test}: its analysis failed or trials are damaged, and any cell may need them"
+    if in_vain(test.provenance.places, cell.conditions):
+        return f"{test.test}: trials that it may need did not complete"
+    return ""
 
 
 def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterator[Line]:
-    """The first match of each test, and its first bound where nothing else matches."""
+    """What each test found, place by place: the first number, or else the first bound.
+
+    Several draws of a random bench are one place, and all of them together what was found there.
+    """
     for test in tests:
-        found = list(_matches(cell, test, problems))
-        numbers = (line for line in found if not _is_bound(line))
-        first = next(numbers, found[0] if found else None)
-        if first is not None:
-            yield first
+        places: dict[str, list[Finding]] = {}
+        for finding in test.findings:
+            if speaks_to(finding, cell, test.known):
+                place = canonical_json(but_for_seed(finding.conditions))
+                places.setdefault(place, []).append(finding)
+        for findings in places.values():
+            lines = [_line(cell, test, [finding], problems) for finding in findings]
+            told = sorted((line for line in lines if line is not None), key=_is_bound)  # stable
+            if told and len({finding.conditions.get(SEED) for finding in findings}) > 1:
+                yield _line(cell, test, findings, problems) or told[0]
+            elif told:
+                yield told[0]
 
 
 def _is_bound(line: Line) -> bool:
     return line.found is not None and line.found.is_bound
 
 
-def _matches(cell: Cell, test: Evidence, problems: list[str]) -> Iterator[Line]:
-    for finding in test.findings:
-        if not speaks_to(finding, cell, test.known) or not math.isfinite(finding.value):
-            continue
-        try:
-            value = reproduced(finding, cell.unit)
-        except ValueError:  # a plug-in's odd unit
-            problems.append(
-                f"{test.test}: {finding.quantity} in {finding.unit!r} cannot be compared with"
-                f" {cell.path} in {cell.unit!r}"
-            )
-            continue
-        status, why = _status(cell, finding, test)
-        yield Line(cell, judge(cell, value), status, value, test.test, test.source, why)
-
-
-def speaks_to(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
-    """Whether a finding is of the cell's quantity and states each of the cell's conditions."""
-    stated = {**known, **finding.conditions}
-    return finding.quantity == cell.quantity and all(
-        name in stated and _same(stated[name], value) for name, value in cell.conditions.items()
-    )
-
-
-def _same(found: Value, published: Value) -> bool:
-    if isinstance(found, bool) or isinstance(published, bool):
-        return found is published
-    if isinstance(found, int | float) and isinstance(published, int | float):
-        return math.isclose(found, published, rel_tol=TOLERANCE)
-    return str(found) == str(published)
-
-
-def _is_among(cell: Cell, patterns: Sequence[str]) -> bool:
-    """Whether the patterns cover the cell, or anything whose condition it repeats."""
-    return any(
-        covers(pattern, cell.path) or any(overlap(pattern, again) for again in cell.repeats)
-        for pattern in patterns
-    )
-
-
-def _status(cell: Cell, finding: Finding, test: Evidence) -> tuple[Status, str]:
-    """The status of a number that was found, and what there is to say of it."""
-    if cell.status:
-        return Status(cell.status), cell.reason
-    altered = test.provenance.why_altered({**test.known, **finding.conditions})
-    if altered:
-        return Status.ALTERED, altered
-    if _is_among(cell, test.fitted):
-        return Status.CALIBRATED, ""
-    if any(covers(given, cell.path) for given in test.given):
-        return Status.RECOVERED, ""
-    if finding.recomputed:
-        return Status.RECOMPUTED, ""
-    if _is_among(cell, test.seen):
-        return Status.SELECTED, ""
-    return (Status.PREDICTED if test.fitted else Status.SIMULATED), ""
+def _line(
+    cell: Cell, test: Evidence, findings: Sequence[Finding], problems: list[str]
+) -> Line | None:
+    """What one finding, or those of several draws, say of a cell; None for no number."""
+    try:
+        # One draw that is left of several is a selection, too.
+        several = len(findings) > 1 or (
+            len(test.provenance.seeds) > 1 and SEED in findings[0].conditions
+        )
+        finding = together(findings, test.provenance.seeds) if several else findings[0]
+        if not math.isfinite(finding.value):
+            return None
+        value = reproduced(finding, cell.unit)
+        draws = tuple(reproduced(each, cell.unit).value for each in findings) if several else ()
+    except ValueError:  # a plug-in's odd unit
+        finding = findings[0]
+        problems.append(
+            f"{test.test}: {finding.quantity} in {finding.unit!r} cannot be compared with"
+            f" {cell.path} in {cell.unit!r}"
+        )
+        return None
+    draws = tuple(draw for draw in draws if math.isfinite(draw))
+    # A place among those that are left, or among bounds, would be none among all.
+    whole = finding.known.origin is not Origin.NOT_DETERMINED
+    place = place_in(draws, cell.value, half_digit(cell)) if draws and whole else None
+    verdict, (status, why) = judge(cell, value), status_of(cell, finding, test)
+    return Line(cell, verdict, status, value, test.test, test.source, why, draws, place)

@@ -23,6 +23,8 @@ from campaign.result import Value
 from campaign.units import to_si
 
 T = TypeVar("T")
+THESIS = "thesis"
+"""What a protocol or a bench calls the packaged document."""
 Relation = Literal["equal", "near", "at most", "at least", "rank"]
 Mark = Literal["inconsistent", "not reproducible"]
 

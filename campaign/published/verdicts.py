@@ -92,14 +92,16 @@ def judge(cell: Cell, found: Reproduced) -> Verdict:
         return Verdict.UNDECIDED
     if cell.relation in CLAIMS:
         return _claim(cell, found)
+    low, high = found.ends
+    narrow = 0.5 * (high - low) <= NARROW * abs(cell.value)
     if rounds_to_print(cell, found.value):
-        return Verdict.AGREES
+        # The middle of draws that lie far apart may agree by luck, or by whoever chose them.
+        by_luck = found.kind == "quantile" and found.has_interval and not narrow
+        return Verdict.UNDECIDED if by_luck else Verdict.AGREES
     if not found.has_interval or cell.relation == "rank":
         return Verdict.DIFFERS
-    low, high = found.ends
     if not low <= cell.value <= high:
         return Verdict.DIFFERS
-    narrow = 0.5 * (high - low) <= NARROW * abs(cell.value)
     return Verdict.COMPATIBLE if narrow else Verdict.UNDECIDED
 
 
@@ -128,8 +130,12 @@ def rounds_to_print(cell: Cell, value: float) -> bool:
     """Whether a number in the cell's unit is the printed one, as far as that has digits."""
     if cell.decimals is None:
         return math.isclose(value, cell.value, rel_tol=1e-12)
-    half = 0.5 * 10.0**-cell.decimals
-    return abs(value - cell.value) <= half * (1 + 1e-9)
+    return abs(value - cell.value) <= half_digit(cell)
+
+
+def half_digit(cell: Cell) -> float:
+    """Half of the last printed digit, and the bits that are lost on the way to it; 0 unknown."""
+    return 0.0 if cell.decimals is None else 0.5 * 10.0**-cell.decimals * (1 + 1e-9)
 
 
 def deviation(cell: Cell, found: Reproduced, verdict: Verdict) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -17,11 +16,11 @@ from campaign.archive.story import read_lines
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
+from campaign.published.evidence import Evidence, evidence_of
 from campaign.published.provenance import NOTHING_ALTERED, Provenance, provenance_of
-from campaign.published.scoreboard import Evidence, evidence_of
 from campaign.published.values import Published, published_values
 from campaign.result import Result
-from campaign.trial import Outcome, Tree
+from campaign.trial import Outcome, Role, Tree
 
 FORMER_SOURCES = {"sim": "simulation", "serial": "hardware", "replay": "recording"}
 """By backend: where samples came from when archives did not say so themselves."""
@@ -76,8 +75,7 @@ class AnalysedTest:
             source=self.source,
             provenance=self.provenance,
         )
-        lost = any(not math.isfinite(finding.value) for finding in found.findings)
-        return replace(found, failed=lost or bool(self.failed or self.problem or self.damaged))
+        return replace(found, failed=bool(self.problem or self.damaged))
 
 
 def analyse_run(
@@ -149,6 +147,7 @@ def _analyse(
             perturbs_bench=experiment is not None and experiment.perturbs_bench,
             described=_described(run, name),
             changed=_gone_on(run, name),
+            failed={t.trial.number for t in trials if t.ending.outcome is not Outcome.COMPLETED},
         ),
     )
 
@@ -214,7 +213,10 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
 
 
 def _bench(trials: tuple[ArchivedTrial, ...]) -> Bench | None:
+    """Of the first measurement: what a warm-up ran on is behind no finding."""
+    measured = (each for each in trials if each.trial.role is Role.MEASUREMENT)
+    first = next(measured, trials[0] if trials else None)
     try:
-        return bench_of(trials[0].trial) if trials else None
+        return None if first is None else bench_of(first.trial)
     except ValueError:
         return None

@@ -89,6 +89,7 @@ def render(
     folder = page.Folder()
     download = page.scoreboard_download(scoreboard, folder)
     picture = page.overview(scoreboard, folder)
+    strips = page.strips(scoreboard, folder)
     truths = truth_tables(run, tests)
     sections = page.lay_out(tests, scoreboard, published, folder, truths)
     happened = besides(run, folder)
@@ -105,6 +106,7 @@ def render(
         "colours": variables(),
         "agreement": tables.agreement(scoreboard),
         "picture": picture,
+        "strips": strips,
         "scoreboard": [lines.shown_line(line) for line in scoreboard.lines],
         "scoreboard_download": download,
         "statuses": lines.statuses(scoreboard),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from campaign.published.scoreboard import Line, Scoreboard, Status
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
 from campaign.published.verdicts import GOOD
 from campaign.report.overview import cell_name
 from campaign.report.palette import MUTED, STATUS
+from campaign.report.strips import place_words
 from campaign.report.text import interval, minus, number, percent, pretty_unit
 
 SIGNS = {
@@ -18,6 +20,7 @@ SIGNS = {
     "*": "★",
     "v": "▼",
     "^": "▲",
+    "<": "◀",
     "X": "✖",
     "x": "✕",
 }
@@ -40,6 +43,7 @@ class ShownLine:
     good: bool
     notes: tuple[str, ...]
     test: str
+    place: str
 
 
 def shown_line(line: Line) -> ShownLine:
@@ -61,6 +65,7 @@ def shown_line(line: Line) -> ShownLine:
         good=line.verdict in GOOD,
         notes=tuple(note for note in (cell.reason, *cell.notes) if note),
         test=line.test,
+        place=place_words(line),
     )
 
 

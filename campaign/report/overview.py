@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from campaign.published.scoreboard import Line, Scoreboard, Status
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
 from campaign.published.values import Cell
 from campaign.report.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
+from campaign.experiments.interface import options_of
 from campaign.experiments.swept_tables import table_names
 from campaign.options import Options
 from campaign.plain_text import on_a_page
@@ -17,6 +18,7 @@ from campaign.report.figures import draw, inline
 from campaign.report.lines import ShownLine, shown_line
 from campaign.report.names import Names, figure_name, stood_for
 from campaign.report.overview import draw_overview
+from campaign.report.strips import draw_strips
 from campaign.report.text import number, pretty_unit
 from campaign.result import Figure, Table
 from campaign.trial import canonical_json
@@ -170,6 +172,23 @@ def overview(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
     )
 
 
+def strips(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
+    """Where published values stand among the draws of a random bench."""
+    svg = draw_strips(scoreboard)
+    if svg is None:
+        return None
+    return folder.figure(
+        svg,
+        "Published values among the draws of a random bench",
+        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
+        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
+        " published value, one draw itself; the share of draws below it stands on the right.",
+        "One strip of ticks per published number, around a line at the published value.",
+        (),
+        "draws",
+    )
+
+
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
     download = folder.table(to_csv(scoreboard.lines), "scoreboard")
@@ -201,7 +220,7 @@ def _section(
     return Section(
         anchor=f"test-{place}",
         test=test,
-        conditions=tuple(_conditions(test)),
+        conditions=tuple(conditions_of(test)),
         figures=tuple(figures),
         tables=tuple(shown_tables),
         comparisons=tuple(comparisons),
@@ -267,8 +286,8 @@ def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -
     )
 
 
-def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
-    """Kind, bench, options and sweep, in words and display units."""
+def conditions_of(test: AnalysedTest) -> Iterator[tuple[str, str]]:
+    """Kind, bench, options that acted, and sweep, in words and display units."""
     yield "Experiment", test.kind
     if test.bench:
         yield (
@@ -283,13 +302,26 @@ def _conditions(test: AnalysedTest) -> Iterator[tuple[str, str]]:
     for trial in test.trials:
         for path, value in trial.trial.point.items():
             points.setdefault(path, {})[canonical_json(value)] = value
+    idle = _without_effect(test)
     for path, value in test.options.items():
-        if path not in points:
+        if path not in points and path not in idle and value not in (None, []):
             yield _label(path), _with_unit(test, path, [value])
     for path, values in points.items():
         names = table_names(list(values.values()))
         shown = [names.get(key, value) for key, value in values.items()]
         yield f"{_label(path)} (swept)", _with_unit(test, path, shown)
+
+
+def _without_effect(test: AnalysedTest) -> frozenset[str]:
+    """Options that did nothing in any trial; empty where the experiment does not know them."""
+    trees = [trial.trial.options for trial in test.trials] or [test.options]
+    if test.experiment is None:
+        return frozenset()
+    try:
+        found = [options_of(test.experiment, tree).without_effect() for tree in trees]
+    except ValueError:  # of another version of the experiment
+        return frozenset()
+    return frozenset.intersection(*found)
 
 
 def _label(path: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from campaign.published.scoreboard import Status
+from campaign.published.status import Status
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,7 @@ _PURPLE = ("#8a3f9c", "#d69be6")
 _OLIVE = ("#7a6a00", "#d9c84a")
 _CYAN = ("#0b7a8c", "#54cfe0")
 _BROWN = ("#8f4a12", "#e0a878")
+_INDIGO = ("#5a3ea8", "#b9a5f0")
 _PINK = ("#b8347c", "#f58fc4")
 
 SERIES = {
@@ -78,6 +79,7 @@ STATUS = {
     Status.SELECTED: Look("st-selected", *_PINK, (), "*"),
     Status.CALIBRATED: Look("st-calibrated", *_OLIVE, (), "v"),
     Status.ALTERED: Look("st-altered", *_BROWN, (), "^"),
+    Status.UNDESCRIBED: Look("st-undescribed", *_INDIGO, (), "<"),
     Status.INCONSISTENT: Look("st-inconsistent", *_RED, (), "X"),
     Status.NOT_REPRODUCIBLE: Look("st-not-reproducible", *_GREY, (), "x"),
 }

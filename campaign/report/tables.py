@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from campaign.estimate import Estimate, Origin
 from campaign.published.headline import Headline, headline
-from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.scoreboard import Line, Scoreboard, place_columns
 from campaign.report.text import interval, minus, number, pretty_unit
 from campaign.result import Cell, Column, Table, Value, bare
 from campaign.units import convert
@@ -158,6 +158,7 @@ def published_csv(lines: Sequence[Line]) -> str:
     """One published table: every cell with what was reproduced, unrounded, and the reason."""
     headers = ("row", "column", "unit", "published", "reproduced", "deviation_percent", "status")
     more = ("reason", "test", "low", "high", "verdict", "source")
+    draws = ("place", "place_low", "place_high", "draws")
     rows = (
         (
             line.cell.row,
@@ -173,10 +174,11 @@ def published_csv(lines: Sequence[Line]) -> str:
             _exact(None if line.found is None else line.found.high),
             str(line.verdict),
             line.source,
+            *place_columns(line),
         )
         for line in lines
     )
-    return _csv((*headers, *more), rows)
+    return _csv((*headers, *more, *draws), rows)
 
 
 def data_link(text: str) -> str:

@@ -1,30 +1,14 @@
-"""The place of a single value among repetitions, and where the next one will lie."""
+"""Where one more value will lie among repetitions."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from campaign.estimate import Estimate
-from campaign.identification.place import of_next, place_in
+from campaign.identification.place import of_next
 from tests.identification.coverage import rejected
 
 T2 = 4.302653  # Student's t with 2 degrees of freedom, 97.5 %: any table
-
-
-def test_a_place_and_its_exact_interval() -> None:
-    """None of ten: [0, 1 - 0.025^(1/10)]; three of ten: 0.0667 to 0.6525 (Clopper and Pearson)."""
-    values = np.arange(10.0)
-    below = place_in(values, -1.0)
-    assert (below.value, below.low) == (0.0, 0.0)
-    assert below.high == pytest.approx(1 - 0.025 ** (1 / 10))
-    inside = place_in([Estimate("error", value, "rad") for value in values], 2.5)
-    assert inside.value == 0.3
-    assert (inside.low, inside.high) == pytest.approx((0.06674, 0.65245), abs=1e-5)
-    assert place_in(values, 20.0).high == 1.0
-    assert place_in([1.0, 2.0, np.nan], 2.0).value == 0.75  # a tie counts half
-    with pytest.raises(ValueError, match="no values"):
-        place_in([np.nan], 1.0)
 
 
 def test_the_next_value_of_three() -> None:

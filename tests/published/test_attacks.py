@@ -5,16 +5,25 @@ The trials are those that `campaign run` would execute and archive; nothing is e
 
 from __future__ import annotations
 
+import math
+import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from campaign.experiments import experiments
+from campaign.physics.bench import Bench
+from campaign.physics.bench_fingerprint import why_altered
 from campaign.protocol import load_protocol, make_plan
+from campaign.protocol.bench_file import load_bench
+from campaign.published.evidence import Evidence, evidence_of
+from campaign.published.headline import Count, headline
 from campaign.published.provenance import Provenance, provenance_of
-from campaign.published.scoreboard import Evidence, Line, score
-from campaign.published.values import thesis
+from campaign.published.scoreboard import Line, Scoreboard, score
+from campaign.published.status import Status
+from campaign.published.values import read_published, thesis
 from campaign.resources import protocols_folder
 from campaign.result import Finding, Value
 
@@ -34,6 +43,16 @@ def provenance(path: Path, test: str, *overrides: str) -> Provenance:
 
 def shipped(name: str, test: str, *overrides: str) -> Provenance:
     return provenance(SHIPPED / f"{name}.toml", test, *overrides)
+
+
+def copied(folder: Path, bench: str, old: str, new: str) -> Path:
+    """The shipped protocols in a folder, with one text of a bench changed by hand."""
+    copy = Path(shutil.copytree(SHIPPED, folder / "protocols"))
+    file = copy / "benches" / f"{bench}.toml"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return copy
 
 
 def line(path: str, finding: Finding, **more: object) -> Line:
@@ -96,12 +115,134 @@ def test_limits_may_be_set() -> None:
 
 def test_half_the_stiffness_is_not_the_bench_of_the_appendix(tmp_path: Path) -> None:
     """By hand in the file, not by --set."""
-    copy = Path(shutil.copytree(SHIPPED, tmp_path / "protocols"))
-    bench = copy / "benches" / "simulink.toml"
-    text = bench.read_text(encoding="utf-8")
-    bench.write_text(text.replace("18000 N m/rad", "9000 N m/rad", 1), encoding="utf-8")
+    copy = copied(tmp_path, "simulink", "18000 N m/rad", "9000 N m/rad")
     why = provenance(copy / "stabilization.toml", "stabilization").why_altered(ERROR)
     assert "not the 'simulink' that was described" in why
+
+
+NOTHING_KNOWN = re.compile(r"^\[known\]$.*?^\[axis\]$", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("known", ["", "known = {}\n", '[known]\ndocument = "thesis"\n'])
+def test_who_empties_what_is_known_does_not_get_a_better_status(tmp_path: Path, known: str) -> None:
+    """Of a calibrated bench with another gear: nobody can tell that nothing was fitted."""
+    copy = copied(tmp_path, "platform", "ratio = 141.176", "ratio = 100.0")
+    file = copy / "benches" / "platform.toml"
+    emptied = NOTHING_KNOWN.sub("[axis]", file.read_text(encoding="utf-8"))
+    head, rest = emptied.split("[axis]", 1)
+    file.write_text(f"{head}{known}[axis]{rest}", encoding="utf-8")
+    found = provenance(copy / "preload.toml", "preload")
+    finding = finding_of("none", Finding("stabilization_error", 0.59e-3, "rad", ERROR))
+    told = line("5.10/none/stabilization_error", finding, provenance=found)
+    assert (told.status, told.verdict) == ("undescribed", "agrees")
+    assert told.why == "the bench does not say what it was made from"
+    headline_of = headline(Scoreboard((told,)))
+    assert headline_of.deviations == (), "nor does it count as one that nobody fitted"
+    assert headline_of.counts == (Count(Status.UNDESCRIBED, 1, 1),)
+
+
+@pytest.mark.parametrize("seed", ["7", "[7]", "[7, 8]"])
+def test_a_draw_that_was_chosen_is_another_bench(tmp_path: Path, seed: str) -> None:
+    """By hand in the bench, or by a sweep that leaves the bench's own seed out."""
+    file = copied(tmp_path, "platform", "seed = 44", "seed = 44") / "component_friction.toml"
+    text = file.read_text(encoding="utf-8")
+    sweep = re.compile(r"^\[test.matrix\].*", re.MULTILINE | re.DOTALL)
+    if seed == "7":
+        file.write_text(sweep.sub("", text), encoding="utf-8")
+        found = provenance(file, "component-friction", "component-friction.bench.variation.seed=7")
+    else:
+        swept = f'[test.matrix]\n"bench.variation.seed" = {seed}\n'
+        file.write_text(sweep.sub(swept, text), encoding="utf-8")
+        found = provenance(file, "component-friction")
+    assert "not the 'platform' that was described" in found.why_altered({})
+
+
+def test_a_swept_table_of_friction_is_another_bench(tmp_path: Path) -> None:
+    """It goes by a name in the conditions, as of one that was always there."""
+    file = copied(tmp_path, "simulink", "[axis]", "[axis]") / "stabilization.toml"
+    bench = tomllib.loads((SHIPPED / "benches" / "simulink.toml").read_text(encoding="utf-8"))
+    table = {**bench["friction"]["load"], "bristle_stiffness": "9000 N m/rad"}
+    inline = ", ".join(f"{k} = {_toml(v)}" for k, v in table.items())
+    text = file.read_text(encoding="utf-8")
+    assert "[test.matrix]\n" in text
+    sweep = f'[test.matrix]\n"bench.friction.load" = [{{ {inline} }}]\n'
+    file.write_text(text.replace("[test.matrix]\n", sweep, 1), encoding="utf-8")
+    found = provenance(file, "stabilization")
+    assert "not the 'simulink'" in found.why_altered({**ERROR, "bench.friction.load": "lugre"})
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+RENAMED = """
+source = "a copy"
+[[table]]
+name = "A.1"
+title = "What Table 5.11 prints"
+quantity = "stabilization_error"
+unit = "{unit}"
+{decimals}
+conditions = {{ acceleration = "36 deg/s^2", frequency = "0.4 Hz" }}
+columns = {{ condition = "compensation", names = ["none", "static"] }}
+[table.cells]
+all = {cells}
+"""
+
+
+@pytest.mark.parametrize(
+    ("unit", "decimals", "cells"),
+    [
+        ("mrad", "decimals = 2", "[0.70, 0.31]"),
+        ("rad", "decimals = 5", "[0.70e-3, 0.31e-3]"),
+        ("mrad", "", "[0.70, 0.31]"),
+    ],
+)
+@pytest.mark.parametrize("known", ["fitted", "given", "seen"])
+def test_a_fitted_number_is_fitted_under_any_name(
+    unit: str, decimals: str, cells: str, known: str
+) -> None:
+    """A laboratory's own document prints Table 5.11 at 0.4 Hz as its Table A.1.
+
+    0.31 stands for a number that the thesis does not print there: the bench was not fitted to it.
+    """
+    thesis_cell = next(c for c in thesis()["5.11"].cells if c.path == "5.11/0.4/none")
+    cells = cells.replace("0.70", f"{thesis_cell.value}")
+    own = read_published(RENAMED.format(unit=unit, decimals=decimals, cells=cells), "own.toml")
+    bench = load_bench(str(SHIPPED / "benches" / "platform.toml"))
+    patterns = {"fitted": (), "given": (), "seen": (), known: ("5.11/0.4",)}
+    bench = bench.model_copy(update={"known": bench.known.model_copy(update=patterns)})
+    where: dict[str, Value] = {"acceleration": math.radians(36), "frequency": 0.4}
+    findings = [
+        Finding("stabilization_error", 0.7e-3, "rad", {**where, "compensation": name})
+        for name in ("none", "static")
+    ]
+    board = score(own, [evidence_of("t", ("A.1",), findings, bench)])
+    told = {"fitted": "calibrated", "given": "recovered", "seen": "selected"}[known]
+    free = "predicted" if known == "fitted" else "simulated"
+    assert [line.status for line in board.lines] == [told, free]
+
+
+def test_what_was_fitted_is_no_operating_condition() -> None:
+    """Or a sweep could choose, from one run to the next, what the calibration had to find."""
+    tree = tomllib.loads((SHIPPED / "benches" / "platform.toml").read_text(encoding="utf-8"))
+    tree["known"]["operating"] = ["gear.preload.torque", "axis.inertia"]
+    with pytest.raises(ValueError, match="inertia' was fitted"):
+        Bench.model_validate(tree)
+    tree["known"]["operating"] = ["*"]
+    with pytest.raises(ValueError, match="no number at"):
+        Bench.model_validate(tree)
+
+
+@pytest.mark.parametrize("name", ["given", "fitted", "seen"])
+@pytest.mark.parametrize("patterns", [[], ["*"]])
+def test_the_lists_are_part_of_the_description(name: str, patterns: list[str]) -> None:
+    """A pattern that matches everything, or nothing, makes another bench of it."""
+    tree = tomllib.loads((SHIPPED / "benches" / "platform.toml").read_text(encoding="utf-8"))
+    tree["known"][name] = patterns
+    assert "not the 'platform' that was described" in why_altered(Bench.model_validate(tree))
 
 
 def test_a_renamed_and_remarked_bench_is_the_same_bench(tmp_path: Path) -> None:

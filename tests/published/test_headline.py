@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from campaign.published.evidence import Evidence
 from campaign.published.headline import headline, once
-from campaign.published.scoreboard import Evidence, Scoreboard, score
+from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import read_published
 from campaign.report.tables import agreement
 from campaign.result import Finding
@@ -88,9 +89,21 @@ def test_a_number_that_is_printed_twice_counts_once() -> None:
 
 
 def test_the_most_fitted_status_counts() -> None:
-    counted = {line.cell.path: line.status for line in once(board(fitted=("2",)).lines)}
+    """Of two benches: Table 1 is found on one that was fitted to nothing, Table 2 on the other."""
+    finding = Finding("error", 1.1e-3, "rad", {"compensation": "none"})
+    known = {"domain": "hardware"}
+    free = Evidence("free", ("1",), [finding], known=known)
+    fitted = Evidence("fitted", ("2",), [finding], fitted=("2",), known=known)
+    lines = score(PUBLISHED, [free, fitted]).lines
+    counted = {line.cell.path: line.status for line in once(lines)}
     assert counted["2/none/measured"] == "calibrated"
     assert "1/none/error" not in counted
+
+
+def test_a_fitted_number_is_fitted_in_every_table_that_prints_it() -> None:
+    counted = {line.cell.path: line.status for line in board(fitted=("2",)).lines}
+    assert counted["1/none/error"] == "calibrated"
+    assert counted["1/static/error"] == "predicted", "Table 2 prints 0.6, and this is 0.5"
 
 
 def test_counts_speak_by_status() -> None:

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from campaign.physics.bench import Bench
+from campaign.physics.bench_fingerprint import fingerprint
+from campaign.physics.known import KnownOptions
 from campaign.published.provenance import provenance_of
 from campaign.trial import Role, Task, Tree, Trial
 
@@ -66,9 +68,10 @@ def test_a_changed_bench_alters_what_it_found() -> None:
 
 def test_only_the_points_that_the_conditions_name() -> None:
     path = "bench.axis.inertia"
-    trials = [trial(with_value(path, v), **{path: v}) for v in (68.7796, 60.0)]
+    known = described()["axis"]["inertia"]
+    trials = [trial(with_value(path, v), **{path: v}) for v in (known, 60.0)]
     found = provenance_of(trials)
-    assert found.why_altered({path: 68.7796}) == ""
+    assert found.why_altered({path: known}) == ""
     assert found.why_altered({path: 60.0})
     assert found.why_altered({}), "it may be of both"
     assert found.why_altered({path: 5.0}), "where no point fits, all are behind it"
@@ -158,3 +161,82 @@ def test_an_archive_of_an_older_program_has_the_former_places() -> None:
     assert provenance_of([plain]).why_altered({}) == ""
     fitted = trial({**old, "given": ["4.3"], "fitted": ["5.3"]})
     assert "states no fingerprint" in provenance_of([fitted]).why_altered({})
+
+
+SEED = "bench.variation.seed"
+
+
+def draws(*seeds: int, **more: Any) -> list[Trial]:
+    return [trial(with_value(SEED, seed, **more), **{SEED: seed}) for seed in seeds]
+
+
+@pytest.mark.parametrize("perturbs", [False, True])
+def test_several_draws_of_its_scatter_are_the_bench(perturbs: bool) -> None:
+    found = provenance_of(draws(44, 1, 2), perturbs_bench=perturbs, described=described())
+    assert found.why_altered({}) == ""
+    assert found.seeds == {44, 1, 2}
+
+
+@pytest.mark.parametrize(
+    ("seeds", "own"),
+    [
+        ((7,), 44),  # chosen by what it gives
+        ((7, 12), 44),  # two of them, as near to each other as wanted
+        ((44, 7), 7),  # --set says 7, and the sweep says it again
+    ],
+)
+def test_a_chosen_draw_is_another_bench(seeds: tuple[int, ...], own: int) -> None:
+    found = provenance_of(draws(*seeds), described=with_value(SEED, own))
+    assert "not the 'platform' that was described" in found.why_altered({})
+
+
+def test_beneath_the_draws_the_bench_is_looked_at() -> None:
+    wide = with_value("variation.day_to_day.static_torque", 0.2)
+    found = provenance_of(draws(44, 1, bench=wide), described=described())
+    assert found.why_altered({})
+    still = {**described(), "variation": None}
+    scattering = [
+        trial(
+            {**still, "variation": {"seed": s, "day_to_day": {"static_torque": 0.2}}}, **{SEED: s}
+        )
+        for s in (0, 1)
+    ]
+    assert provenance_of(scattering, described=still).why_altered({})
+    assert provenance_of(draws(44, 1)).why_altered({}), "nobody kept which bench it began with"
+
+
+def test_a_bench_that_says_nothing_is_undescribed() -> None:
+    """Whoever empties [known] and changes the bench gains nothing over who only changes it."""
+    bench = with_value("axis.inertia", 60.0, with_value("known", {}))
+    found = provenance_of([trial(bench)])
+    assert (found.why_altered({}), found.is_described({})) == ("", False)
+    assert provenance_of([trial(described())]).is_described({})
+
+
+def test_one_undescribed_trial_is_enough() -> None:
+    """An archive may be written by hand, trial by trial."""
+    trials = [trial(described(), case="a"), trial(with_value("known", {}), case="b")]
+    found = provenance_of(trials)
+    assert not found.is_described({})
+    assert found.is_described({"case": "a"})
+    assert not found.is_described({"case": "b"})
+
+
+def test_which_trials_failed_is_told_by_place() -> None:
+    first = trial(described(), speed=1.0).model_copy(update={"number": 1, "options": {"a": 2.0}})
+    second = trial(described(), speed=2.0).model_copy(update={"number": 2})
+    found = provenance_of([first, second], failed={2})
+    assert [(place.failed, dict(place.numbers)) for place in found.places] == [
+        (False, {"a": 2.0}),
+        (True, {}),
+    ]
+
+
+def test_trials_of_two_descriptions_are_of_no_bench() -> None:
+    """Each is the bench that it states, and of the second nothing is said to be fitted."""
+    other = Bench.model_validate(with_value("known", {}), context={"si": True})
+    other = other.model_copy(update={"known": KnownOptions(fingerprint=fingerprint(other))})
+    second = trial(other.model_dump(mode="json"), case="b")
+    assert provenance_of([second]).why_altered({}) == ""
+    found = provenance_of([trial(described(), case="a"), second])
+    assert "different descriptions" in found.why_altered({"case": "b"})

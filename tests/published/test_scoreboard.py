@@ -9,15 +9,9 @@ import math
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.published.evidence import Evidence
 from campaign.published.provenance import Place, Provenance
-from campaign.published.scoreboard import (
-    COLUMNS,
-    Evidence,
-    Line,
-    Scoreboard,
-    score,
-    to_csv,
-)
+from campaign.published.scoreboard import COLUMNS, Line, Scoreboard, score, to_csv
 from campaign.published.values import read_published
 from campaign.result import Finding
 
@@ -166,8 +160,12 @@ def test_a_published_zero_has_no_deviation_in_percent() -> None:
     assert found.verdict == "agrees"
 
 
-def test_nan_is_no_finding() -> None:
-    assert board(Finding("error", math.nan, "rad", SHAKEN)) == board()
+def test_nan_is_no_finding_and_was_tried() -> None:
+    found = board(Finding("error", math.nan, "rad", SHAKEN))
+    here, *others = found.lines
+    assert (here.verdict, here.reproduced, here.status) == ("not found", None, None)
+    assert here.why == "test: the analysis found no number"
+    assert tuple(others) == board().lines[1:]
 
 
 def test_the_first_test_that_found_a_cell_counts() -> None:
@@ -177,6 +175,17 @@ def test_the_first_test_that_found_a_cell_counts() -> None:
     found = score(PUBLISHED, tests)
     assert line(found, "1.1/0.5/none").test == "b"
     assert [(line.test, line.reproduced) for line in found.further] == [("c", pytest.approx(0.6))]
+
+
+def test_what_a_sweep_finds_again_is_told() -> None:
+    """Of three days the first counts, whichever suits best."""
+    days = [
+        Finding("error", value, "rad", {**SHAKEN, "bench.variation.day": day})
+        for day, value in ((1, 0.6e-3), (2, 0.5e-3), (3, 0.7e-3))
+    ]
+    found = board(*days)
+    assert line(found, "1.1/0.5/none").reproduced == pytest.approx(0.6)
+    assert [line.reproduced for line in found.further] == pytest.approx([0.5, 0.7])
 
 
 def test_a_number_counts_before_a_bound_that_an_earlier_test_found() -> None:
@@ -224,7 +233,7 @@ def test_the_file_has_exactly_these_columns_and_unrounded_values() -> None:
     rows = list(csv.DictReader(io.StringIO(to_csv(board(ERROR).lines))))
     assert tuple(rows[0]) == COLUMNS == (
         "table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status",
-        "low", "high", "verdict", "source"
+        "low", "high", "verdict", "source", "place", "place_low", "place_high", "draws"
     )  # fmt: skip
     by_cell = {(r["row"], r["column"]): r for r in rows}
     found = by_cell["0.5", "none"]
