@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal, Self
 
+ROUNDING = 1e-9
+"""Share of a number by which it may lie outside of its interval: unit conversions round."""
+
 Kind = Literal["number", "count", "quantile", "at least", "at most"]
 
 
@@ -41,8 +44,9 @@ class Estimate:
     Attributes:
         name: of the quantity, e.g. `coulomb_torque`.
         value: SI, in `unit`; NaN only when `origin` says that it is not determined.
-        low, high: bounds of the interval that scatter leaves (SI); both None when it has none, and
-            `reason` says why. One of them None: the interval is open on that side.
+        low, high: bounds of the interval that scatter leaves (SI), of whatever kind the number is:
+            they hold the value. Both None when it has none, and `reason` says why. One of them
+            None: the interval is open on that side.
         level: the share of repetitions in which such an interval holds the truth, e.g. 0.95.
         method: how value and interval were found, in words.
         reason: why there is no interval, or why the value is not determined.
@@ -74,6 +78,12 @@ class Estimate:
         finite = all(number is None or math.isfinite(number) for number in numbers)
         if not finite or not (open_value or math.isfinite(self.value)):
             raise ValueError(f"{self.name}: an estimate is finite, or it is not given")
+        slack = ROUNDING * max(abs(end) for end in (self.value, self.low or 0.0, self.high or 0.0))
+        below = self.low is not None and self.value < self.low - slack
+        above = self.high is not None and self.value > self.high + slack
+        if below or above:  # never true of NaN
+            ends = f"{self.low} to {self.high}"
+            raise ValueError(f"{self.name}: {self.value} lies outside of its interval, {ends}")
 
     @classmethod
     def without_interval(cls, name: str, value: float, unit: str, reason: str, **more: Any) -> Self:

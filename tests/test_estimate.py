@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimate import Estimate, Kind, Origin, Systematic
 
 KT = Systematic("torque constant", 0.3)
 J = Systematic("inertia", 0.4)
@@ -49,6 +50,20 @@ def test_a_value_is_finite_or_not_determined(value: float) -> None:
         Estimate("torque", value, "N m")
     with pytest.raises(ValueError, match="finite"):
         Estimate("torque", math.inf, "N m", origin=Origin.NOT_DETERMINED)
+
+
+@pytest.mark.parametrize("kind", ["number", "count", "quantile"])
+@pytest.mark.parametrize(("low", "high"), [(10.1, 11.0), (9.0, 9.9), (10.1, None), (None, 9.9)])
+def test_an_interval_holds_its_own_value(kind: Kind, low: float | None, high: float | None) -> None:
+    with pytest.raises(ValueError, match=r"torque: 10.0 lies outside of its interval"):
+        Estimate("torque", 10.0, "N m", low, high, kind=kind)
+    with pytest.raises(ValueError, match="outside"):
+        replace(Estimate("torque", 10.0, "N m", 9.0, 11.0), value=12.0)
+
+
+def test_a_value_may_lie_at_an_end_or_off_it_by_rounding() -> None:
+    assert Estimate("torque", 0.3, "N m", 0.1 + 0.2, 0.4).value == 0.3
+    assert Estimate("torque", -10.0, "N m", -10.0, -10.0).half_width == 0.0
 
 
 def test_nothing_known_is_not_determined() -> None:

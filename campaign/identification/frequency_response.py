@@ -21,8 +21,7 @@ ComplexArray = NDArray[np.complex128]
 MOST_ERROR = 0.2
 """of a point's own size: with more its phase is hardly known, nor its level."""
 NEIGHBOURS = 2
-"""Points on each side with which a point's size is smoothed before its error is judged: noise that
-makes it larger would else let it pass."""
+"""Points on each side whose median size with it stands for its own."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +49,22 @@ class Response:
         return np.asarray(self.error / np.maximum(np.abs(self.values), 1e-300))
 
     @property
+    def size(self) -> Array:
+        """Magnitude, the median of a point's and its neighbours', shape (n,).
+
+        What weights and thresholds go by: a point that noise makes large would else seem surer than
+        one that noise makes small.
+        """
+        padded = np.pad(np.abs(self.values), NEIGHBOURS, constant_values=np.nan)
+        near = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
+        return np.asarray(np.nanmedian(near, axis=1))
+
+    @property
     def told(self) -> Response:
         """The points whose error is below `MOST_ERROR` of their size."""
         if not len(self.frequency):
             return self
-        padded = np.pad(np.abs(self.values), NEIGHBOURS, constant_values=np.nan)
-        near = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
-        kept = self.error < MOST_ERROR * np.nanmedian(near, axis=1)
+        kept = self.error < MOST_ERROR * self.size
         return Response(
             self.frequency[kept], self.values[kept], self.error[kept], self.coherence[kept]
         )

@@ -17,7 +17,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.continuation import DECIBEL, gain_margin_beyond
 from campaign.identification.crossings import Passing, passings, sides
 from campaign.identification.frequency_response import Array, ComplexArray, Response, open_loop
-from campaign.identification.intervals import LEVEL, shifted_by, student, with_error
+from campaign.identification.intervals import LEVEL, judged, shifted_by, with_error
 from campaign.identification.local_fit import Quantity, Reading, read
 
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
@@ -25,12 +25,6 @@ LARGEST = 600.0
 """Logarithm that can still be undone; a polynomial far from its points may pass it."""
 ONE_SIDED = 1.645
 """Normal quantile of a bound that holds in 95 of 100 repetitions."""
-LEAST_GAP = 0.001
-"""of a frequency: half of the narrowest interval that interpolation leaves. Friction bends a real
-response between points more than polynomials of it show (0.08 % on the bench `platform`)."""
-GAP = 2.0
-"""Standard uncertainties of interpolation per difference of two fits. With 1 the intervals of 250
-random loops on four grids held the truth in 90 to 96 %, with 2 in 93 to 98 %."""
 INTERPOLATION = "interpolation between the frequencies"
 
 
@@ -234,22 +228,19 @@ def _read(
         return None
 
 
-METHOD = "local polynomial of log L over log frequency"
+METHOD = "Gaussian process through log L over log frequency"
 
 
 def _frequency(name: str, reading: Reading) -> Estimate:
     value = math.exp(reading.log_frequency)
     found = with_error(name, value, "Hz", value * reading.frequency_error, math.inf, METHOD)
-    least = max(LEAST_GAP, reading.frequency_bend)
-    off = math.hypot(GAP * reading.frequency_gap, least / student(math.inf))
-    return shifted_by(found, INTERPOLATION, value * off)
+    return judged(shifted_by(found, INTERPOLATION, value * reading.frequency_gap))
 
 
 def _value(name: str, unit: str, reading: Reading, more: float = 0.0) -> Estimate:
     value = reading.value + more
     found = with_error(name, value, unit, reading.value_error, math.inf, METHOD)
-    off = math.hypot(GAP * reading.value_gap, reading.value_bend / student(math.inf))
-    return shifted_by(found, INTERPOLATION, off)
+    return judged(shifted_by(found, INTERPOLATION, reading.value_gap))
 
 
 def change(name: str, unit: str, bare: Estimate, other: Estimate) -> Estimate | None:

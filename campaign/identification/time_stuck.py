@@ -77,7 +77,11 @@ def time_stuck(
 
 
 def over_recordings(found: Sequence[Estimate]) -> Estimate | None:
-    """What several trials say together, t over them; None for none."""
+    """What several trials say together, t over them; None for none.
+
+    A share is told by its distance from 0 and 1, not by its size: 1 % ± 1 % is well determined, so
+    that `judged` has no place here.
+    """
     if len(found) < 2:
         return found[0] if found else None
     shares = [one.value for one in found]

@@ -17,7 +17,7 @@ closest to the truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import judged, student, with_error
+from campaign.identification.intervals import USELESS, judged, student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
     LEAST,
@@ -52,6 +52,8 @@ ROUNDS = 20
 """of fit and deviation in turn, at most; usually five."""
 SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
+FEWEST_BELOW = 3
+"""speeds below vs, for Ts not to be extrapolated."""
 LACKING = 0.05
 """p-value of the lack of fit below which the model does not describe the repeated points."""
 
@@ -227,8 +229,9 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
     def cost(tried: float) -> float:
         return held_at(found, fit.speed, fit.torque, name, tried, exponent)
 
-    # Profile likelihood on one side: the rise of chi-square is the square of Student's t there.
-    rise = student(fit.freedom, 0.90) ** 2
+    # Profile likelihood on one side: the rise of chi-square is the square of Student's t there; of
+    # the two-sided one, because the data choose whether there are one side or two.
+    rise = student(fit.freedom) ** 2
     step = float(np.median(fit.deviation)) / (
         float(fit.speed.max()) if name == "viscous_friction" else 1.0
     )
@@ -237,6 +240,12 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
     except ValueError:
         told = Estimate(name, value, unit, method=method)
         return _not_determined(told, "these points leave it open")
+    if name != "viscous_friction" and high > USELESS * float(fit.torque.max()):
+        # A map that ends below vs is as well described by Tc = 0 and a huge viscous friction as by
+        # the truth. Where noise prefers that, a limit would be of the wrong one of two minima: it
+        # held Tc in 22 % of such maps.
+        told = Estimate(name, value, unit, method=method)
+        return _not_determined(told, "these points do not tell it from viscous friction")
     return Estimate(
         name,
         value,
@@ -249,14 +258,19 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
 
 
 def nominal_estimates(
-    positive: DirectionFit, negative: DirectionFit, model: Model
+    positive: DirectionFit,
+    negative: DirectionFit,
+    model: Model,
+    told: Sequence[Mapping[str, Estimate]] | None = None,
 ) -> dict[str, Estimate]:
     """Mean of both directions, by name; their errors are those of the same trials.
+
+    `told` are the estimates of both directions, where they are at hand.
 
     Points of one speed are of one trial, out and back. How far their errors go together is told by
     the residuals; it was 0.73 to 0.99 where friction scatters from trial to trial.
     """
-    one, other = (direction_estimates(fit, model) for fit in (positive, negative))
+    one, other = told or [direction_estimates(fit, model) for fit in (positive, negative)]
     return {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
 
 
@@ -359,7 +373,7 @@ def doubts(fit: DirectionFit) -> Iterator[str]:
             "effect shows, and stribeck_velocity is not determined"
         )
     below = int(np.sum(fit.speed < found.values["stribeck_velocity"]))
-    if fit.shows_stribeck_effect and below < 3:
+    if fit.shows_stribeck_effect and below < FEWEST_BELOW:
         yield (
             f"{below} speeds are below stribeck_velocity: add slower ones, static_torque is"
             " extrapolated"

@@ -75,10 +75,8 @@ def parameter_of(finding: Finding) -> str:
     single ones that it is made of.
     """
     told = finding.conditions
-    if (
-        told.get("exponent", "free") != "free"
-    ):  # which wrong curve is closest, the weights of its fit decide
-        return ""
+    if told.get("exponent", "free") != "free":
+        return f"{finding.quantity} with delta = {told['exponent']}, {told['direction']}"
     if told.get("measurement") is not None:
         return f"{finding.quantity}, one ramp" if told["measurement"] == 1 else ""
     direction = told.get("direction")

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.experiments import experiments
+from campaign.experiments.velocity_map_fits import MapFits, fit_map
+from campaign.experiments.velocity_map_points import points_of, steady
+from campaign.identification.stribeck import fit_stribeck, stribeck
 from campaign.physics.bench import Bench
 from campaign.physics.lanes import Lane
 from campaign.physics.rows import OUTPUTS
 from campaign.physics.simulate import simulate_together
-from campaign.physics.true_values import true_value
+from campaign.physics.true_values import DIRECTIONS, stribeck_parameters, true_value
 from campaign.physics.truth import plant_of, simulated
 from campaign.physics.variation import as_it_is, of_its_day
 from campaign.result import Finding
@@ -46,11 +49,14 @@ class Truths:
     def __init__(self, run: Run) -> None:
         self._run, self._case = run, run.case
         self._ramps: dict[int, tuple[float, float]] = {}
+        self._closest: dict[tuple[float, str], Mapping[str, float]] = {}
 
     def of(self, finding: Finding) -> float | None:
-        """None where nothing is true: a fit with a wrong exponent, a rule, a change of a number."""
+        """None where nothing is true: a rule, a change of a number."""
         if finding.recomputed:
             return None
+        if finding.conditions.get("exponent", "free") != "free":
+            return self._of_wrong_curve(finding)
         match finding.quantity:
             case "breakaway_torque":
                 return self._ramp_mean(finding, 0)
@@ -62,6 +68,32 @@ class Truths:
         bench = self._case.truth
         there = as_it_is(bench, own[0].seed) if len(own) == 1 else of_its_day(bench)
         return true_value(there, finding.quantity, finding.conditions)
+
+    def _of_wrong_curve(self, finding: Finding) -> float | None:
+        """With an exponent that is not the bench's: of the curve of that kind closest to the truth.
+
+        Closest as the fit has it, at its speeds and with its weights.
+        """
+        exponent = float(str(finding.conditions["exponent"]))
+        direction = str(finding.conditions["direction"])
+        ways = list(DIRECTIONS) if direction == "nominal" else [direction]
+        found = [self._closest_curve(exponent, way).get(finding.quantity) for way in ways]
+        told = [value for value in found if value is not None]
+        return math.fsum(told) / len(ways) if len(told) == len(ways) else None
+
+    def _closest_curve(self, exponent: float, direction: str) -> Mapping[str, float]:
+        if (exponent, direction) not in self._closest:
+            true = stribeck_parameters(of_its_day(self._case.truth), DIRECTIONS[direction])
+            fit = self._map().fits[direction]
+            curve = stribeck(fit.speed, true)
+            closest = fit_stribeck(fit.speed, curve, fit.deviation, exponent)
+            self._closest[exponent, direction] = {n: closest.values[n] for n in closest.free}
+        return self._closest[exponent, direction]
+
+    def _map(self) -> MapFits:
+        notes: list[str] = []
+        kept, _ = steady(points_of(self._run.done, self._case.stated, notes), notes)
+        return fit_map(kept, self._case.stated)
 
     def by_stated(self, finding: Finding) -> float | None:
         """What would be found without scatter of what depends on the stated inertia; else None."""
@@ -141,7 +173,7 @@ def loop_numbers(case: Case) -> dict[str, float]:
     response = _response(case, grid)
     found: dict[str, float] = {}
     for name, level in {
-        "bandwidth": lambda t: np.abs(t) - math.sqrt(0.5),
+        "bandwidth": lambda t: np.abs(t) - 10.0 ** (-3.0 / 20.0),
         "phase_margin": lambda t: np.abs(t / (1.0 - t)) - 1.0,
         "gain_margin": lambda t: _lead_over_half_turn(t),
     }.items():

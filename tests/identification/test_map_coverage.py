@@ -298,6 +298,28 @@ def test_intervals_hold_beside_a_parameter_at_its_bound() -> None:
     assert rejected(held_at_a_bound(4000, 42), "less") == {}
 
 
+def coulomb_at_zero(coulomb: float, count: int, seed: int) -> dict[str, list[bool]]:
+    """By origin, whether Tc's interval holds it, in maps that end at 1.5 vs and prefer Tc = 0."""
+    random = np.random.default_rng(seed)
+    speed = np.deg2rad(np.geomspace(0.05, 2.3, 16))
+    true = TRUE | {"coulomb_torque": coulomb}
+    held: dict[str, list[bool]] = {}
+    for _ in range(count):
+        torque = stribeck(speed, true) * (1.0 + BETWEEN * random.normal(size=len(speed)))
+        found = fit_direction(speed, torque, np.zeros(len(speed)))
+        if "coulomb_torque" in found.fits["free"].bounds:
+            told = direction_estimates(found, "free")["coulomb_torque"]
+            held.setdefault(told.origin, []).append(not told.has_interval or holds(told, coulomb))
+    return held
+
+
+def test_a_coulomb_torque_that_the_map_does_not_tell_has_no_limit() -> None:
+    """25.3 N m or 0 with forty times the viscous friction: the curves are the same there."""
+    held = coulomb_at_zero(25.3, 100, 43)
+    assert set(held) == {"not determined"}
+    assert len(held["not determined"]) > 10
+
+
 # Maps unlike one another: nothing is hidden behind "not determined"
 
 

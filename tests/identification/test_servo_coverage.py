@@ -1,18 +1,21 @@
 """Bandwidth and margins hold the truth as often as they say, over random loops of any speed.
 
 The estimators alone: exact responses of PI-controlled axes with lags and a delay, 0.5 to 50 Hz,
-with noise on T. Seeds were chosen before looking. Where points are close, bandwidth and phase
-margin must be held in 95 % or more, and not in more than 98 %: a share of what interpolation may do
-is part of each interval, also where it does nothing. Gain margins are told only where noise lets
-the crossing be seen, and where points are far apart, or the sweep ends below the crossing, an
-interval is wide on purpose: of these only what holds too seldom is rejected.
+with noise on T. Seeds were chosen before looking. Bandwidth and phase margin must be held in 95 %
+or more (one-sided), and where points are close and noisy, not in more than 98 %. Two-sided cannot
+be asked: these loops are smoother than the curves that the interval provides for, and without the
+friction that is part of it, and the interval of a Gaussian process holds 95 % on average over its
+own curves, not of each one (Cox, "An analysis of Bayesian inference for nonparametric regression",
+Annals of Statistics 21 (1993) 903). How wide they are beside what the points leave is bounded
+instead. Gain margins are told only where noise lets the crossing be seen, which depends on that
+noise, and hulls of a sweep that ends below the crossing are a rule: of these 90 % are asked.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -26,6 +29,7 @@ from tests.identification.coverage import holds, rejected
 from tests.identification.loops import Array, Truth, closed, noisy, random_loop
 
 Held = dict[str, list[bool]]
+WELL = ("bandwidth", "phase_margin")
 TOO_WIDE = 0.98
 """Coverage above which an interval of close points claims too little."""
 
@@ -37,14 +41,24 @@ class Case:
     Attributes:
         noise: standard deviation of each part of T, over the gain crossover; above a third of it
             proportional to frequency, as it is for a command whose amplitude falls as 1/f.
+        scatter: standard deviation of each part of log L from trial to trial, as friction has it,
+            of which no trial by itself tells.
     """
 
     grid: Array
     noise: float
+    scatter: float = 0.0
 
     def measured(self, truth: Truth, random: np.random.Generator, at: Array) -> Response:
         error = self.noise * np.maximum(at / truth.scale, 0.3)
-        return noisy(closed(truth.loop), at, error, random)
+        found = noisy(closed(truth.loop), at, error, random)
+        if not self.scatter:
+            return found
+        parts = random.standard_normal((2, len(at)))
+        loop = truth.loop(2j * np.pi * at)
+        moved = loop * np.exp(self.scatter * (parts[0] + 1j * parts[1]))
+        shift = moved / (1.0 + moved) - loop / (1.0 + loop)
+        return replace(found, values=found.values + shift)
 
 
 CLOSE = {
@@ -54,6 +68,7 @@ CLOSE = {
 FAR = {
     "log 22": Case(np.geomspace(0.15, 45, 22), 1e-3),
     "log 40": Case(np.geomspace(0.15, 45, 40), 1e-4),
+    "log 40, scattered": Case(np.geomspace(0.15, 45, 40), 1e-4, 2e-2),
     "log 40, noisy": Case(np.geomspace(0.15, 45, 40), 3e-3),
     "linear 50": Case(0.35 * np.arange(1, 51), 1e-3),
     "linear 200": Case(0.09 * np.arange(1, 201), 1e-3),
@@ -113,6 +128,13 @@ def refined(case: Case, truth: Truth, sweep: Response, random: np.random.Generat
     )
 
 
+def too_seldom(held: Held) -> dict[str, float]:
+    """What holds in less than 95 %, or 90 % where no more is asked."""
+    well = {name: inside for name, inside in held.items() if name.endswith(WELL)}
+    rest = {name: inside for name, inside in held.items() if name not in well}
+    return rejected(well, "less") | rejected(rest, "less", 0.9)
+
+
 quick = pytest.mark.parametrize(
     ("draws", "seed"), [(25, 31_000), pytest.param(4000, 32_000, marks=pytest.mark.soak)]
 )
@@ -121,22 +143,22 @@ quick = pytest.mark.parametrize(
 @quick
 def test_close_points(draws: int, seed: int) -> None:
     held = pooled(CLOSE, draws, seed)
-    assert rejected(held, "less") == {}
-    narrow = ("bandwidth", "phase_margin")
-    alike = {name: inside for name, inside in held.items() if name.endswith(narrow)}
-    assert rejected(alike, "greater", TOO_WIDE) == {}
+    assert too_seldom(held) == {}
+    noisy = {name: inside for name, inside in held.items() if name.startswith("much noise")}
+    narrow = {name: inside for name, inside in noisy.items() if name.endswith(WELL)}
+    assert rejected(narrow, "greater", TOO_WIDE) == {}
 
 
 @quick
 def test_far_points(draws: int, seed: int) -> None:
-    assert rejected(pooled(FAR, draws, seed + 100), "less", 0.9) == {}
+    assert too_seldom(pooled(FAR, draws, seed + 100)) == {}
 
 
 @quick
 def test_sweeps_that_end_below_the_crossing(draws: int, seed: int) -> None:
     held = pooled(SHORT, draws, seed + 200)
     assert sum(len(inside) for name, inside in held.items() if name.endswith("hull")) > draws / 10
-    assert rejected(held, "less", 0.9) == {}
+    assert too_seldom(held) == {}
 
 
 @quick
@@ -145,7 +167,7 @@ def test_a_second_stage_makes_the_interval_narrow_and_keeps_it_honest(
 ) -> None:
     case = Case(np.geomspace(0.2, 30, 20), 1e-3)
     held = collected(case, draws, seed + 300, refined)
-    assert rejected(held, "less") == {}
+    assert too_seldom(held) == {}
     random = np.random.default_rng(seed + 301)
     widths = np.array([_widths(case, random_loop(random), random) for _ in range(30)])
     assert np.median(widths[:, 1] / widths[:, 0]) < 0.6
@@ -157,3 +179,19 @@ def _widths(case: Case, truth: Truth, random: np.random.Generator) -> tuple[floa
     first = characteristics(sweep).bandwidth
     second = characteristics(refined(case, truth, sweep, random)).bandwidth
     return first.half_width / truth.bandwidth, second.half_width / truth.bandwidth
+
+
+def test_far_points_leave_a_narrow_interval_where_the_loop_is_smooth() -> None:
+    """40 points over two decades with 0.01 % of noise: their own spread is 0.05 % of the bandwidth.
+
+    A fixed bend between points made it 0.6 %, and 4 mrad.
+    """
+    case, random = FAR["log 40"], np.random.default_rng(33_000)
+    found = []
+    for _ in range(20):
+        truth = random_loop(random)
+        told = characteristics(case.measured(truth, random, truth.scale * case.grid))
+        found.append((told.bandwidth.half_width / truth.bandwidth, told.phase_margin.half_width))
+    width, margin = np.median(found, axis=0)
+    assert width < 0.003
+    assert margin < 0.0015

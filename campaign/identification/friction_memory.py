@@ -1,0 +1,51 @@
+"""The angle in which friction forgets a reversal, from the recording of one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEVELS = (0.5, 0.9)
+"""of the settled torque, between which the load's displacement is taken."""
+BINS = 500
+"""into which a reversal is averaged, so that noise passes no level for friction."""
+
+
+def memory_angle(time: Array, rate: Array, torque: Array, settled: float) -> float:
+    """Ts / sigma0 (rad): the length over which friction approaches its settled value.
+
+    A load that is moved slowly out of rest displaces bristles before it slides, and friction is
+    F = Fs (1 - c exp(-x / m)) with the load's displacement x (Dahl's model; LuGre's and others' at
+    low rates), wherever it began. So m is the displacement between two levels of F / Fs, over
+    ln((1 - 0.5) / (1 - 0.9)). How soon the drive's torque rises, with which gains, does not matter.
+
+    Args:
+        time, rate, torque: of the reversal, from before the load begins to move (s, rad/s, N m), at
+            even intervals, shape (n,).
+        settled: friction torque (N m) of steady sliding behind it, with its sign.
+
+    NaN where the torque begins above the lower level, or does not pass both.
+    """
+    used = len(time) // BINS * BINS if len(time) > BINS else len(time)
+    step = float(np.mean(np.diff(time)))
+    moved = np.abs(np.cumsum(rate[:used]) * step)
+    share = torque[:used] / settled
+    moved, share = (values.reshape(min(BINS, used), -1).mean(axis=1) for values in (moved, share))
+    places = [_first_above(share, level) for level in LEVELS]
+    if None in places or places[0] == 0:
+        return math.nan
+    low, high = (
+        float(np.interp(level, share[k - 1 : k + 1], moved[k - 1 : k + 1]))
+        for level, k in zip(LEVELS, places, strict=True)
+        if k is not None
+    )
+    return max(high - low, 0.0) / math.log((1.0 - LEVELS[0]) / (1.0 - LEVELS[1]))
+
+
+def _first_above(values: Array, level: float) -> int | None:
+    found = np.flatnonzero(values >= level)
+    return int(found[0]) if len(found) else None
