@@ -27,6 +27,10 @@ class Options(BaseModel):
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
+    def without_effect(self) -> frozenset[str]:
+        """Names of options that do nothing as the others are; a report does not list them."""
+        return frozenset()
+
 
 @dataclass(frozen=True)
 class TextFile:

@@ -90,12 +90,15 @@ class Quantity:
         return core_schema.with_info_before_validator_function(self._validate, handler(source))
 
     def _validate(self, value: Any, info: ValidationInfo) -> Any:
+        context = info.context
+        if type(value) is float and type(context) is dict and context.get("si"):
+            return value  # most of an archive
         if isinstance(value, str):
             try:
                 return self.parse(value)
             except ValueError as error:
                 raise PydanticCustomError("quantity", "{why}", {"why": str(error)}) from None
-        already_si = isinstance(info.context, Mapping) and info.context.get("si")
+        already_si = isinstance(context, Mapping) and context.get("si")
         if isinstance(value, int | float) and not isinstance(value, bool) and not already_si:
             raise PydanticCustomError(
                 "quantity",

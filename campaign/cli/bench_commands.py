@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from campaign.cli.app import app
+from campaign.cli.setup_commands import app
 
 __all__ = ["app"]
 

@@ -55,7 +55,7 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
     code = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     check_limits(prepared.plan)
     check_loops(prepared.plan)
-    print_low_margins(prepared.plan)
+    print_warnings(prepared.plan)
     return code
 
 
@@ -112,8 +112,11 @@ def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
         yield f"stage {number}, {own[0].name}: {in_short(most_of(own))}{points}: {own[0].why}"
 
 
-def print_low_margins(plan: Plan) -> None:
-    """A warning for each test that is stable and hardly so."""
+def print_warnings(plan: Plan) -> None:
+    """What experiments say of their tests, and a line for each that is stable and hardly so."""
+    for test in plan.tests:
+        for line in test.warnings:
+            print_note(f"{test.name}: {line}", "yellow")
     for line in low_margins(plan):
         print_note(line, "yellow")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from campaign.cli.chosen import chosen_lines
 from campaign.cli.output import print_line, print_note
+from campaign.cli.plan import in_short
 from campaign.errors import CampaignError, UsageError
 from campaign.execution.display import clock
 from campaign.experiments import experiments
@@ -32,26 +33,31 @@ class _Test:
     more: str = ""
 
 
-IDENTIFY = (
-    _Test(
-        "velocity-map",
-        "velocity_map",
-        "Friction torque over speed",
-        "Constant speeds in both directions, and the Stribeck curve through them.",
-    ),
-    _Test(
-        "breakaway",
-        "breakaway",
-        "Breakaway and presliding",
-        "Slow torque ramps from rest: how friction gives way, and how stiff it is before.",
-    ),
-    _Test(
-        "closed-loop",
-        "frequency_response",
-        "Frequency response of the rate loop",
-        "A stepped sine of the rate command: bandwidth and margins.",
-    ),
-)
+PILOT = "pilot = true    # friction is not described: ten speeds first tell which others to run\n"
+
+
+def _identify(bench: Bench) -> tuple[_Test, ...]:
+    return (
+        _Test(
+            "velocity-map",
+            "velocity_map",
+            "Friction torque over speed",
+            "Constant speeds in both directions, and the Stribeck curve through them.",
+            "" if bench.friction else PILOT,
+        ),
+        _Test(
+            "breakaway",
+            "breakaway",
+            "Breakaway and presliding",
+            "Slow torque ramps from rest: how friction gives way, and how stiff it is before.",
+        ),
+        _Test(
+            "closed-loop",
+            "frequency_response",
+            "Frequency response of the rate loop",
+            "A stepped sine of the rate command: bandwidth and margins.",
+        ),
+    )
 
 
 @unwinding()
@@ -62,13 +68,14 @@ def init_for_bench(folder: Path, written: str) -> None:
     cannot be written; nothing is written then.
     """
     bench = load_bench(written)
-    for test in (*IDENTIFY, _stabilize(bench)):
+    identify = _identify(bench)
+    for test in (*identify, _stabilize(bench)):
         _check_fit(test, bench)
     source = _source(written)
     own = folder / "benches" / source.name
     name = f"benches/{source.name}"
     files = {
-        folder / "identify.toml": _page(bench, name, "Identification of", IDENTIFY),
+        folder / "identify.toml": _page(bench, name, "Identification of", identify),
         folder / "stabilize.toml": _page(bench, name, "Compensation on", [_stabilize(bench)]),
     }
     if not _is(source, own):
@@ -148,7 +155,8 @@ def _with_reasons(path: Path) -> None:
         mark = f'name = "{test.name}"\n'
         text = text.replace(f"[[test]]\n{mark}", f"{reasons}[[test]]\n{mark}")
     path.write_text(text, encoding="utf-8", newline="\n")
-    print_line(f"{path}: {len(plan.trials)} trials, {clock(plan.duration)} of bench time")
+    later = f"; later stages add {in_short(plan.following)}" if plan.stages else ""
+    print_line(f"{path}: {len(plan.trials)} trials, {clock(plan.duration)} of bench time{later}")
     for problem in _refusals(plan):
         print_note(f"{path}: {problem}", style="yellow")
 

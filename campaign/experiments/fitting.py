@@ -8,68 +8,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from campaign.experiments.choices import Choices, Reasons, nice, share
 from campaign.experiments.interface import Chosen
 from campaign.experiments.rig import MOST, Rig
 from campaign.physics.bench import Bench
-from campaign.units import convert, factor
 
 DEG = math.pi / 180.0
+NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
+START = 2.0
+"""s before what an observer test measures: its `SETTLE`."""
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
+MINUTE = 60.0
+"""s that a run of a map takes at most, one way."""
+SLOWEST = 0.1
+"""of the fastest speed of a map, at most: its slowest, so that it is a curve."""
 SPEEDS = 40
 """of a map: the fit needs some ten, the rest shows where the curve is not the model's."""
 SWEPT = 40
 """frequencies, evenly in their logarithm."""
 RAMP_TIME = 30.0
 """s, of a torque ramp up to breakaway: slow against friction's own rates."""
+SLIDING = 0.1
+"""of the rate limit, at most: a rate that counts as sliding."""
 RUN_OUT = 4.0
 """s; times the rate that counts as sliding, room behind a ramp for the load to be stopped in."""
 PEAK = 1.8
 """times the static torque: where a ramp or a torque sine ends."""
-
-Reasons = Mapping[str, float]
-"""Sizes (SI) by the reason that asks for them."""
-
-
-@dataclass
-class Choices:
-    """What is chosen for the options of one test; those that it writes stay as they are."""
-
-    options: Any
-    told: dict[str, Chosen] = field(default_factory=dict)
-
-    def least(self, name: str, unit: str, reasons: Reasons) -> float:
-        """The smallest of some sizes, with few digits in `unit`, rounded towards zero."""
-        why = min(reasons, key=lambda reason: reasons[reason])
-        return float(self.take(name, nice(reasons[why], unit), why))
-
-    def most(self, name: str, unit: str, reasons: Reasons) -> float:
-        """The largest of some sizes, with few digits in `unit`, rounded away from zero."""
-        why = max(reasons, key=lambda reason: reasons[reason])
-        return float(self.take(name, nice(reasons[why], unit, up=True), why))
-
-    def take(self, name: str, value: Any, why: str) -> Any:
-        """What the option will be: as written, or `value`."""
-        if name in self.options.model_fields_set:
-            return getattr(self.options, name)
-        if value != getattr(self.options, name):
-            self.told[name] = Chosen(value, why)
-        return value
-
-    def sample_rate(self, rig: Rig) -> float:
-        """Of the recording (Hz)."""
-        return float(self.take("sample_rate", rig.sample_rate, "the controller's own rate"))
 
 
 def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Travel, ramps, settling, windows, speeds and times of a friction-velocity map."""
     rig, limits, choices = Rig(bench), bench.limits, Choices(options)
     _overcome_friction(rig)
+    allowed = _longest_run(limits.duration, options.rest)
+    longest = min(MINUTE, allowed)
     own = options.speeds
     travel = choices.least(
         "max_travel", "deg", {"a usual size": 60 * DEG, share("angle", 0.8): 1.6 * limits.angle}
@@ -82,6 +59,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "half of what torque and friction leave": 0.5 * rig.acceleration(0.7 * limits.rate),
         },
     )
+    settling = max(0.3, rig.loop_time)
     fastest = (
         max(own)
         if own
@@ -89,18 +67,21 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "fastest",
             "deg/s",
             {
+                "its ramps take half of a run": 0.25 * acceleration * longest,
                 share("rate", 0.7): 0.7 * limits.rate,
-                "a second is left of the travel": _fastest(travel, acceleration, 1.0),
+                "the travel leaves room to settle and measure": _fastest(
+                    travel, acceleration, max(1.0, settling + 0.5)
+                ),
             },
         )
     )
-    room = max(travel / fastest - fastest / acceleration, 0.0)
+    room = max(min(travel / fastest, longest - fastest / acceleration) - fastest / acceleration, 0)
     settle_time = choices.least(
         "settle_time",
         "s",
         {
-            "ten time constants of the loop, at least 0.3 s": max(0.3, rig.loop_time),
-            "half of the time that the fastest speed has": 0.5 * room,
+            "ten time constants of the loop, at least 0.3 s": settling,
+            "what the fastest speed leaves": max(room - 0.5, 0.5 * room),
         },
     )
     memory = rig.presliding
@@ -110,32 +91,48 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         f"{SETTLED:.0f} times Ts/σ0 of {memory / DEG:.2g} deg, once the loop's integral has turned "
         f"round in {turned / DEG:.2g} deg": SETTLED * memory + turned
     }
+    slow = {} if own else {"half of what slow speeds turn": 0.5 * longest * SLOWEST * fastest}
     settle = choices.least(
-        "settle_angle", "deg", {"a quarter of the travel": 0.25 * travel, **(known or usual)}
+        "settle_angle",
+        "deg",
+        {"a quarter of the travel": 0.25 * travel, **slow, **(known or usual)},
     )
     period = rig.ripple_period
     wide = {"a period of the ripple": 1.05 * period} if period else {"a usual size": 5 * DEG}
     window = choices.least("window_angle", "deg", {"half of the travel": 0.5 * travel, **wide})
     choices.sample_rate(rig)
-    slowest = min(own) if own else _slowest(rig, choices, settle, window, 0.1 * fastest)
+    if own:
+        slowest = min(own)
+    else:
+        slowest = _slowest(rig, choices, settle, window, longest, SLOWEST * fastest)
     needed = max((settle + window) / slowest, settle_time + options.window_time)
-    choices.least(
+    max_time = choices.least(
         "max_time",
         "s",
         {
             "the slowest speed settles": max(20.0, needed + 2 * slowest / acceleration),
-            "a minute": 60.0,
-            share("duration", 0.4): 0.4 * limits.duration,
+            "a minute": MINUTE,
+            "what the limit of duration leaves a run": allowed,
         },
     )
-    choices.least(
+    warm = choices.least(
         "warm_up_speed",
         "deg/s",
         {"a usual size": 20 * DEG, "half of the fastest speed": 0.5 * fastest},
     )
+    run = min(max_time, travel / warm + warm / acceleration)
+    _warm_up_cycles(choices, run, limits.duration)
     if not own:
         choices.take("points", SPEEDS, "the fit needs some ten")
     return choices.told
+
+
+def _warm_up_cycles(choices: Choices, run: float, duration: float) -> None:
+    """As many moves out and back, of two runs (s) and two rests each, as a trial may last."""
+    rest = choices.options.rest
+    most = int((MOST * duration - rest) / (2.0 * (run + rest)))
+    if most < choices.options.warm_up_cycles:
+        choices.take("warm_up_cycles", most, f"what fits into {share('duration', MOST)}")
 
 
 def _overcome_friction(rig: Rig) -> None:
@@ -147,15 +144,30 @@ def _overcome_friction(rig: Rig) -> None:
         )
 
 
+def _longest_run(duration: float, rest: float) -> float:
+    """How long (s) a run of a map may take, one way: two and three rests are a trial.
+
+    Raises ValueError where the limit of duration leaves it none.
+    """
+    longest = 0.5 * (MOST * duration - 3.0 * rest)
+    if longest <= 0:
+        raise ValueError(
+            f"the limit of duration, {duration:.3g} s, leaves no time for a run out and back with "
+            f"three rests of {rest:.3g} s; raise it, or shorten rest"
+        )
+    return longest
+
+
 def _fastest(travel: float, acceleration: float, steady: float) -> float:
     """Rate (rad/s) that is held for `steady` (s) between two ramps: v^2 / a + v t = travel."""
     return 0.5 * acceleration * (math.sqrt(steady**2 + 4 * travel / acceleration) - steady)
 
 
-def _slowest(rig: Rig, choices: Choices, settle: float, window: float, most: float) -> float:
+def _slowest(
+    rig: Rig, choices: Choices, settle: float, window: float, longest: float, most: float
+) -> float:
     """Lowest rate (rad/s): where the curve bends, above the gyro's noise, in the time there is."""
     vs = rig.stribeck_velocity
-    longest = min(0.4 * rig.bench.limits.duration, 60.0)
     bend = {"a thirtieth of the Stribeck velocity": vs / 30} if vs else {"a usual size": 0.05 * DEG}
     reasons = {
         **bend,
@@ -172,9 +184,8 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Positions, height and slope of torque ramps, and what counts as sliding."""
     rig, limits, choices = Rig(bench), bench.limits, Choices(options)
     _overcome_friction(rig)
-    # A ramp ends once the load slides at 4 times `sliding_rate`; it then still has to be stopped.
-    sliding = max(0.2 * (rig.stribeck_velocity or 0.025), 6.0 * rig.rate_noise)
-    reach = max(min(45 * DEG, 0.75 * limits.angle, limits.angle - RUN_OUT * sliding), 0.0)
+    sliding = _sliding(rig, options)
+    reach = _reach(rig, options, max(sliding.values()))
     positions = tuple(nice(p, "deg", 3) for p in np.linspace(-reach, reach, 10))
     if reach < 45 * DEG:
         choices.take("positions", positions, f"ten, within {share('angle', 0.75)}")
@@ -194,17 +205,48 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         length = (static or 0.5 * peak) / slope
         why = "a third of the ramp up to breakaway, to know the gyro's bias"
         choices.take("rest", nice(length / 3.0, "s"), why)
-    vs = rig.stribeck_velocity
-    choices.most(
-        "sliding_rate",
-        "deg/s",
-        {
-            "six deviations of the gyro's noise": 6.0 * rig.rate_noise,
-            **({"a fifth of the Stribeck velocity": 0.2 * vs} if vs else {"a usual size": 0.005}),
-        },
-    )
+    choices.most("sliding_rate", "deg/s", sliding)
     choices.sample_rate(rig)
     return choices.told
+
+
+def _sliding(rig: Rig, options: Any) -> Reasons:
+    """Rate (rad/s) that counts as sliding: above the gyro's noise, and within the limits.
+
+    A ramp ends at four times that, and then the load still has to be stopped.
+    """
+    if "sliding_rate" in options.model_fields_set:
+        return {"as written": options.sliding_rate}
+    vs, limits, noise = rig.stribeck_velocity, rig.bench.limits, 6.0 * rig.rate_noise
+    wanted = {
+        "six deviations of the gyro's noise": noise,
+        **({"a fifth of the Stribeck velocity": 0.2 * vs} if vs else {"a usual size": 0.005}),
+    }
+    allowed = {
+        share("rate", SLIDING): SLIDING * limits.rate,
+        "what half of the angle limit leaves to stop": 0.5 * limits.angle / RUN_OUT,
+    }
+    why = min(allowed, key=lambda reason: allowed[reason])
+    if max(wanted.values()) <= allowed[why]:
+        return wanted
+    if allowed[why] < noise:
+        raise ValueError(
+            f"within its limits a load slides at {allowed[why] / DEG:.2g} deg/s at most, and six "
+            f"deviations of the gyro's noise are {noise / DEG:.2g} deg/s: raise the limits of "
+            "angle or rate, or write sliding_rate"
+        )
+    return {why: allowed[why]}
+
+
+def _reach(rig: Rig, options: Any, sliding: float) -> float:
+    """How far from zero (rad) a ramp may begin: it creeps, gives way, and has to be stopped."""
+    limit, creep = rig.bench.limits.angle, 2.0 * (rig.presliding or 0.0)
+    if creep > 0.5 * limit and "positions" not in options.model_fields_set:
+        raise ValueError(
+            f"a load creeps {creep / DEG:.2g} deg before friction gives way, more than half of the "
+            f"angle limit of {limit / DEG:.2g} deg: raise it, or write positions"
+        )
+    return max(min(45 * DEG, 0.75 * limit, limit - RUN_OUT * sliding - creep), 0.0)
 
 
 def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
@@ -228,8 +270,21 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         torque = choices.least("torque", "N m", {**friction, **drive})
     if {"lowest", "highest", "step", "frequencies"} & options.model_fields_set:
         return choices.told
+    control = bench.controller.sample_rate
+    highest = 100.0 if control is None else 0.35 * control
     swing = 0.7 * (limits.angle - abs(options.position))
-    lowest = {"a usual size": 0.5}
+    if swing <= 0:
+        raise ValueError(
+            "there is no room to swing: its position is at the limit of angle or beyond"
+        )
+    cycles = options.settle_cycles + options.cycles
+    lowest = {
+        "a usual size": min(0.5, 0.1 * highest),
+        f"its cycles take {share('duration', MOST)}": max(
+            cycles / (MOST * limits.duration),
+            (options.cycles + 1) / max(MOST * limits.duration - options.settle_time, 1e-3),
+        ),
+    }
     if options.loop == "closed":
         lowest[f"its swing is {share('angle', 0.7)}"] = amplitude / (2 * math.pi * swing)
     else:
@@ -237,9 +292,12 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         lowest[f"its swing is {share('angle', 0.7)}"] = math.sqrt(free / swing) / (2 * math.pi)
         lowest[f"its rate is {share('rate', 0.7)}"] = free / (0.7 * limits.rate * 2 * math.pi)
     why = max(lowest, key=lambda reason: lowest[reason])
-    control = bench.controller.sample_rate
-    highest = 100.0 if control is None else 0.35 * control
-    low = min(lowest[why], 0.1 * highest)
+    low = lowest[why]
+    if low > 0.5 * highest:
+        raise ValueError(
+            f"a sweep would begin at {low:.3g} Hz ({why}) and end at {highest:.3g} Hz; raise the "
+            "limits, or write frequencies"
+        )
     swept = dict.fromkeys(nice(f, "Hz", 3, up=True) for f in np.geomspace(low, highest, SWEPT))
     top = "35 % of the controller's sample rate" if control else "a usual size"
     told = f"from {low:.2g} Hz ({why}) to {highest:.3g} Hz ({top})"
@@ -252,7 +310,7 @@ def base_motion(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     if getattr(getattr(options, "motion", None), "kind", "sine") != "sine":
         return {}
     rig, limits, choices = Rig(bench), bench.limits, Choices(options)
-    omega = 2 * math.pi * options.frequency
+    omega = 2 * math.pi * _periods_in_time(choices, MOST * limits.duration)
     choices.least(
         "acceleration",
         "deg/s^2",
@@ -267,9 +325,50 @@ def base_motion(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     return choices.told
 
 
+def observer_gain(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+    """The base motion, and times of noise and disturbance within the limit of duration."""
+    choices, longest = Choices(options), MOST * bench.limits.duration
+    why = share("duration", MOST)
+    if longest < START + options.noise_time:
+        choices.take("noise_time", max(0.0, nice(longest - START, "s")), f"within {why}")
+    kept = tuple(
+        f
+        for f in options.disturbance_frequencies
+        if max(START, 2.0 / f) + options.disturbance_cycles / f <= longest
+    )
+    if kept != options.disturbance_frequencies:
+        choices.take("disturbance_frequencies", kept, f"whose cycles are within {why}")
+    return {**base_motion(options, bench), **choices.told}
+
+
+def _periods_in_time(choices: Choices, longest: float) -> float:
+    """Frequency (Hz) of a sine whose cycles last `longest` (s) at most: fewer of them, or faster.
+
+    One cycle to settle and two that are measured are the fewest.
+    """
+    options, why = choices.options, share("duration", MOST)
+    settle, cycles = options.settle_cycles, options.cycles
+    if (settle + cycles) / options.frequency <= longest:
+        return float(options.frequency)
+    fewest = f"the fewest cycles take {why}"
+    frequency = choices.most(
+        "frequency", "Hz", {"a usual size": options.frequency, fewest: 3.0 / longest}
+    )
+    fitting = int(frequency * longest + 1e-9)
+    settle = choices.take("settle_cycles", min(settle, max(1, fitting // 4)), f"within {why}")
+    choices.take("cycles", max(1, min(cycles, fitting - settle)), f"within {why}")
+    return frequency
+
+
 def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Height and ramp of a step of the rate command, above the gyro's noise."""
     rig, limits, choices = Rig(bench), bench.limits, Choices(options)
+    drive = 0.5 * min(limits.acceleration, rig.torque / bench.axis.inertia)
+    room = limits.angle - abs(options.position)
+    if room <= 0:
+        raise ValueError(
+            "there is no room to move: its position is at the limit of angle or beyond"
+        )
     step = choices.least(
         "step",
         "deg/s",
@@ -278,9 +377,12 @@ def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
                 1 * DEG, 50 * rig.rate_noise
             ),
             share("rate", 0.3): 0.3 * limits.rate,
+            f"its way is {share('angle', 0.6)}": 0.6 * room / options.duration,
+            "what acceleration and torque allow in a tenth of the duration": 0.09
+            * options.duration
+            * drive,
         },
     )
-    drive = 0.5 * min(limits.acceleration, rig.torque / bench.axis.inertia)
     choices.most(
         "ramp",
         "s",
@@ -299,24 +401,3 @@ def presliding(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     sizes = tuple(nice(part * memory, "rad") for part in (0.125, 0.25, 0.5, 1.0, 2.0))
     choices.take("amplitudes", sizes, f"an eighth to twice Ts/σ0 of {memory / DEG:.2g} deg")
     return choices.told
-
-
-def share(limit: str, part: float) -> str:
-    """`80 % of the angle limit`."""
-    return f"{100 * part:.0f} % of the {limit} limit"
-
-
-def nice(value: float, unit: str, digits: int = 2, *, up: bool = False) -> float:
-    """SI value with few digits in the unit that people read; towards zero, or away from it."""
-    si = SI.get(unit, unit)
-    shown = float(convert(value, si, unit))
-    if shown == 0.0 or not math.isfinite(shown):
-        return value
-    step = 10.0 ** (math.floor(math.log10(abs(shown))) - digits + 1)
-    count = abs(shown) / step
-    whole = math.ceil(count - 1e-9) if up else math.floor(count + 1e-9)
-    return float(f"{math.copysign(whole * step, shown):.{digits + 2}g}") * factor(unit, si)
-
-
-SI = {"deg": "rad", "deg/s": "rad/s", "deg/s^2": "rad/s^2"}
-"""Display units used here and what they are inside; the others are SI."""

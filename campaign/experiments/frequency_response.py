@@ -18,8 +18,17 @@ from pydantic import Field
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
 from campaign.experiments import fitting
-from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
-from campaign.experiments.frequency_response_figures import closed_loop_figures, torque_figure
+from campaign.experiments.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
+from campaign.experiments.frequency_response_figures import (
+    closed_loop_figures,
+    torque_figure,
+)
 from campaign.experiments.frequency_response_tables import (
     Sweep,
     changes,
@@ -88,8 +97,13 @@ class FrequencyResponseOptions(Options):
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
     refine: bool = False
-    """Closed loop: when the sweep has ended, measure further frequencies around the -3 dB crossing
-    and, where it lies in the sweep, the phase crossover."""
+    """Closed loop: when the sweep has ended, measure further frequencies around the crossings
+    of -3 dB and of 0 dB and, where it lies in the sweep, the phase crossover."""
+
+    def without_effect(self) -> frozenset[str]:
+        swept = {"lowest", "highest", "step"} if self.frequencies else set()
+        closed = {"amplitude", "max_acceleration", "refine"}
+        return frozenset(swept | ({"torque"} if self.loop == "closed" else closed))
 
 
 def swept_frequencies(options: FrequencyResponseOptions) -> tuple[float, ...]:
@@ -266,6 +280,8 @@ def _point(data: TrialData) -> SinePoint:
     """The sine of a trial, from its metrics. Raises ValueError where there is none."""
     found = metrics(data, _measure)
     real, imaginary = found["response_real"], found["response_imag"]
+    if not math.isfinite(real.value + imaginary.value):
+        raise ValueError("its signals have no numbers")
     return SinePoint(
         _frequency(data),
         complex(real.value, imaginary.value),
@@ -359,8 +375,8 @@ EXPERIMENT = Experiment(
     stages=(
         Stage(
             name="refinement",
-            why="bandwidth and gain margin are read between frequencies: more of them around "
-            "both crossings",
+            why="bandwidth and margins are read between frequencies: more of them around "
+            "each crossing",
             most=_most_refined,
             trials=_refined,
         ),

@@ -26,7 +26,7 @@ from campaign.experiments.friction_models import (
     simulated,
 )
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.identification.intervals import of_repeats, shifted_by
+from campaign.identification.intervals import judged, of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -197,7 +197,9 @@ def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
     found = combined(trials, _measure)
     cut = trials[0].recording().window(*trials[0].trial.task.window)
     rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
-    return Loop(frequency, rate, friction, *(found.get(name) or _lost(name) for name in METRICS))
+    return Loop(
+        frequency, rate, friction, *(judged(found.get(name) or _lost(name)) for name in METRICS)
+    )
 
 
 def _analyse(data: TestData) -> Result:

@@ -11,7 +11,7 @@ from pydantic import JsonValue, ValidationError
 
 from campaign.estimate import Estimate
 from campaign.experiments.common import grouped
-from campaign.experiments.interface import TrialData, metrics
+from campaign.experiments.interface import Metrics, TrialData, metrics
 from campaign.identification.intervals import shifted_by
 from campaign.identification.sampled import together
 from campaign.physics.bench import Bench
@@ -128,7 +128,7 @@ def combined(
     """The metrics of repeats, by name, as `sampled.together` puts them; of those that all have."""
     each = [metrics(item, measure) for item in trials]
     names = [name for name in each[0] if all(name in found for found in each)]
-    return {name: together([found[name] for found in each]) for name in names}
+    return Metrics({name: together([found[name] for found in each]) for name in names})
 
 
 def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[Place, ...]:

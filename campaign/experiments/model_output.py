@@ -96,6 +96,9 @@ class ModelOutputOptions(Options):
     sample_rate: Frequency = Field(default=2000.0, gt=0, le=100_000)
     """Rate of the recording."""
 
+    def without_effect(self) -> frozenset[str]:
+        return frozenset(() if self.vary else {"factors"})
+
 
 def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]:
     known: set[str] = set()

@@ -176,8 +176,9 @@ def _all(data: TrialData, share: float = 1.0) -> tuple[Axis, Any, Any]:
     """Torque over rate, one whole cycle."""
     _, cut = _cut(data, CYCLE)
     rate = cut[RELATIVE_RATE]
-    largest = share * float(np.max(np.abs(rate)))
-    axis = Axis("Rate", "rad/s", "deg/s", limits=(-largest, largest))
+    largest = share * float(np.max(np.abs(rate), initial=0.0))
+    limits = (-largest, largest) if largest > 0 else None
+    axis = Axis("Rate", "rad/s", "deg/s", limits=limits)
     return axis, rate, cut[COMPENSATION_TORQUE]
 
 

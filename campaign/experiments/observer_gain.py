@@ -22,7 +22,11 @@ from campaign.estimate import Estimate
 from campaign.experiments import fitting
 from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.observer_figures import error_figure, noise_figure, rejection_figure
+from campaign.experiments.observer_figures import (
+    error_figure,
+    noise_figure,
+    rejection_figure,
+)
 from campaign.experiments.observer_metrics import (
     BY_THEORY,
     Gain,
@@ -78,6 +82,10 @@ class ObserverGainOptions(Options):
     simulation only. Else as it is: a stuck load neither follows nor shakes as they say."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
+
+    def without_effect(self) -> frozenset[str]:
+        rejection = {"disturbance", "disturbance_cycles"}
+        return frozenset(() if self.disturbance_frequencies else rejection)
 
 
 def _tuned(bench: Bench, name: str, corner: float) -> Bench:
@@ -311,7 +319,7 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting.base_motion,
+    fit=fitting.observer_gain,
     perturbs_bench=True,
     measure=measure,
     requires={

@@ -125,7 +125,7 @@ class Loop:
         """
         peak = float(np.max(np.abs(self.friction)))
         energy = float(np.trapezoid(self.friction, self.displacement))
-        loss = energy / (np.pi * peak * amplitude)
+        loss = energy / (np.pi * peak * amplitude) if peak > 0 else 0.0
         return {"peak": peak, "hysteresis_energy": energy, "loss_factor": loss}
 
 
@@ -135,6 +135,8 @@ def _amplitude_of(data: TrialData) -> float:
 
 def _loop(data: TrialData, window: Window) -> Loop:
     cut = data.recording().window(window.start, window.stop)
+    if not len(cut.time):
+        raise ValueError("the recording ends before its last loop")
     return Loop(
         np.append(cut[RELATIVE_ANGLE], cut[RELATIVE_ANGLE][0]),
         np.append(cut[FRICTION_TORQUE], cut[FRICTION_TORQUE][0]),

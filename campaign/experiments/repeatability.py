@@ -31,6 +31,7 @@ from campaign.experiments.velocity_map_runs import (
     map_trials,
     settling_notes,
 )
+from campaign.experiments.velocity_map_warnings import map_warnings
 from campaign.identification.intervals import of_repeats
 from campaign.identification.scatter import relative_scatter
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
@@ -293,6 +294,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=measure,
     fit=fitting.velocity_map,
+    warnings=map_warnings,
     requires=REQUIRED,
     can_use=CAN_USE,
 )

@@ -67,12 +67,16 @@ class Rig:
 
     @property
     def unwinding(self) -> float:
-        """Angle (rad) that a stuck load lags at a reversal until the loop's integral has turned.
+        """Angle (rad) that a stuck load lags at a reversal until the loop's integral has turned."""
+        return self.unwinding_from(self.static_torque or 0.0)
+
+    def unwinding_from(self, static_torque: float) -> float:
+        """The same for a static torque (N m) that was found.
 
         From -Ts to Ts: 2 Ts / (N Kt Ki); 0 without an integral, which then never breaks it away.
         """
         gain = self.bench.torque_per_current * self.bench.controller.rate.integral_gain
-        return 2.0 * (self.static_torque or 0.0) / gain if gain > 0 else 0.0
+        return 2.0 * static_torque / gain if gain > 0 else 0.0
 
     @property
     def torque(self) -> float:

@@ -20,7 +20,13 @@ from campaign.experiments import fitting
 from campaign.experiments.common import failures_note, with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.model_variation import model_figures, model_trials
-from campaign.experiments.pointing_error import error_of, found, measured_part, of_each, windows_of
+from campaign.experiments.pointing_error import (
+    error_of,
+    found,
+    measured_part,
+    of_each,
+    windows_of,
+)
 from campaign.experiments.sensitivity_results import (
     SYMBOLS,
     Response,
@@ -70,6 +76,10 @@ class SensitivityOptions(Options):
     """Also run the model alone at a prescribed rate (Figures 5.12, 5.13): in simulation only."""
     model_change: float = Field(default=0.5, gt=0, lt=1)
     """Relative change, either way, that its output is shown for."""
+
+    def without_effect(self) -> frozenset[str]:
+        threshold = set() if self.threshold_ratio is None else {"threshold"}
+        return frozenset(threshold | (set() if self.model_output else {"model_change"}))
 
 
 def varied_paths(bench: Bench, compensation: str, parameter: str) -> dict[str, float]:

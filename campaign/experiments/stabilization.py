@@ -75,6 +75,9 @@ class StabilizationOptions(Options):
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
 
+    def without_effect(self) -> frozenset[str]:
+        return frozenset(() if isinstance(self.motion, SineMotion) else OF_A_SINE)
+
 
 OF_A_SINE = ("frequency", "acceleration", "cycles", "settle_cycles")
 

@@ -12,7 +12,13 @@ from pydantic import Field
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
 from campaign.experiments import fitting
-from campaign.experiments.common import conditions, failures_note, grouped, method_label, swept
+from campaign.experiments.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.identification.intervals import of_repeats
 from campaign.identification.sampled import where_it_scatters

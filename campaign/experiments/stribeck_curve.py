@@ -7,7 +7,8 @@ sliding (Figure 2.9, Equation 4.6); what the measurement adds is that it does ge
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -133,7 +134,9 @@ class _Points:
 
 
 def _points(place: Place) -> _Points:
-    found = [combined(trials, _measure) for trials in place.by("speed").values()]
+    """Those that moved and told a torque: without a rate the model promises no friction."""
+    read = (combined(trials, _measure) for trials in place.by("speed").values())
+    found = [each for each in read if each["rate"].value and _told(each)]
     rates = tuple(each["rate"] for each in found)
     torques = tuple(each["friction_torque"] for each in found)
     rate = np.array([each.value for each in rates])
@@ -153,14 +156,21 @@ def _largest_deviation(points: _Points) -> Estimate:
     return replace(found, low=low, systematic=points.deviations[0].systematic)
 
 
+NOTHING_MOVED = "No reading has both a rate and a torque: nothing is told of friction in motion."
+
+
+def _told(each: Mapping[str, Estimate]) -> bool:
+    return math.isfinite(each["rate"].value + each["friction_torque"].value)
+
+
 def _analyse(data: TestData) -> Result:
-    found = places(data.completed(), OWN)
+    told = [(place, _points(place)) for place in places(data.completed(), OWN)]
+    found = [(place, points) for place, points in told if points.rates]
     if not found:
-        return Result(notes=failures_note(data))
+        return Result(notes=(*failures_note(data), *([NOTHING_MOVED] if told else [])))
     rows: list[dict[str, Cell]] = []
     findings, panels = [], []
-    for place in found:
-        points = _points(place)
+    for place, points in found:
         rows += [
             {**place.point, "rate": v, "torque": t, "curve": float(p)}
             for v, t, p in zip(points.rates, points.torques, points.promised, strict=True)
@@ -172,7 +182,7 @@ def _analyse(data: TestData) -> Result:
         key="stribeck-curve",
         title="Friction of steady sliding",
         columns=(
-            *found[0].columns,
+            *found[0][0].columns,
             Column("rate", "Rate", "rad/s", "deg/s"),
             Column("torque", "Friction torque", "N m", "N m"),
             Column("curve", "Stribeck curve", "N m", "N m", reason=OF_THE_MODEL),

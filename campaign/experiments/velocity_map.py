@@ -11,15 +11,15 @@ from campaign.channels import COMMAND
 from campaign.experiments import fitting
 from campaign.experiments.common import failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.velocity_map_choice import STAGE
 from campaign.experiments.velocity_map_figures import example_figure, fit_figure, map_figure
 from campaign.experiments.velocity_map_fits import fit_map
+from campaign.experiments.velocity_map_pilot import PilotedMapOptions, settled_enough, trials
 from campaign.experiments.velocity_map_points import measure, points_of, steady
 from campaign.experiments.velocity_map_runs import (
     CAN_USE,
     OWN,
     REQUIRED,
-    VelocityMapOptions,
-    map_trials,
     settling_notes,
 )
 from campaign.experiments.velocity_map_tables import (
@@ -29,6 +29,7 @@ from campaign.experiments.velocity_map_tables import (
     parameter_table,
     point_table,
 )
+from campaign.experiments.velocity_map_warnings import map_warnings
 from campaign.result import Figure, Finding, Result, Table
 
 
@@ -53,7 +54,7 @@ def _one_map(group: tuple[TrialData, ...], suffix: str) -> Result:
     where = ", ".join(f"{k} = {v}" for k, v in place.items())
     bench = bench_of(group[0].trial)
     notes: list[str] = []
-    points = points_of(group, bench, notes)
+    points = points_of(settled_enough(group, notes), bench, notes)
     kept, left = steady(points, notes)
     try:
         fits = fit_map(kept, bench)
@@ -74,11 +75,13 @@ def _one_map(group: tuple[TrialData, ...], suffix: str) -> Result:
 EXPERIMENT = Experiment(
     name="velocity_map",
     summary="friction torque over constant velocity, and its Stribeck fit (Table 4.3)",
-    options=VelocityMapOptions,
-    trials=map_trials,
+    options=PilotedMapOptions,
+    trials=trials,
     analyse=_analyse,
     measure=measure,
     fit=fitting.velocity_map,
+    warnings=map_warnings,
     requires=REQUIRED,
     can_use={COMMAND: "command in the figure of one point", **CAN_USE},
+    stages=(STAGE,),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -47,19 +47,27 @@ class MapFits:
     fits: Mapping[str, DirectionFit]
     shift: Mapping[str, Array]
     bench: Bench
+    _told: dict[Model, dict[str, dict[str, Estimate]]] = field(default_factory=dict, repr=False)
 
     def estimates(self, model: Model) -> dict[str, dict[str, Estimate]]:
         """Parameters by direction, `nominal` behind both; then by name. Systematic parts included.
 
         Those of the nominal are the mean of both directions: one constant moves both.
         """
+        if model not in self._told:
+            self._told[model] = self._estimates(model)
+        return self._told[model]
+
+    def _estimates(self, model: Model) -> dict[str, dict[str, Estimate]]:
         effects = {name: self._effects(name, model) for name in DIRECTIONS}
         effects["nominal"] = {
             parameter: 0.5 * sum(effects[name].get(parameter, 0.0) for name in DIRECTIONS)
             for parameter in PARAMETERS
         }
         found = {name: direction_estimates(self.fits[name], model) for name in DIRECTIONS}
-        found["nominal"] = nominal_estimates(self.fits["positive"], self.fits["negative"], model)
+        both = found["positive"], found["negative"]
+        positive, negative = self.fits["positive"], self.fits["negative"]
+        found["nominal"] = nominal_estimates(positive, negative, model, both)
         return {
             name: {each.name: self._shifted(each, effects[name]) for each in estimates.values()}
             for name, estimates in found.items()

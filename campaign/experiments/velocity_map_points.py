@@ -11,7 +11,7 @@ from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.experiments.interface import TrialData, bench_of, metrics
 from campaign.experiments.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
-from campaign.experiments.velocity_map_runs import DIRECTIONS, WHOLE, rule_of, windows_of
+from campaign.experiments.velocity_map_runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
 from campaign.identification.ripple import (
     FASTEST,
     Harmonic,
@@ -193,9 +193,10 @@ def points_of(items: Iterable[TrialData], bench: Bench, notes: list[str]) -> lis
 
 def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
     """The two points of one trial on `bench`, out and back."""
+    rule = rule_of(data.trial)
     found = metrics(data, measure)
     windows = windows_of(data.trial)
-    speed = float(str(data.trial.point["speed"]))
+    speed = speed_of(data.trial)
     for name, sign in DIRECTIONS.items():
         torque, acceleration = found[f"friction_torque_{name}"], found[f"acceleration_{name}"].value
         torque = with_systematic(torque, bench, TORQUE_CONSTANT, torque.value)
@@ -210,7 +211,7 @@ def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
             torque=torque,
             spread=found[f"spread_{name}"].value,
             window=windows[name].stop - windows[name].start,
-            rule=rule_of(data.trial),
+            rule=rule,
             acceleration=acceleration,
             first=_value(found, f"first_angle_{name}"),
             last=_value(found, f"last_angle_{name}"),

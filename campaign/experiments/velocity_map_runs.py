@@ -6,6 +6,7 @@ homing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Window
-from campaign.experiments.interface import bench_of
+from campaign.experiments.interface import bench_of, validated
 from campaign.experiments.rig import Rig
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -29,6 +30,9 @@ WHOLE = "settled {}"
 """Name of the window of all that a run has behind its settling, by direction."""
 MEMORIES = 7.0
 """lengths of friction's memory, Ts / sigma0, after which a reversal is over: 2 exp(-7) is 0.2 %."""
+
+ROUNDING = 1e-9
+"""of an angle, by which a difference of times may fall short of it."""
 
 
 class VelocityMapOptions(Options):
@@ -71,6 +75,10 @@ class VelocityMapOptions(Options):
     """Where runs begin: each speed is run from each, and its torques are averaged. Several, half a
     period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
 
+    def without_effect(self) -> frozenset[str]:
+        found = {"slowest", "fastest", "points"} if self.speeds else set()
+        return frozenset(found | (set() if self.warm_up_cycles else {"warm_up_speed"}))
+
 
 def map_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
     """Speeds of the map (rad/s), as written or rising. Raises ValueError for an empty range."""
@@ -103,6 +111,11 @@ class Run:
     window: float
     rule: str
     settle: float
+
+    @property
+    def settled(self) -> float:
+        """How long the speed is held once it has settled."""
+        return self.cruise - self.settle
 
     @property
     def leg(self) -> float:
@@ -156,21 +169,34 @@ def windows_of(trial: Trial) -> dict[str, Window]:
 
 def rule_of(trial: Trial) -> str:
     """What set the length of the trial's window, in words."""
-    return _replanned(trial).rule
+    run, own = _replanned(trial), windows_of(trial)["positive"]
+    # Runs of a pilot, and those that follow it, have other windows than the options tell.
+    return run.rule if math.isclose(own.stop - own.start, run.window) else "the pilot"
+
+
+def settled_angle(trial: Trial) -> float:
+    """Angle (rad) that a run moves at constant speed before what counts as settled."""
+    run, whole = _replanned(trial), windows_of(trial).get(WHOLE.format("positive"))
+    settle = run.settle if whole is None else run.cruise - (whole.stop - whole.start)
+    return settle * run.speed
+
+
+def speed_of(trial: Trial) -> float:
+    """Commanded speed (rad/s)."""
+    return float(str(trial.point["speed"]))
 
 
 def _replanned(trial: Trial) -> Run:
-    options = VelocityMapOptions.model_validate(trial.options, context={"si": True})
-    return plan_run(float(str(trial.point["speed"])), options)
+    known = {k: v for k, v in trial.options.items() if k in VelocityMapOptions.model_fields}
+    return plan_run(speed_of(trial), validated(VelocityMapOptions, known))
 
 
-def settling_advice(bench: Bench, settled: float) -> str:
+def settling_advice(rig: Rig, settled: float) -> str:
     """What to do when runs settle for too short an angle (rad); empty when they do not."""
-    rig = Rig(bench)
     memory, turned = rig.presliding or 0.0, rig.unwinding
     turned = turned if turned > memory else 0.0  # less is over while friction forgets
     needed = MEMORIES * memory + turned
-    if settled >= needed:
+    if settled >= needed * (1.0 - ROUNDING):
         return ""
     wanted, known, lag = (np.rad2deg(angle) for angle in (needed, memory, turned))
     integral = f", and the loop's integral turns round in {lag:.2g} deg" if turned else ""
@@ -204,48 +230,61 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
 def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
     """What to do where runs of a map settle for too short an angle, once for each bench."""
     told: dict[str, list[float]] = {}
-    benches: dict[str, Bench] = {}
+    rigs: dict[str, Rig] = {}
     for trial in trials:
-        run, key = _replanned(trial), canonical_json(trial.bench)
-        bench = benches.setdefault(key, benches.get(key) or bench_of(trial))
-        advice = settling_advice(bench, run.settle * run.speed)
-        if advice:
-            told.setdefault(advice, []).append(float(np.rad2deg(run.speed)))
+        key = canonical_json(trial.bench)
+        rig = rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
+        if advice := settling_advice(rig, settled_angle(trial)):
+            told.setdefault(advice, []).append(float(np.rad2deg(speed_of(trial))))
     for advice, speeds in told.items():
         yield f"At {min(speeds):.3g} to {max(speeds):.3g} deg/s: {advice}."
 
 
 def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
     """The warm-up, then one trial out and back for each speed and each angle to start from."""
-    starts = options.start_angles or (-0.5 * options.max_travel,)
-    many = bool(options.start_angles)
-    if options.warm_up_cycles:
-        yield _warm_up(options, starts[0])
+    yield from warm_ups(options)
+    rig = Rig(bench)
     for speed in map_speeds(options):
-        run = plan_run(speed, options)
-        if run.window * options.sample_rate < SMALLEST_WINDOW:
-            raise ValueError(
-                f"at {np.rad2deg(speed):.4g} deg/s the window of {run.window:.3g} s holds fewer "
-                f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
-            )
-        (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
-        told = f"window {run.window:.3g} s, {np.rad2deg(run.window * speed):.3g} deg: {run.rule}"
-        advice = settling_advice(bench, speed * run.settle)
-        for start_angle in starts:
-            yield TrialRequest(
-                Task(
-                    mode="rate",
-                    command=run.command(),
-                    compensation=options.compensation,
-                    duration=2 * run.leg + options.rest,
-                    window=(first, last),
-                    sample_rate=options.sample_rate,
-                    start_angle=start_angle,
-                ),
-                point={"speed": speed} | ({"start_angle": start_angle} if many else {}),
-                note=f"{told}; {advice}" if advice else told,
-                windows=run.windows(),
-            )
+        yield from run_requests(plan_run(speed, options), options, rig)
+
+
+def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[TrialRequest]:
+    """A trial of the run for each angle to start from. ValueError for too few samples."""
+    if run.window * options.sample_rate < SMALLEST_WINDOW:
+        raise ValueError(
+            f"at {np.rad2deg(run.speed):.4g} deg/s the window of {run.window:.3g} s holds fewer "
+            f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
+        )
+    (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
+    told = f"window {run.window:.3g} s, {np.rad2deg(run.window * run.speed):.3g} deg: {run.rule}"
+    advice = settling_advice(rig, run.speed * run.settle)
+    many = bool(options.start_angles)
+    for start_angle in _starts(options):
+        yield TrialRequest(
+            Task(
+                mode="rate",
+                command=run.command(),
+                compensation=options.compensation,
+                duration=2 * run.leg + options.rest,
+                window=(first, last),
+                sample_rate=options.sample_rate,
+                start_angle=start_angle,
+            ),
+            point={"speed": run.speed} | ({"start_angle": start_angle} if many else {}),
+            note=f"{told}; {advice}" if advice else told,
+            windows=run.windows(),
+        )
+
+
+def _starts(options: VelocityMapOptions) -> tuple[float, ...]:
+    """Angles to start from (rad)."""
+    return options.start_angles or (-0.5 * options.max_travel,)
+
+
+def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:
+    """The warm-up, where one is wanted."""
+    if options.warm_up_cycles:
+        yield _warm_up(options, _starts(options)[0])
 
 
 def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:

@@ -269,7 +269,7 @@ class Bench(Options):
     gear: GearOptions
     """The gear."""
     friction: dict[str, FrictionField] = Field(min_length=0, max_length=8)
-    """The true friction, by interface (`load`, `motor` ...)."""
+    """The true friction, by interface (`load`, `motor` ...); `friction = {}` where unknown."""
     variation: VariationOptions | None = None
     """How the friction of a simulated bench scatters; absent: it is always the same."""
     controller: ControllerOptions

@@ -36,6 +36,7 @@ class Expanded:
     `first_measurement` is the index of the first as written, whatever the order; None without one.
     `stages` are those that may follow, by point in the order of the matrix. `memory` is what all of
     it takes (bytes), the trials that follow included. `truths` are the plants that its trials name.
+    `warnings` are what its experiment says of the plan, each once.
     """
 
     trials: tuple[Trial, ...]
@@ -44,6 +45,7 @@ class Expanded:
     stages: tuple[PlannedStage, ...] = ()
     memory: int = 0
     truths: Mapping[str, Tree] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,8 @@ def expand(
     first = next(measured, None)
     at = next((i for i, place in enumerate(ordered) if place is first), None)
     of_places = tuple(place.bench for place in ordered)
-    return Expanded(trials, of_places, at, tuple(stages), spent + later, truths.plants)
+    told = tuple(dict.fromkeys(line for point in points for line in _warnings(test, point)))
+    return Expanded(trials, of_places, at, tuple(stages), spent + later, truths.plants, told)
 
 
 def _setup(test: Test, point: Point) -> tuple[str, ...]:
@@ -133,16 +136,30 @@ def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
     try:
         return list(planned_stages(test, point, seed))
     except (ValueError, ArithmeticError) as error:
-        where = f" at {point.label}" if point.values else ""
-        message = f"test '{test.entry.name}'{where}: {first_line(error)}"
-        raise PointError([test.origin.problem((), "value", message)]) from None
+        raise _refused(test, point, error) from None
+
+
+def _warnings(test: Test, point: Point) -> list[str]:
+    """What the experiment warns of at a point. Raises PointError."""
+    if test.experiment.warnings is None:
+        return []
+    try:
+        return list(test.experiment.warnings(point.options, point.bench))
+    except (ValueError, ArithmeticError) as error:
+        raise _refused(test, point, error) from None
+
+
+def _refused(test: Test, point: Point, error: Exception) -> PointError:
+    """An experiment's word against options and bench of a point."""
+    where = f" at {point.label}" if point.values else ""
+    message = f"test '{test.entry.name}'{where}: {first_line(error)}"
+    return PointError([test.origin.problem((), "value", message)])
 
 
 def _requests(
     test: Test, point: Point, own_benches: dict[str, tuple[Bench, Tree]], truths: _Truths
 ) -> Iterator[tuple[TrialRequest, Bench, Tree, str]]:
     """What the experiment asks for at a point, with bench and truth, checked as only a plan can."""
-    where = f" at {point.label}" if point.values else ""
     try:
         for request in test.experiment.trials(point.options, point.bench):
             bench, tree = _bench_for(request, point, own_benches)
@@ -152,8 +169,7 @@ def _requests(
             check_recording(request.task)
             yield request, bench, tree, truths.of(point, bench, tree)
     except (ValueError, ArithmeticError) as error:
-        message = f"test '{test.entry.name}'{where}: {first_line(error)}"
-        raise PointError([test.origin.problem((), "value", message)]) from None
+        raise _refused(test, point, error) from None
 
 
 def _bench_for(

@@ -69,6 +69,7 @@ class PlannedTest:
         chosen: options that the test does not write and its experiment chose for the bench, with
             the reason; as they are at the first point of the matrix.
         stages: trials that follow from what these find, by point; they are not among `numbers`.
+        warnings: what its experiment says of the plan, with what to do about it.
     """
 
     name: str
@@ -90,6 +91,7 @@ class PlannedTest:
     coarse: tuple[LimitUse, ...] = ()
     chosen: Mapping[str, str] = field(default_factory=dict)
     stages: tuple[PlannedStage, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -315,6 +317,7 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         coarse=coarse,
         chosen=first.chosen,
         stages=expanded.stages,
+        warnings=expanded.warnings,
     )
 
 

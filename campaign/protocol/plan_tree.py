@@ -66,6 +66,7 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "seeks_instability": test.seeks_instability,
         "coarse": [_use(use) for use in test.coarse],
         "stages": [stage_tree(stage) for stage in test.stages],
+        "warnings": list(test.warnings),
     }
 
 

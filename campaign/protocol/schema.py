@@ -69,6 +69,9 @@ class ExperimentKind(typing.Protocol):
     def fit(self) -> Callable[[Any, Bench], Mapping[str, ChosenValue]] | None: ...
 
     @property
+    def warnings(self) -> Callable[[Any, Bench], Iterable[str]] | None: ...
+
+    @property
     def requires(self) -> Mapping[str, str]: ...
 
     @property

@@ -281,7 +281,9 @@ def test_archived_metrics_are_used_and_no_sample_is_read_for_them() -> None:
     assert len({metric.name for metric in metrics}) == len(metrics)
     assert all(np.isfinite(metric.value) for metric in metrics)
     moved = tuple(
-        replace(metric, value=1.01 * metric.value) if metric.name == "breakaway_torque" else metric
+        replace(metric, value=1.01 * metric.value, low=None, high=None)
+        if metric.name == "breakaway_torque"
+        else metric
         for metric in metrics
     )
     result = analyse("breakaway", [replace(done[0], estimates=moved)])

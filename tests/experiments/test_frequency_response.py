@@ -227,7 +227,9 @@ def test_the_response_is_a_metric_of_its_trial_and_the_analysis_believes_it() ->
     told, measured_now = analyse(KIND, archived), analyse(KIND, done)
     assert told.findings == measured_now.findings
     assert told.tables == measured_now.tables
-    moved = [replace(each, value=0.5 * each.value) for each in archived[0].estimates]
+    moved = [
+        replace(each, value=0.5 * each.value, low=None, high=None) for each in archived[0].estimates
+    ]
     other = analyse(KIND, [replace(archived[0], estimates=tuple(moved)), *archived[1:]])
     assert other.figures[0].panels[0].curves[0].y[0] < -5
 

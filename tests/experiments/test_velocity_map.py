@@ -109,7 +109,7 @@ def test_runs_that_cannot_settle_or_be_sampled_are_refused() -> None:
     with pytest.raises(ValueError, match="settle"):
         plan_run(deg(130.0), VelocityMapOptions())
     for changed in ({"sample_rate": "1 Hz"}, {"speeds": ["-1 deg/s"]}):
-        options = VelocityMapOptions.model_validate(changed)
+        options = EXPERIMENT.options.model_validate(changed)
         with pytest.raises(ValueError, match=r"samples|positive"):
             list(EXPERIMENT.trials(options, bench()))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -92,6 +92,7 @@ class Kind:
     can_use: Mapping[str, str] = field(default_factory=dict)
     seeks_instability: bool = False
     fit: Callable[[Any, Bench], Mapping[str, Any]] | None = None
+    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
     stages: tuple[Any, ...] = ()
 
 

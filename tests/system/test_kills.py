@@ -26,8 +26,9 @@ TRIALS = 12
 # meets the run, and not the second in which Python starts.
 NURSERY = """
 import os, sys
-import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file, campaign.archive.sealing
-import campaign.archive.unsealing, campaign.physics.simulate, campaign.backends.sim
+import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file
+import campaign.archive.sealing, campaign.archive.unsealing
+import campaign.physics.simulate, campaign.backends.sim
 from campaign.cli import main
 for line in sys.stdin:
     child = os.fork()

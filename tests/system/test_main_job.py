@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from tests.system.user import SEA, campaign, write
 
@@ -39,6 +40,7 @@ def test_the_scoreboard_reproduces_the_published_stabilization_error(quickstart)
     assert list(lines[0]) == [
         *("table", "row", "column", "unit", "published", "reproduced"),
         *("deviation_percent", "status", "low", "high", "verdict", "source"),
+        *("place", "place_low", "place_high", "draws"),
     ]
     none = [line for line in lines if (line["table"], line["row"]) == ("5.2", "none")]
     assert [float(line["published"]) for line in none] == [0.4844]
@@ -103,6 +105,18 @@ def test_the_plan_executes_nothing_and_is_what_runs(tmp_path: Path):
     assert run.err.splitlines()[-1].startswith("complete: 2 trials done")
 
 
+def test_the_plan_warns_of_what_it_can_know_before(tmp_path: Path):
+    few = ", ".join(f'"{speed} deg/s"' for speed in (0.1, 0.5, 1, 2, 4))
+    write(
+        tmp_path,
+        f'[[test]]\nname = "m"\nkind = "velocity_map"\nbench = "simulink"\nspeeds = [{few}]\n',
+    )
+    said = " ".join(campaign(tmp_path, "plan", "protocol.toml").err.split())
+    assert "m: 5 speeds cannot determine the 5 parameters" in said
+    tree = json.loads(campaign(tmp_path, "plan", "protocol.toml", "--json").out)
+    assert len(tree["tests"][0]["warnings"]) == 1
+
+
 def test_set_changes_a_test_and_the_archive_says_so(tmp_path: Path):
     write(tmp_path, SEA)
     change = 'sea.frequency="0.5 Hz"'
@@ -143,6 +157,34 @@ def test_init_writes_protocols_that_fit_a_bench_of_ones_own(tmp_path: Path):
     write(lab, "# mine\n", "identify.toml")
     refused = campaign(tmp_path, "init", "lab", "--bench", "small-rig.toml", code=2)
     assert "nothing was written" in refused.err
+
+
+def test_init_for_a_bench_without_friction_has_a_pilot(tmp_path: Path):
+    """Where friction is described the speeds follow from that: no pilot."""
+    lines = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
+    for name, text in (("known.toml", lines), ("unknown.toml", without_friction(lines))):
+        write(tmp_path, text, name)
+        folder = name.removesuffix(".toml")
+        said = campaign(tmp_path, "init", folder, "--bench", name)
+        assert not said.err
+        assert ("later stages add at most 30 trials" in said.out) is (name == "unknown.toml")
+        plan = json.loads(campaign(tmp_path / folder, "plan", "identify.toml", "--json").out)
+        (of_map,) = [test for test in plan["tests"] if test["kind"] == "velocity_map"]
+        pilot = name == "unknown.toml"
+        assert of_map["options"]["pilot"] is pilot
+        assert [stage["most"]["trials"] for stage in of_map["stages"]] == [30] * pilot
+        assert len(of_map["trials"]) == (11 if pilot else 41)
+
+
+def without_friction(text: str) -> str:
+    """A bench file without the tables of friction, and what refers to them."""
+    document = tomlkit.parse(text)
+    for name in ("variation", "known", "compensation"):
+        document.pop(name, None)
+    document["friction"] = tomlkit.table()
+    if "preload" in document["gear"]:
+        document["gear"].pop("preload")
+    return tomlkit.dumps(document)
 
 
 def test_init_for_a_bench_that_cannot_move_writes_nothing(tmp_path: Path):

@@ -1,0 +1,85 @@
+"""What can be typed once: see the kinds, compile, begin a folder, bring files forward."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from campaign.cli.archive_commands import app
+
+__all__ = ["app"]
+
+
+@app.command()
+def kinds(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="One of them, with its options.", show_default=False),
+    ] = None,
+) -> None:
+    """List experiments, friction models, compensation methods and backends."""
+    from campaign.cli.kinds import list_kinds, show_kind
+
+    if name is None:
+        list_kinds()
+    else:
+        show_kind(name)
+
+
+@app.command()
+def warmup() -> None:
+    """Compile the engine now, once per installation, instead of in the first run."""
+    from campaign.cli.warmup import warm_up
+
+    raise typer.Exit(warm_up())
+
+
+@app.command()
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Made when it is not there.")],
+    bench: Annotated[
+        str,
+        typer.Option(
+            "--bench",
+            metavar="BENCH",
+            help="Write protocols for this bench instead: a TOML file, or a shipped bench's name.",
+            show_default=False,
+        ),
+    ] = "",
+) -> None:
+    """Copy the shipped protocols, benches and templates into DIR, or write a bench its own."""
+    if bench:
+        from campaign.cli.rig_protocols import init_for_bench
+
+        init_for_bench(folder, bench)
+        return
+    from campaign.cli.archives import init_folder
+
+    init_folder(folder)
+
+
+@app.command()
+def migrate(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Protocols and benches.", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            metavar="FILE",
+            help="A new file to write it to, instead of the one that is read.",
+            show_default=False,
+        ),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit code 1 if anything would change.")
+    ] = False,
+) -> None:
+    """Bring protocols and benches of an older schema forward, or say what a person must decide."""
+    from campaign.cli.migrate import migrate_files
+
+    raise typer.Exit(migrate_files(files, output, check=check))
