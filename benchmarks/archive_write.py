@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from campaign.archive.trial_file import TrialFile
+from campaign.archive.writing.trial_file import TrialFile
 from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
 
 RATE = 1000

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import open_run
-from campaign.archive.trial_file import TrialFile
-from campaign.archive.verification import verify_run
+from campaign.archive.verifying.verification import verify_run
+from campaign.archive.writing.trial_file import TrialFile
 from campaign.backends import sim
 from campaign.backends.replay import BACKEND as REPLAY
 from campaign.backends.replay import ReplayOptions

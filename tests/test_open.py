@@ -115,7 +115,7 @@ def test_nothing_is_read_before_it_is_asked_for(run, monkeypatch):
     def refuse(*arguments: object) -> None:
         raise AssertionError("samples were read")
 
-    monkeypatch.setattr("campaign.archive.series.Series.read", refuse)
+    monkeypatch.setattr("campaign.archive.reading.series.Series.read", refuse)
     assert [view.number for view in run] == [1, 2]
     assert len(run.trials) == len(run) == 2
     assert "2 of 2 trials" in repr(run)

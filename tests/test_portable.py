@@ -49,8 +49,8 @@ NAMES = frozenset({
 """Names that Windows does not have in modules that it has."""
 
 ALLOWED: dict[tuple[str, str], str] = {
-    ("campaign/archive/run_lock.py", "_lock"): 'if os.name == "nt":',
-    ("campaign/archive/remnants.py", "_in_use"): 'if os.name == "nt"',
+    ("campaign/archive/writing/run_lock.py", "_lock"): 'if os.name == "nt":',
+    ("campaign/archive/writing/remnants.py", "_in_use"): 'if os.name == "nt"',
     ("campaign/signing/tool.py", "_kill"): 'os.name == "posix"',
     ("campaign/device/line.py", "PtyStream.__init__"): "this system has no pseudo-terminals",
     ("campaign/execution/guardian.py", "main"): "POSIX",

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from campaign.archive import ArchivedTrial
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import in_words
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import in_words
 from campaign.estimate import Estimate
 from campaign.result import Finding
 

@@ -13,8 +13,8 @@ from campaign.access.tables import trials_table
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
 from campaign.archive import RunHeader, RunReader, RunStatus
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import in_words, lost_trials, of_test
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import in_words, lost_trials, of_test
 from campaign.errors import ArchiveError, UsageError
 from campaign.trial import Outcome, trial_number
 

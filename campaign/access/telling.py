@@ -9,8 +9,8 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import in_one_line
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import in_one_line
 from campaign.errors import ArchiveError, ArchiveWarning
 
 _PACKAGE = str(Path(__file__).parents[1]) + os.sep

@@ -13,8 +13,8 @@ from campaign.access.tables import result_table, trials_table
 from campaign.access.telling import tell
 from campaign.access.trial import TrialView
 from campaign.archive import ArchivedTrial
-from campaign.archive.damage import Damage
-from campaign.archive.sound_samples import Trials, without_damaged
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of

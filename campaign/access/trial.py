@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from campaign.archive import ArchivedTrial
-from campaign.archive.damage import Damage
+from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
 from campaign.trial import Ending, Recording, Trial
 

@@ -4,14 +4,14 @@
 format is described in `docs/archive-format.md`. Importing this package does not import h5py.
 """
 
-from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.header import PlannedTrial, RunHeader, RunStatus
-from campaign.archive.listing import find_run, find_runs, list_runs
-from campaign.archive.naming import new_run_name, reserved_name
-from campaign.archive.opening import open_run
-from campaign.archive.run_reader import RunReader
-from campaign.archive.summary import RunSummary
-from campaign.archive.writer import RunWriter, TrialWriter
+from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.listing import find_run, find_runs, list_runs
+from campaign.archive.reading.opening import open_run
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.reading.summary import RunSummary
+from campaign.archive.writing.naming import new_run_name, reserved_name
+from campaign.archive.writing.writer import RunWriter, TrialWriter
 
 __all__ = [
     "ArchivedTrial",

@@ -21,9 +21,9 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
-from campaign.archive.damage_words import in_one_line, in_words, lost_trials
-from campaign.archive.sound_samples import whole_recording
-from campaign.archive.story import read_lines
+from campaign.archive.layout.story import read_lines
+from campaign.archive.reading.damage_words import in_one_line, in_words, lost_trials
+from campaign.archive.reading.sound_samples import whole_recording
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ArchiveError
 from campaign.options import Options

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 from campaign.archive import RunSummary, list_runs
-from campaign.archive.remnants import find_remnants
+from campaign.archive.writing.remnants import find_remnants
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.selection import Selection
 from campaign.interrupts import unwinding

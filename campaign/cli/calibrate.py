@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from campaign.archive.files import why, write_atomically
+from campaign.archive.layout.files import why, write_atomically
 from campaign.calibration.document import bench_text, interruption, result_text
 from campaign.calibration.known_values import known_entries
 from campaign.calibration.outcome import CalibrationOutcome, calibrate

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from campaign.archive import RunWriter
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import heading, in_words, listed
-from campaign.archive.run_reader import RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import heading, in_words, listed
+from campaign.archive.reading.run_reader import RunReader
 from campaign.backends.interface import Backend, ServesArchive
 from campaign.cli.output import print_note
 from campaign.errors import ExitCode

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from campaign.archive.files import why, write_atomically
+from campaign.archive.layout.files import why, write_atomically
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ExitCode, UsageError
 from campaign.physics.bench_fingerprint import fingerprint, why_altered

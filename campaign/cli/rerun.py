@@ -16,9 +16,9 @@ from campaign.archive import (
     open_run,
     reserved_name,
 )
-from campaign.archive.damage_words import heading, in_words, lost_trials
-from campaign.archive.header import PARTIAL
-from campaign.archive.sound_samples import whole_recording
+from campaign.archive.layout.header import PARTIAL
+from campaign.archive.reading.damage_words import heading, in_words, lost_trials
+from campaign.archive.reading.sound_samples import whole_recording
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE
 from campaign.cli.output import print_line, print_note
 from campaign.cli.prepare import find_backend, open_backend

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
-from campaign.archive.header import PARTIAL
-from campaign.archive.journal import utc_now
-from campaign.archive.signature_file import has_signature
+from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.journal import utc_now
+from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, reserved_name
-from campaign.archive.header import PARTIAL, Truth
+from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings

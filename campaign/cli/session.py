@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 
 from campaign.archive import RunReader, RunStatus, RunWriter
-from campaign.archive.header import SEALED
-from campaign.archive.journal import TrialsFollowed
+from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.journal import TrialsFollowed
 from campaign.backends.interface import Backend, BackendKind, StoppedOutside, Timed
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged

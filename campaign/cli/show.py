@@ -8,18 +8,18 @@ from dataclasses import asdict
 from pathlib import Path
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.archive.damage import Damage
-from campaign.archive.header import Truth
-from campaign.archive.journal import (
+from campaign.archive.layout.header import Truth
+from campaign.archive.layout.journal import (
     Decision,
     OperatorStep,
     RunResumed,
     TrialFinished,
     TrialsFollowed,
 )
-from campaign.archive.record import plain
-from campaign.archive.signature_file import has_signature, signature_path
-from campaign.archive.story import Lines, read_lines
+from campaign.archive.layout.record import plain
+from campaign.archive.layout.signature_file import has_signature, signature_path
+from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.reading.damage import Damage
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table
 from campaign.errors import ExitCode

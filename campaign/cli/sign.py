@@ -8,14 +8,14 @@ from pathlib import Path
 
 from campaign import signing
 from campaign.archive import find_run
-from campaign.archive.files import why
-from campaign.archive.run_lock import RunLock
-from campaign.archive.signature_file import (
+from campaign.archive.layout.files import why
+from campaign.archive.layout.signature_file import (
     has_signature,
     set_aside_signature,
     signature_path,
     write_signature,
 )
+from campaign.archive.writing.run_lock import RunLock
 from campaign.cli.ask import somebody_is_there
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ArchiveError, CampaignError, ExitCode, UsageError
@@ -40,7 +40,7 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
             f"{sealed}: is not sealed, and only a sealed run is signed; "
             f"`campaign resume {reference(sealed)}` goes on to its end"
         )
-    from campaign.archive.verification import verify_run
+    from campaign.archive.verifying.verification import verify_run
 
     _check_free(sealed, replace=replace)
     signing.check_key(key)  # before all of a large run is read
@@ -115,7 +115,7 @@ def _check_free(sealed: Path, *, replace: bool) -> None:
 
 def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
     """The new signature is made before an old one is touched."""
-    from campaign.archive.statement import run_statement
+    from campaign.archive.verifying.statement import run_statement
 
     made = signing.sign(run_statement(sealed), key, ask=somebody_is_there())
     _check_free(sealed, replace=replace)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign import signing
-from campaign.archive.signature_file import has_signature, read_signature, signature_path
-from campaign.archive.statement import run_statement
+from campaign.archive.layout.signature_file import has_signature, read_signature, signature_path
+from campaign.archive.verifying.statement import run_statement
 from campaign.cli.sign import WHAT_IT_PROVES
 from campaign.errors import ArchiveError, UsageError
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from campaign.archive import find_runs
-from campaign.archive.damage_words import in_words
-from campaign.archive.verification import verify_run
-from campaign.archive.verification_result import Verification
+from campaign.archive.reading.damage_words import in_words
+from campaign.archive.verifying.result import Verification
+from campaign.archive.verifying.verification import verify_run
 from campaign.cli.output import error_console, print_json, print_line, print_note
 from campaign.cli.signature import Checked, Wanted, check_signature
 from campaign.errors import ExitCode

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.archive.journal import utc_now
-from campaign.archive.measured import Measure
+from campaign.archive.layout.journal import utc_now
+from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import campaign
-from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.measured import Measured
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.measured import Measured
 from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
 from campaign.estimate import Estimate

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import campaign
-from campaign.archive.header import FORMAT
+from campaign.archive.layout.header import FORMAT
 from campaign.backends import backends
 from campaign.entry_points import PlugIn
 from campaign.experiments import experiments

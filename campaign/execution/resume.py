@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaign.archive import PlannedTrial, RunHeader, RunReader
-from campaign.archive.journal import Decision, TrialFinished, parse_journal
-from campaign.archive.resuming import RESUMABLE
+from campaign.archive.layout.journal import Decision, TrialFinished, parse_journal
+from campaign.archive.writing.resuming import RESUMABLE
 from campaign.errors import UsageError
 from campaign.execution.provenance import shaping
 from campaign.protocol import PlannedStage

@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from types import MappingProxyType
 
-from campaign.archive.header import RunStatus
-from campaign.archive.journal import utc_now
-from campaign.archive.measured import Measure
+from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.journal import utc_now
+from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend
 from campaign.execution.attendance import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from queue import Empty, SimpleQueue
 
-from campaign.archive.measured import Measure
+from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
 from campaign.execution.attendance import Attendance, SetUp

@@ -15,9 +15,9 @@ from dataclasses import replace
 from typing import Protocol
 
 from campaign.archive import ArchivedTrial
-from campaign.archive.followed import trials_followed
-from campaign.archive.journal import TrialsFollowed, utc_now
-from campaign.archive.measured import Measured
+from campaign.archive.layout.followed import trials_followed
+from campaign.archive.layout.journal import TrialsFollowed, utc_now
+from campaign.archive.reading.measured import Measured
 from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from campaign.archive.header import RunStatus
-from campaign.archive.measured import Measure
+from campaign.archive.layout.header import RunStatus
+from campaign.archive.reading.measured import Measure
 from campaign.trial import Array, ChannelInfo, Ending, Event, SafeState, Trial
 
 

@@ -15,14 +15,14 @@ from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Origin, Window
-from campaign.experiments import fitting
-from campaign.experiments.breakaway_figures import position_figure, ramp_figure
-from campaign.experiments.breakaway_means import Ramps, means_of, with_comparisons
-from campaign.experiments.breakaway_remarks import remarks
-from campaign.experiments.breakaway_tables import findings_of, table_of, window_table
-from campaign.experiments.common import conditions, failures_note, grouped
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
-from campaign.experiments.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.experiments.results.breakaway_figures import position_figure, ramp_figure
+from campaign.experiments.results.breakaway_means import Ramps, means_of, with_comparisons
+from campaign.experiments.results.breakaway_remarks import remarks
+from campaign.experiments.results.breakaway_tables import findings_of, table_of, window_table
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
 from campaign.options import Options

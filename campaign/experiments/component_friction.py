@@ -18,9 +18,9 @@ from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
-from campaign.experiments.common import conditions, failures_note, grouped
-from campaign.experiments.component_sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.results.component_sums import load_share, total_of
+from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.intervals import shifted_by
 from campaign.identification.readings import (

@@ -16,8 +16,9 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import (
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.friction_models import (
     OF_ONE,
     Place,
     combined,
@@ -26,7 +27,6 @@ from campaign.experiments.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.identification.sampled import at_sample, bracketed, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench

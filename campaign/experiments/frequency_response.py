@@ -17,19 +17,12 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
-from campaign.experiments import fitting
-from campaign.experiments.common import (
-    conditions,
-    failures_note,
-    grouped,
-    method_label,
-    swept,
-)
-from campaign.experiments.frequency_response_figures import (
+from campaign.experiments.interface import Experiment, Stage, TestData, TrialData, metrics
+from campaign.experiments.results.frequency_response_figures import (
     closed_loop_figures,
     torque_figure,
 )
-from campaign.experiments.frequency_response_tables import (
+from campaign.experiments.results.frequency_response_tables import (
     Sweep,
     changes,
     closed_findings,
@@ -39,7 +32,14 @@ from campaign.experiments.frequency_response_tables import (
     modes,
     quality_note,
 )
-from campaign.experiments.interface import Experiment, Stage, TestData, TrialData, metrics
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
 from campaign.identification.frequency_response import Response, make_response
 from campaign.identification.intervals import with_error
 from campaign.identification.refinement import MOST as MOST_REFINED

@@ -13,9 +13,9 @@ from pydantic_core import to_json
 from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
-from campaign.experiments.draws import draws_of, merged
-from campaign.experiments.swept_tables import table_names
-from campaign.experiments.unusable import doubt, notes_on
+from campaign.experiments.preparing.draws import draws_of, merged
+from campaign.experiments.preparing.swept_tables import table_names
+from campaign.experiments.preparing.unusable import doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED

@@ -16,14 +16,15 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.experiments.common import (
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared.common import (
     conditions,
     failures_note,
     grouped,
     method_label,
     with_changes,
 )
-from campaign.experiments.friction_models import (
+from campaign.experiments.shared.friction_models import (
     OF_ONE,
     combined,
     in_models,
@@ -32,7 +33,6 @@ from campaign.experiments.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.sampled import LOST, at_sample, bracketed, named, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from campaign.channels import RELATIVE_ANGLE
-from campaign.experiments.common import failures_note
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared.common import failures_note
 from campaign.identification.intervals import of_series, shifted_by
 from campaign.identification.sampled import shifted
 from campaign.options import Options

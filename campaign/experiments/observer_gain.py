@@ -19,15 +19,13 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
-from campaign.experiments import fitting
-from campaign.experiments.common import with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.observer_figures import (
+from campaign.experiments.results.observer_figures import (
     error_figure,
     noise_figure,
     rejection_figure,
 )
-from campaign.experiments.observer_metrics import (
+from campaign.experiments.results.observer_metrics import (
     BY_THEORY,
     Gain,
     gain_of,
@@ -38,7 +36,9 @@ from campaign.experiments.observer_metrics import (
     own_observer,
     worst_ratio,
 )
-from campaign.experiments.pointing_error import windows_of
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import with_changes
+from campaign.experiments.shared.pointing_error import windows_of
 from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.options import Options
 from campaign.physics import observer_loop as theory

@@ -15,10 +15,10 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
-from campaign.experiments import fitting
-from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import Place, in_models, places
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.friction_models import Place, in_models, places
 from campaign.identification.intervals import shifted_by
 from campaign.options import Options
 from campaign.physics.bench import Bench

@@ -15,14 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments import fitting
-from campaign.experiments.common import failures_note
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.systematic import shared_parts
-from campaign.experiments.velocity_map_figures import point_bars
-from campaign.experiments.velocity_map_fits import MapFits, fit_map
-from campaign.experiments.velocity_map_points import measure, points_of, steady
-from campaign.experiments.velocity_map_runs import (
+from campaign.experiments.friction_map.figures import point_bars
+from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.friction_map.points import measure, points_of, steady
+from campaign.experiments.friction_map.runs import (
     CAN_USE,
     DIRECTIONS,
     OWN,
@@ -31,7 +27,11 @@ from campaign.experiments.velocity_map_runs import (
     map_trials,
     settling_notes,
 )
-from campaign.experiments.velocity_map_warnings import map_warnings
+from campaign.experiments.friction_map.warnings import map_warnings
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.systematic import shared_parts
 from campaign.identification.intervals import of_repeats
 from campaign.identification.scatter import relative_scatter
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS

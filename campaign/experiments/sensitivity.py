@@ -16,24 +16,24 @@ from pydantic import Field
 
 from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
-from campaign.experiments import fitting
-from campaign.experiments.common import failures_note, with_changes
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.model_variation import model_figures, model_trials
-from campaign.experiments.pointing_error import (
-    error_of,
-    found,
-    measured_part,
-    of_each,
-    windows_of,
-)
-from campaign.experiments.sensitivity_results import (
+from campaign.experiments.results.sensitivity_results import (
     SYMBOLS,
     Response,
     judge,
     sensitivity_figure,
     sensitivity_findings,
     sensitivity_table,
+)
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import failures_note, with_changes
+from campaign.experiments.shared.model_variation import model_figures, model_trials
+from campaign.experiments.shared.pointing_error import (
+    error_of,
+    found,
+    measured_part,
+    of_each,
+    windows_of,
 )
 from campaign.identification.stabilization_error import over_trials
 from campaign.identification.threshold import Threshold

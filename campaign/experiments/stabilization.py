@@ -24,12 +24,13 @@ from campaign.channels import (
     missing,
 )
 from campaign.estimate import Estimate
-from campaign.experiments import fitting
-from campaign.experiments.common import conditions, failures_note, grouped, swept
-from campaign.experiments.comparisons import compared, preload_of
-from campaign.experiments.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.pointing_error import (
+from campaign.experiments.results.stabilization_figures import stabilization_figures
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
+from campaign.experiments.shared.comparisons import compared, preload_of
+from campaign.experiments.shared.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
+from campaign.experiments.shared.pointing_error import (
     error_of,
     found,
     measured_part,
@@ -37,7 +38,6 @@ from campaign.experiments.pointing_error import (
     rate_of,
     windows_of,
 )
-from campaign.experiments.stabilization_figures import stabilization_figures
 from campaign.identification.place import of_next
 from campaign.identification.stabilization_error import BLOCKS, LOST, over_trials, whole_cycles
 from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time_stuck

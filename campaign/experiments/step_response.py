@@ -11,15 +11,15 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
-from campaign.experiments import fitting
-from campaign.experiments.common import (
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import (
     conditions,
     failures_note,
     grouped,
     method_label,
     swept,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.identification.intervals import of_repeats
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.step_response import step_characteristics

@@ -15,8 +15,9 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
-from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import (
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.friction_models import (
     OF_ONE,
     Place,
     combined,
@@ -25,7 +26,6 @@ from campaign.experiments.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options

@@ -16,8 +16,9 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.experiments.common import failures_note
-from campaign.experiments.friction_models import (
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.friction_models import (
     OF_ONE,
     Place,
     combined,
@@ -25,7 +26,6 @@ from campaign.experiments.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.identification.intervals import of_series
 from campaign.identification.sampled import largest, where_it_scatters
 from campaign.options import Options

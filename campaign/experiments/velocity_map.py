@@ -8,28 +8,28 @@ torque over a settled window, less J times the residual acceleration, is one poi
 from __future__ import annotations
 
 from campaign.channels import COMMAND
-from campaign.experiments import fitting
-from campaign.experiments.common import failures_note, grouped
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.velocity_map_choice import STAGE
-from campaign.experiments.velocity_map_figures import example_figure, fit_figure, map_figure
-from campaign.experiments.velocity_map_fits import fit_map
-from campaign.experiments.velocity_map_pilot import PilotedMapOptions, settled_enough, trials
-from campaign.experiments.velocity_map_points import measure, points_of, steady
-from campaign.experiments.velocity_map_runs import (
+from campaign.experiments.friction_map.choice import STAGE
+from campaign.experiments.friction_map.figures import example_figure, fit_figure, map_figure
+from campaign.experiments.friction_map.fits import fit_map
+from campaign.experiments.friction_map.pilot import PilotedMapOptions, settled_enough, trials
+from campaign.experiments.friction_map.points import measure, points_of, steady
+from campaign.experiments.friction_map.runs import (
     CAN_USE,
     OWN,
     REQUIRED,
     settling_notes,
 )
-from campaign.experiments.velocity_map_tables import (
+from campaign.experiments.friction_map.tables import (
     map_findings,
     map_notes,
     model_table,
     parameter_table,
     point_table,
 )
-from campaign.experiments.velocity_map_warnings import map_warnings
+from campaign.experiments.friction_map.warnings import map_warnings
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import failures_note, grouped
 from campaign.result import Figure, Finding, Result, Table
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from campaign.access import TrialView
-from campaign.archive.damage_words import in_words
+from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 from campaign.trial import Recording, canonical_json

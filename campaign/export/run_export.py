@@ -11,9 +11,9 @@ from pathlib import Path
 
 from campaign.access import RunView, TrialView
 from campaign.access.tables import trials_table
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import FILE, damaged_csv, lost_trials
-from campaign.archive.sound_samples import sound_part
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import FILE, damaged_csv, lost_trials
+from campaign.archive.reading.sound_samples import sound_part
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 from campaign.plain_text import on_a_page

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from pydantic import ValidationError
 
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import of_test
-from campaign.archive.journal import RunResumed, TrialFinished
-from campaign.archive.sound_samples import Trials, without_damaged
-from campaign.archive.story import read_lines
+from campaign.archive.layout.journal import RunResumed, TrialFinished
+from campaign.archive.layout.story import read_lines
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import of_test
+from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench

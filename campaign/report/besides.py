@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from campaign.archive import RunReader
-from campaign.archive.damage import Damage
-from campaign.archive.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
-from campaign.archive.story import Lines, read_lines
+from campaign.archive.layout.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
+from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.reading.damage import Damage
 from campaign.report import page, tables
 from campaign.report.drift import drift_figure, drift_table, drifts_of
 from campaign.report.figures import draw

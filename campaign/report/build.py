@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import listed, lost_trials
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import listed, lost_trials
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page

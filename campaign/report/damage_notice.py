@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.archive import RunReader
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import FILE, damaged_csv, heading, in_one_line
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import FILE, damaged_csv, heading, in_one_line
 from campaign.report.page import Download, Folder
 
 TRIALS = 12

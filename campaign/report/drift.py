@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.archive.damage import Damage
-from campaign.archive.sound_samples import Trials, without_damaged
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.channels import (
     DRIVE_TORQUE,
     GYRO_RATE,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from campaign.experiments.interface import options_of
-from campaign.experiments.swept_tables import table_names
+from campaign.experiments.preparing.swept_tables import table_names
 from campaign.options import Options
 from campaign.plain_text import on_a_page
 from campaign.published.scoreboard import Scoreboard, to_csv

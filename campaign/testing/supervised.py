@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import RunStatus
-from campaign.archive.measured import Measure
+from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from campaign.archive import open_run
-from campaign.archive.checksums import BLOCK, SeriesDigest, series_digest, text_digest
-from campaign.archive.hdf5 import SampleColumns
+from campaign.archive.layout.checksums import BLOCK, SeriesDigest, series_digest, text_digest
+from campaign.archive.writing.hdf5 import SampleColumns
 
 EDGES = [0, 1, 7, 32_767, 32_768, 32_769, 65_536, 100_003]
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.journal import JOURNAL
+from campaign.archive.layout.journal import JOURNAL
 from campaign.errors import ArchiveError, UsageError
 from campaign.trial import Ending, Outcome
 

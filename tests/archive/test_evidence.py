@@ -18,10 +18,10 @@ import h5py
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.sound_samples import whole_recording
-from campaign.archive.statement import run_statement
-from campaign.archive.verification import verify_run
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.sound_samples import whole_recording
+from campaign.archive.verifying.statement import run_statement
+from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
 from campaign.trial import Ending, Fault, Outcome
 from tests.archive.forging import (

@@ -7,7 +7,7 @@ import h5py
 import pytest
 
 from campaign.archive import RunHeader
-from campaign.archive.storage import CHUNK
+from campaign.archive.layout.storage import CHUNK
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "archive-format.md"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunWriter, list_runs, open_run
-from campaign.archive.sound_samples import whole_recording
-from campaign.archive.verification import verify_run
+from campaign.archive.reading.sound_samples import whole_recording
+from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError, ExitCode
 from tests.archive.forging import (
     canonical,

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs
-from campaign.archive.index import INDEX
+from campaign.archive.reading.index import INDEX
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def not_opened(monkeypatch):
     def summarise(path):
         raise AssertionError(f"{path} was opened")
 
-    monkeypatch.setattr("campaign.archive.index.summarise", summarise)
+    monkeypatch.setattr("campaign.archive.reading.index.summarise", summarise)
 
 
 def test_a_second_listing_opens_nothing_and_says_the_same(results, monkeypatch):

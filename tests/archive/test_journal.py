@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from campaign.archive.header import RunStatus
-from campaign.archive.journal import (
+from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.journal import (
     Decision,
     Entry,
     Journal,

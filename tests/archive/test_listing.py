@@ -16,7 +16,7 @@ from campaign.archive import (
     new_run_name,
     open_run,
 )
-from campaign.archive.journal import read_journal
+from campaign.archive.layout.journal import read_journal
 from campaign.errors import ArchiveError, UsageError
 
 NOW = datetime(2026, 11, 21, 9, 36, 58, tzinfo=UTC)

@@ -13,9 +13,9 @@ import h5py
 import pytest
 
 from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
-from campaign.archive.journal import JOURNAL
-from campaign.archive.measured import Measured
-from campaign.archive.verification import verify_run
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.reading.measured import Measured
+from campaign.archive.verifying.verification import verify_run
 from campaign.estimate import Estimate, Systematic
 from campaign.trial import Ending, Outcome
 from tests.archive import forging

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter
-from campaign.archive.nexus import REQUIRED, VERSION, definition_path
-from campaign.archive.preview import PREVIEW_POINTS
-from campaign.archive.storage import CHUNK
+from campaign.archive.layout.storage import CHUNK
+from campaign.archive.writing.nexus import REQUIRED, VERSION, definition_path
+from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.backends.sim import CHANNELS
 from campaign.trial import ChannelInfo, Ending, Outcome
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from campaign.archive import ArchivedTrial, RunWriter
-from campaign.archive.files import PART, write_atomically
-from campaign.archive.journal import JOURNAL
-from campaign.archive.measured import Measured
+from campaign.archive.layout.files import PART, write_atomically
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.reading.measured import Measured
 from campaign.estimate import Estimate
 from campaign.trial import ChannelInfo, Ending, Outcome, SafeState, Trial
 from tests.archive.recorded_calls import Call, Calls, recorded

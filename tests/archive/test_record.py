@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.record import (
+from campaign.archive.layout.record import (
     PreviewRecord,
     SeriesRecord,
     TrialRecord,

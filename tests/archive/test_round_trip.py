@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.preview import PREVIEW_POINTS
-from campaign.archive.storage import CHUNK
+from campaign.archive.layout.storage import CHUNK
+from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.trial import Ending, Outcome, Role, SafeState
 
 

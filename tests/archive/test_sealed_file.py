@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.journal import JOURNAL, read_journal
-from campaign.archive.nexus import REQUIRED
-from campaign.archive.sealed_file import SealedFile
-from campaign.archive.verification import verify_run
+from campaign.archive.layout.journal import JOURNAL, read_journal
+from campaign.archive.verifying.verification import verify_run
+from campaign.archive.writing.nexus import REQUIRED
+from campaign.archive.writing.sealed_file import SealedFile
 from campaign.errors import ArchiveError
 from campaign.trial import ChannelInfo, Ending, Outcome, Role, SafeState
 from tests.archive.forging import sha256, text_of

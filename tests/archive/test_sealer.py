@@ -8,11 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, sealing
-from campaign.archive.journal import JOURNAL, TrialFinished, read_journal
-from campaign.archive.run_folder import SEALING
-from campaign.archive.sealed_file import SealedFile
-from campaign.archive.verification import verify_run
+from campaign.archive import RunStatus, RunWriter
+from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.run_folder import SEALING
+from campaign.archive.verifying.verification import verify_run
+from campaign.archive.writing import sealing
+from campaign.archive.writing.sealed_file import SealedFile
 from tests.archive.forging import canonical, sha256
 
 PROTOCOL = {"tests": [{"name": "map"}]}

@@ -13,13 +13,14 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run, sealed_file, sealing
-from campaign.archive import hdf5 as hdf5_module
-from campaign.archive.header import PARTIAL
-from campaign.archive.journal import JOURNAL, TrialFinished, read_journal
-from campaign.archive.run_folder import SEALING
-from campaign.archive.series import Series
-from campaign.archive.verification import verify_run
+from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.run_folder import SEALING
+from campaign.archive.reading.series import Series
+from campaign.archive.verifying.verification import verify_run
+from campaign.archive.writing import hdf5 as hdf5_module
+from campaign.archive.writing import sealed_file, sealing
 from campaign.errors import ArchiveError
 from campaign.trial import Ending, Outcome
 from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs
-from campaign.archive import resuming as resuming_module
-from campaign.archive.signature_file import (
+from campaign.archive.layout.signature_file import (
     LARGEST,
     read_signature,
     set_aside_signature,
     signature_path,
     write_signature,
 )
-from campaign.archive.statement import run_statement
+from campaign.archive.verifying.statement import run_statement
+from campaign.archive.writing import resuming as resuming_module
 from campaign.errors import ArchiveError, UsageError
 
 KEPT = Path(__file__).parent / "kept"

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from campaign.archive.storage import pack, unpack
+from campaign.archive.layout.storage import pack, unpack
 
 NOISE = np.random.default_rng(1).normal(size=1000)
 COUNT = len(NOISE)

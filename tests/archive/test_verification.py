@@ -9,9 +9,9 @@ import h5py
 import pytest
 
 from campaign.archive import RunWriter, open_run
-from campaign.archive.journal import JOURNAL
-from campaign.archive.verification import verify_run
-from campaign.archive.verification_result import PER_DATASET, STRUCTURE, UNFINISHED
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.verifying.result import PER_DATASET, STRUCTURE, UNFINISHED
+from campaign.archive.verifying.verification import verify_run
 from campaign.trial import Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 

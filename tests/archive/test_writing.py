@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from campaign.archive import RunWriter
-from campaign.archive.hdf5 import SampleColumns
-from campaign.archive.preview import Preview
-from campaign.archive.storage import CHUNK, pack
+from campaign.archive.layout.storage import CHUNK, pack
+from campaign.archive.writing.hdf5 import SampleColumns
+from campaign.archive.writing.preview import Preview
 from campaign.errors import BackendError
 from campaign.trial import ChannelInfo
 

@@ -218,7 +218,7 @@ def test_the_channels_are_known_without_a_sample_being_read(tmp_path, monkeypatc
     def unread(*arguments: object) -> None:
         raise AssertionError("samples were read")
 
-    monkeypatch.setattr("campaign.archive.series.Series.read", unread)
+    monkeypatch.setattr("campaign.archive.reading.series.Series.read", unread)
     with pytest.raises(AssertionError, match="samples were read"):
         open_run(path).trials[0].recording()
     assert len(announced) == 11

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.experiments import experiments
-from campaign.experiments.velocity_map_fits import MapFits, fit_map
-from campaign.experiments.velocity_map_points import points_of, steady
+from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.friction_map.points import points_of, steady
 from campaign.identification.stribeck import fit_stribeck, stribeck
 from campaign.physics.bench import Bench
 from campaign.physics.lanes import Lane

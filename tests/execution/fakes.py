@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive.journal import TrialsFollowed
-from campaign.archive.measured import Measure
+from campaign.archive.layout.journal import TrialsFollowed
+from campaign.archive.reading.measured import Measure
 from campaign.estimate import Estimate
 from campaign.trial import (
     ChannelInfo,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from campaign.archive.header import RunStatus
+from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.attendance import Attendance, SimulatedOperator
 from campaign.execution.batches import LOOK_AHEAD, Batches

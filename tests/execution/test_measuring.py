@@ -15,10 +15,10 @@ import pytest
 
 import campaign
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.journal import Decision
-from campaign.archive.storage import CHUNK
-from campaign.archive.story import read_lines
-from campaign.archive.verification import verify_run
+from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.storage import CHUNK
+from campaign.archive.layout.story import read_lines
+from campaign.archive.verifying.verification import verify_run
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import LOAD_RATE
 from campaign.cli.show import show_archive

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from campaign.archive.header import RunStatus
+from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
 from campaign.execution.attendance import Attendance, SimulatedOperator, wait_unless
 from campaign.execution.outcome import RunOutcome

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from campaign.archive.followed import trials_in
-from campaign.archive.header import RunStatus
+from campaign.archive.layout.followed import trials_in
+from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
 from campaign.execution.attendance import Attendance, SimulatedOperator
 from campaign.execution.outcome import RunOutcome

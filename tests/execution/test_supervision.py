@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from campaign.archive.archived_trial import ArchivedTrial
-from campaign.archive.header import RunStatus
-from campaign.archive.measured import Measure, Measured
+from campaign.archive.layout.header import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.measured import Measure, Measured
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome

@@ -12,7 +12,7 @@ import pytest
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import default_positions
-from campaign.experiments.breakaway_means import mean
+from campaign.experiments.results.breakaway_means import mean
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.result import Result

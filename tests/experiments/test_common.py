@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.experiments.common import with_changes
+from campaign.experiments.shared.common import with_changes
 from campaign.physics.bench import Bench
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from campaign.experiments import experiments
-from campaign.experiments.choices import nice
-from campaign.experiments.rig import Rig
-from campaign.experiments.velocity_map_runs import plan_run
+from campaign.experiments.friction_map.runs import plan_run
+from campaign.experiments.shared.choices import nice
+from campaign.experiments.shared.rig import Rig
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins, worst_friction

@@ -16,7 +16,7 @@ from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Systematic
 from campaign.execution.measuring import checked
 from campaign.experiments import experiments
-from campaign.experiments.friction_models import with_model
+from campaign.experiments.shared.friction_models import with_model
 from campaign.identification.sampled import LOST
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from campaign.experiments.hull_motion import SeriesMotion
-from campaign.experiments.motion_series import MOST_ROWS, kind_of, motion_signal, read_series
+from campaign.experiments.shared.hull_motion import SeriesMotion
+from campaign.experiments.shared.motion_series import MOST_ROWS, kind_of, motion_signal, read_series
 from campaign.experiments.stabilization import EXPERIMENT, StabilizationOptions
 from campaign.options import TextFile
 from campaign.physics.base_motion import base_rate

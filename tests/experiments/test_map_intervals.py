@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.friction_map.points import map_points, measure
 from campaign.experiments.interface import bench_of
-from campaign.experiments.velocity_map_fits import MapFits, fit_map
-from campaign.experiments.velocity_map_points import map_points, measure
 from campaign.physics.bench import Bench
 from campaign.result import Table
 from tests.experiments.laboratory import Done, analyse, execute, table_of_estimates, trials
@@ -188,7 +188,7 @@ def test_a_systematic_part_follows_the_torque_constant(monkeypatch: pytest.Monke
     """1 % of the torque constant is 1 % of every torque, and nothing of vs; J hardly counts."""
     known = {"motor.torque_constant": 0.01, "axis.inertia": 0.1}
     monkeypatch.setattr(
-        "campaign.experiments.systematic.known_uncertainty", lambda bench, path: known[path]
+        "campaign.experiments.shared.systematic.known_uncertainty", lambda bench, path: known[path]
     )
     estimates = fitted(1, told=True).estimates("free")["nominal"]
     static = estimates["static_torque"]

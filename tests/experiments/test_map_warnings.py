@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from campaign.experiments import experiments
-from campaign.experiments.velocity_map_pilot import PilotedMapOptions
-from campaign.experiments.velocity_map_runs import VelocityMapOptions
-from campaign.experiments.velocity_map_warnings import map_warnings
+from campaign.experiments.friction_map.pilot import PilotedMapOptions
+from campaign.experiments.friction_map.runs import VelocityMapOptions
+from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.physics.bench import Bench
 from campaign.protocol import load_protocol, make_plan
 from tests.physics.benches import Tree, bench

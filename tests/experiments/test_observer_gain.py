@@ -9,7 +9,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions
-from campaign.experiments.observer_metrics import Gain, Rejection, measured_corner
+from campaign.experiments.results.observer_metrics import Gain, Rejection, measured_corner
 from campaign.identification.sine_amplitude import amplitude
 from campaign.trial import Ending, Outcome
 from tests.experiments.laboratory import analyse, execute, finding, table, trials

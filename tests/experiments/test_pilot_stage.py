@@ -11,23 +11,23 @@ from functools import cached_property
 import numpy as np
 import pytest
 
-from campaign.experiments.interface import TestData
-from campaign.experiments.rig import Rig
-from campaign.experiments.velocity_map import EXPERIMENT
-from campaign.experiments.velocity_map_choice import choose
-from campaign.experiments.velocity_map_pilot import (
+from campaign.experiments.friction_map.choice import choose
+from campaign.experiments.friction_map.pilot import (
     FEWEST,
     SPEEDS,
     PilotedMapOptions,
     pilot_speeds,
 )
-from campaign.experiments.velocity_map_runs import (
+from campaign.experiments.friction_map.runs import (
     MEMORIES,
     map_speeds,
     plan_run,
     run_requests,
     settled_angle,
 )
+from campaign.experiments.interface import TestData
+from campaign.experiments.shared.rig import Rig
+from campaign.experiments.velocity_map import EXPERIMENT
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.true_values import stribeck_parameters

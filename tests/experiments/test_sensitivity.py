@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.experiments.results.sensitivity_results import Response, judge, ranking
 from campaign.experiments.sensitivity import EXPERIMENT, SensitivityOptions
-from campaign.experiments.sensitivity_results import Response, judge, ranking
 from campaign.identification.threshold import Threshold
 from campaign.trial import Channel, Recording
 from tests.experiments.laboratory import (

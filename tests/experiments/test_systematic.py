@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.systematic import (
+from campaign.experiments.shared.systematic import (
     INERTIA,
     TORQUE_CONSTANT,
     known_uncertainty,

@@ -7,10 +7,10 @@ import math
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.fitting import velocity_map
-from campaign.experiments.rig import Rig
-from campaign.experiments.velocity_map_points import MapPoint
-from campaign.experiments.velocity_map_runs import VelocityMapOptions
+from campaign.experiments.friction_map.points import MapPoint
+from campaign.experiments.friction_map.runs import VelocityMapOptions
+from campaign.experiments.shared.fitting import velocity_map
+from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
 from tests.experiments.laboratory import Tree, analyse, execute, finding, trials
 from tests.physics.benches import bench

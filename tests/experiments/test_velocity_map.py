@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from campaign.experiments.friction_map.runs import VelocityMapOptions, map_speeds, plan_run
 from campaign.experiments.velocity_map import EXPERIMENT
-from campaign.experiments.velocity_map_runs import VelocityMapOptions, map_speeds, plan_run
 from campaign.result import Result
 from campaign.trial import Role
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials

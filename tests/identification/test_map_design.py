@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from campaign.experiments import experiments
-from campaign.experiments.velocity_map_pilot import SPEEDS, pilot_speeds
-from campaign.experiments.velocity_map_runs import map_speeds
+from campaign.experiments.friction_map.pilot import SPEEDS, pilot_speeds
+from campaign.experiments.friction_map.runs import map_speeds
 from campaign.identification.map_design import (
     COUNTED,
     RIDGE,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.backends.sim import BACKEND, SimOptions
-from campaign.experiments.friction_models import with_model
+from campaign.experiments.shared.friction_models import with_model
 from campaign.physics.engine_version import ENGINE
 from campaign.protocol.bench_file import load_bench
 from campaign.signals import Polyline, Sine

@@ -9,7 +9,7 @@ import pytest
 
 from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.experiments import experiments
-from campaign.experiments.common import with_changes
+from campaign.experiments.shared.common import with_changes
 from campaign.protocol import (
     as_tree,
     check_limits,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import ArchivedTrial, PlannedTrial, RunHeader, RunReader, RunStatus
-from campaign.archive.full_plan import FullPlan
+from campaign.archive.layout.full_plan import FullPlan
 from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options

@@ -11,7 +11,7 @@ import pytest
 
 import campaign.report.besides
 from campaign.archive import ArchivedTrial, RunReader
-from campaign.archive.journal import (
+from campaign.archive.layout.journal import (
     Decision,
     OperatorStep,
     TrialFinished,

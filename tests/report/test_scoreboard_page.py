@@ -14,7 +14,7 @@ from types import ModuleType
 import pytest
 
 from campaign.archive import RunReader
-from campaign.archive.journal import RunResumed, TrialFinished
+from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Line, score
 from campaign.report.analysis import analyse_run, published_of

@@ -17,11 +17,11 @@ import pytest
 
 import campaign
 from campaign.archive import ArchivedTrial, RunWriter, find_run, open_run
-from campaign.archive.damage import Damage
-from campaign.archive.damage_words import in_one_line
-from campaign.archive.journal import Decision
-from campaign.archive.sound_samples import readable, without_damaged
-from campaign.archive.story import read_lines
+from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.story import read_lines
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import in_one_line
+from campaign.archive.reading.sound_samples import readable, without_damaged
 from campaign.errors import ArchiveError
 from campaign.export import exports
 from campaign.export.run_export import export_run

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import RunStatus, find_run, open_run
-from campaign.archive.listing import run_paths
+from campaign.archive.reading.listing import run_paths
 from tests.system.user import SEA, environment, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
@@ -26,8 +26,8 @@ TRIALS = 12
 # meets the run, and not the second in which Python starts.
 NURSERY = """
 import os, sys
-import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file
-import campaign.archive.sealing, campaign.archive.unsealing
+import campaign.cli.run, campaign.cli.resume, campaign.archive.writing.trial_file
+import campaign.archive.writing.sealing, campaign.archive.writing.unsealing
 import campaign.physics.simulate, campaign.backends.sim
 from campaign.cli import main
 for line in sys.stdin:

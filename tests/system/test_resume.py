@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import open_run
-from campaign.archive.journal import Decision, RunResumed, parse_journal
+from campaign.archive.layout.journal import Decision, RunResumed, parse_journal
 from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request

@@ -17,10 +17,10 @@ import pytest
 
 from campaign import signing
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.run_lock import RunLock
-from campaign.archive.signature_file import signature_path
-from campaign.archive.statement import run_statement
-from campaign.archive.verification import verify_run
+from campaign.archive.layout.signature_file import signature_path
+from campaign.archive.verifying.statement import run_statement
+from campaign.archive.verifying.verification import verify_run
+from campaign.archive.writing.run_lock import RunLock
 from campaign.backends import sim
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run

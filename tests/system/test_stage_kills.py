@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import RunStatus, find_run, open_run
-from campaign.archive.verification import verify_run
+from campaign.archive.verifying.verification import verify_run
 from tests.archive.test_resuming import content, documented_differences
 from tests.system.user import environment, write
 
@@ -59,10 +59,10 @@ STAGES = (11, 50)
 # is told, it is killed: before it is written, after half of it, or when it is on the disk.
 NURSERY = """
 import os, signal, sys
-import campaign.cli.run, campaign.cli.resume, campaign.archive.trial_file
-import campaign.archive.sealing, campaign.archive.unsealing
+import campaign.cli.run, campaign.cli.resume, campaign.archive.writing.trial_file
+import campaign.archive.writing.sealing, campaign.archive.writing.unsealing
 import campaign.physics.simulate, campaign.backends.sim
-from campaign.archive.journal import Journal
+from campaign.archive.layout.journal import Journal
 from campaign.cli import main
 
 def dies(where, number):

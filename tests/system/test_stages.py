@@ -11,7 +11,7 @@ import pytest
 
 import campaign as program
 from campaign.archive import RunReader, find_run, open_run
-from campaign.archive.verification import verify_run
+from campaign.archive.verifying.verification import verify_run
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run

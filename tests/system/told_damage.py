@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 import campaign
 from campaign.archive import RunReader, find_run, open_run
-from campaign.archive.journal import Decision
-from campaign.archive.story import read_lines
+from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.story import read_lines
 from campaign.cli.bench_commands import app
 from campaign.errors import ArchiveError, CampaignError
 from campaign.trial import Recording

@@ -1,0 +1,43 @@
+"""What the groups and files of trials are called.
+
+NeXus allows no hyphen in a name, so the trial that is called `trial-00017` has the group
+`trial_00017`. Of several attempts the last one has that name in a sealed run; an attempt that a
+later one replaced is `trial_00017_attempt_1`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.journal import TrialFinished
+
+ENTRY = re.compile(r"trial_([0-9]{5,10})(?:_attempt_([0-9]{1,6}))?")
+
+
+def entry_name(trial_number: int) -> str:
+    """Name of a trial's group."""
+    return f"trial_{trial_number:05d}"
+
+
+def earlier_entry_name(trial_number: int, attempt: int) -> str:
+    """Name, in a sealed run, of an attempt that a later one replaced."""
+    return f"{entry_name(trial_number)}_attempt_{attempt}"
+
+
+def file_name(trial_number: int, attempt: int) -> str:
+    """Name of a trial's file: `trial-00017.nxs`, and `trial-00017-2.nxs` for a second attempt."""
+    return f"trial-{trial_number:05d}{f'-{attempt}' if attempt > 1 else ''}{SEALED}"
+
+
+def entry_names(attempts: Iterable[TrialFinished]) -> dict[str, TrialFinished]:
+    """Every finished attempt by the name of its group in a sealed run, in the order of trials."""
+    known = sorted(attempts, key=lambda finished: (finished.trial, finished.attempt))
+    last = {finished.trial: finished.attempt for finished in known}
+    return {
+        entry_name(each.trial)
+        if each.attempt == last[each.trial]
+        else earlier_entry_name(each.trial, each.attempt): each
+        for each in known
+    }

@@ -1,0 +1,99 @@
+"""Every planned trial, whole: what a run would have executed can be rebuilt to the last digit.
+
+Benches and options come again and again in a plan, so they are kept once each (`plan-trees.jsonl`),
+under the SHA-256 of their canonical JSON, and the trials (`plan-trials.jsonl`) name them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from campaign.archive.layout.files import write_lines_atomically
+from campaign.archive.layout.followed import trials_in
+from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.record import parse_trees, restored_trial, shared_trees, trees_text
+from campaign.archive.layout.run_folder import first_line
+from campaign.errors import ArchiveError
+from campaign.trial import Tree, Trial, canonical_json
+
+PLAN_TRIALS = "plan-trials.jsonl"
+PLAN_TREES = "plan-trees.jsonl"
+
+
+def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:
+    """Write both files into a run's folder, line by line."""
+    trees: dict[str, Tree] = {}
+
+    def lines() -> Iterator[str]:
+        for trial in trials:
+            described, own = shared_trees(trial)
+            trees.update(own)
+            yield canonical_json(described) + "\n"
+
+    write_lines_atomically(folder / PLAN_TRIALS, lines())
+    write_lines_atomically(folder / PLAN_TREES, [trees_text(trees)])
+
+
+@dataclass(frozen=True)
+class FullPlan:
+    """The planned trials of a run; they are read when they are asked for.
+
+    Attributes:
+        path: of the run, for messages.
+        texts: reads the two files; empty texts in an archive of format 1. Raises ArchiveError.
+        stages: of the journal; their trials come after those of the two files.
+    """
+
+    path: Path
+    texts: Callable[[], tuple[str, str]] = field(repr=False)
+    stages: tuple[TrialsFollowed, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def _both(self) -> tuple[str, str]:
+        return self.texts()
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self._both[0].splitlines()
+
+    @cached_property
+    def _trees(self) -> dict[str, Tree]:
+        try:
+            return parse_trees(self._both[1])
+        except ValueError as error:
+            raise ArchiveError(f"{self.path}: {PLAN_TREES}: {error}") from None
+
+    @cached_property
+    def _followed(self) -> dict[int, Trial]:
+        try:
+            return {trial.number: trial for trial in trials_in(self.stages)}
+        except (ValueError, TypeError) as error:
+            raise ArchiveError(f"{self.path}: {JOURNAL}: {first_line(error)}") from None
+
+    def __len__(self) -> int:
+        return len(self._lines) + sum(len(stage.trials) for stage in self.stages)
+
+    def trial(self, number: int) -> Trial:
+        """The planned trial `number`, from 1. Raises ArchiveError when it cannot be rebuilt."""
+        if self.stages and number > len(self._lines) and number in self._followed:
+            return self._followed[number]
+        if not 1 <= number <= len(self._lines):
+            raise ArchiveError(f"{self.path}: the plan has no trial {number}")
+        try:
+            trial = restored_trial(json.loads(self._lines[number - 1]), self._trees)
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
+            raise self._damaged(PLAN_TRIALS, number, first_line(error)) from None
+        if trial.number != number:
+            raise self._damaged(PLAN_TRIALS, number, f"holds trial number {trial.number}")
+        return trial
+
+    def trials(self) -> Iterable[Trial]:
+        """All of them, in order, one at a time."""
+        return (self.trial(number) for number in range(1, len(self) + 1))
+
+    def _damaged(self, name: str, line: int, what: str) -> ArchiveError:
+        return ArchiveError(f"{self.path}: {name}, line {line}: {what}")

@@ -1,0 +1,322 @@
+"""The journal of a run in progress: the truth about what finished.
+
+One JSON object per line, appended and synced before anybody is told. A kill can tear the last line
+only; a torn line was never reported, so a reader leaves it out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    field_serializer,
+)
+
+from campaign.archive.layout.files import why
+from campaign.archive.layout.header import PlannedTrial, RunStatus
+from campaign.errors import ArchiveError
+from campaign.estimate import Estimate
+from campaign.trial import Outcome, SafeState, Tree, canonical_json
+
+JOURNAL = "journal.jsonl"
+
+_ESTIMATE = TypeAdapter(Estimate)
+
+
+class _Line(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class RunStarted(_Line):
+    """The first line."""
+
+    event: Literal["run started"] = "run started"
+    at: str
+    run: str
+    format: int
+    trials: int
+
+
+class RunResumed(_Line):
+    """Somebody goes on with a run that was interrupted or killed; what follows is theirs.
+
+    `changes` are the differences to what the run began with, as they were shown and accepted.
+    """
+
+    event: Literal["run resumed"] = "run resumed"
+    at: str
+    host: dict[str, str] = {}
+    versions: dict[str, str] = {}
+    command: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
+
+
+class OperatorStep(_Line):
+    """A person was asked to do something to the bench, and what they answered."""
+
+    event: Literal["operator step"] = "operator step"
+    at: str
+    trial: int = Field(ge=1)
+    step: str
+    answer: str
+
+
+class Decision(_Line):
+    """What the run did besides its plan: a retry, a skipped trial, an abort, a rest ..."""
+
+    event: Literal["decision"] = "decision"
+    at: str
+    trial: int | None = None
+    decision: str = Field(pattern=r"^[a-z -]{1,40}$")
+    reason: str
+
+
+class FollowedTrial(PlannedTrial):
+    """A trial of a stage: its line of the plan, and all of it as in `plan-trials.jsonl`."""
+
+    trial: Tree
+
+
+class TrialRefused(_Line):
+    """A trial of a stage that may not be executed, and why."""
+
+    label: str
+    why: str
+
+
+class TrialsFollowed(_Line):
+    """A stage of a test was asked, at one point of its matrix, which trials follow.
+
+    Attributes:
+        stage: its number; 1 are the planned trials.
+        trials: those that are executed, numbered after all that were known before.
+        trees: benches and options that they name, by digest.
+        reason: why there are none, where the stage itself failed.
+    """
+
+    event: Literal["trials followed"] = "trials followed"
+    at: str
+    test: str
+    stage: int = Field(ge=2)
+    name: str
+    point: Tree = {}
+    reason: str = ""
+    trials: tuple[FollowedTrial, ...] = ()
+    trees: dict[str, Tree] = {}
+    refused: tuple[TrialRefused, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """For people: `sweep at compensation = none, stage 2 (refinement)`."""
+        point = ", ".join(f"{path} = {value}" for path, value in self.point.items())
+        return f"{self.test}{f' at {point}' if point else ''}, stage {self.stage} ({self.name})"
+
+
+class TrialFinished(_Line):
+    """A trial ended, however it ended, and its file is on the disk under its real name.
+
+    `record` is the digest of the trial's record; before format 3 there was none.
+    """
+
+    event: Literal["trial finished"] = "trial finished"
+    at: str
+    trial: int = Field(ge=1)
+    attempt: int = Field(default=1, ge=1)
+    file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs$")
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    record: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
+    bytes: int = Field(ge=0)
+    outcome: Outcome
+    reason: str
+    safe_state: SafeState
+
+
+class TrialMeasured(_Line):
+    """What a recording says by itself, found once its trial was on the disk.
+
+    Attributes:
+        record: digest of the trial's record, which names the samples: of them it is said.
+        by: which code found it, with its version.
+        estimates: each finite, and of another name than the others.
+    """
+
+    event: Literal["trial measured"] = "trial measured"
+    at: str
+    trial: int = Field(ge=1)
+    attempt: int = Field(default=1, ge=1)
+    record: str = Field(pattern=r"^[0-9a-f]{64}$")
+    by: str
+    estimates: tuple[Estimate, ...]
+
+    @field_serializer("estimates")
+    def _as_in_a_record(self, estimates: tuple[Estimate, ...]) -> list[Tree]:
+        """What would say its default is left out."""
+        return [_ESTIMATE.dump_python(e, mode="json", exclude_defaults=True) for e in estimates]
+
+
+class TrialAbandoned(_Line):
+    """A trial was begun and nothing of it is kept."""
+
+    event: Literal["trial abandoned"] = "trial abandoned"
+    at: str
+    trial: int = Field(ge=1)
+    reason: str
+
+
+class RunEnded(_Line):
+    """The run was closed and is being, or has been, sealed; only a resume may follow."""
+
+    event: Literal["run ended"] = "run ended"
+    at: str
+    status: RunStatus
+    reason: str
+    safe_state: SafeState
+
+
+Entry = Annotated[
+    RunStarted
+    | RunResumed
+    | OperatorStep
+    | Decision
+    | TrialsFollowed
+    | TrialFinished
+    | TrialMeasured
+    | TrialAbandoned
+    | RunEnded,
+    Field(discriminator="event"),
+]
+_ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
+
+
+def utc_now() -> str:
+    """The wall clock as a journal keeps it: ISO 8601, UTC, to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+class Journal:
+    """Appends lines; each is on the disk when `append` returns. Safe to share between threads."""
+
+    def __init__(self, path: Path, *, whole: int | None = None) -> None:
+        """`whole`: bytes of whole lines there are; what follows was torn by a crash, and is cut."""
+        self._path = path
+        self._lock = threading.Lock()
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        if whole is not None:
+            os.ftruncate(self._descriptor, whole)
+            os.fsync(self._descriptor)
+
+    def append(self, entry: Entry) -> None:
+        """Add one line. Raises ArchiveError, leaving the journal as it was, when that fails."""
+        line = canonical_json(entry.model_dump(mode="json")).encode() + b"\n"
+        with self._lock:
+            before = os.fstat(self._descriptor).st_size
+            try:
+                written = os.write(self._descriptor, line)
+                if written < len(line):
+                    raise OSError("no space for a whole line")
+                os.fsync(self._descriptor)
+            except OSError as error:
+                os.ftruncate(self._descriptor, before)
+                raise ArchiveError(f"{self._path}: cannot be written: {why(error)}") from None
+
+    def close(self) -> None:
+        with self._lock:
+            if self._descriptor >= 0:
+                os.close(self._descriptor)
+                self._descriptor = -1
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a journal tells.
+
+    Attributes:
+        started: its first line.
+        finished: by trial number, in the order of their numbers; a trial's last attempt counts.
+        earlier: by trial number, the attempts before that, in the order they were made.
+        ended: None when the run is still in progress or was killed.
+        entries: all of it, in order.
+        text: the whole lines, verbatim.
+    """
+
+    started: RunStarted
+    finished: dict[int, TrialFinished]
+    earlier: dict[int, tuple[TrialFinished, ...]]
+    ended: RunEnded | None
+    entries: tuple[Entry, ...]
+    text: str
+
+    @property
+    def files(self) -> list[TrialFinished]:
+        """Every attempt that is kept, in the order of the trials' numbers."""
+        kept = self.finished.items()
+        return [one for number, last in kept for one in (*self.earlier.get(number, ()), last)]
+
+
+def read_journal(path: Path) -> Story:
+    """Read a journal. Raises ArchiveError naming the line that cannot be understood."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+    return parse_journal(path, content)
+
+
+def parse_journal(path: Path, content: bytes) -> Story:
+    """What a journal tells; `path` is for messages."""
+    lines = content.split(b"\n")[:-1]  # what follows the last line's end was never reported
+    return _tell(path, lines)
+
+
+def _tell(path: Path, lines: list[bytes]) -> Story:
+    entries = list(_parse(path, lines))
+    if not entries or not isinstance(entries[0], RunStarted):
+        raise ArchiveError(f"{path}: does not begin with the start of a run")
+    attempts: dict[int, dict[str, TrialFinished]] = {}
+    for entry in entries:
+        if isinstance(entry, TrialFinished):
+            of_trial = attempts.setdefault(entry.trial, {})
+            of_trial.pop(entry.file, None)
+            of_trial[entry.file] = entry
+    kept = {number: list(attempts[number].values()) for number in sorted(attempts)}
+    text = b"".join(line + b"\n" for line in lines[: len(entries)]).decode()
+    return Story(
+        started=entries[0],
+        finished={number: of_trial[-1] for number, of_trial in kept.items()},
+        earlier={n: tuple(of_trial[:-1]) for n, of_trial in kept.items() if len(of_trial) > 1},
+        ended=_end(entries),
+        entries=tuple(entries),
+        text=text,
+    )
+
+
+def _end(entries: list[Entry]) -> RunEnded | None:
+    """How the run ended, unless it was resumed since."""
+    for entry in reversed(entries):
+        if isinstance(entry, RunEnded):
+            return entry
+        if isinstance(entry, RunResumed):
+            return None
+    return None
+
+
+def _parse(path: Path, lines: list[bytes]) -> Iterable[Entry]:
+    for number, line in enumerate(lines, start=1):
+        try:
+            yield _ENTRY.validate_python(json.loads(line))
+        except (ValidationError, ValueError, RecursionError):
+            if number == len(lines):  # a power cut may leave a last line of rubbish
+                return
+            raise ArchiveError(f"{path}:{number}: is not a line of a journal") from None

@@ -1,0 +1,275 @@
+"""What an archive keeps of a trial besides its samples, as one text.
+
+The record names every series that was recorded, with its unit and the digest of its samples, so the
+digest of the record vouches for all of the trial, wherever its samples lie and whether they were
+kept at all. Benches and options come again and again, so a record names them by their SHA-256 and
+they stand in `trees`, once each.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
+
+from campaign.archive.layout.checksums import text_digest
+from campaign.estimate import Estimate, Window
+from campaign.trial import (
+    ChannelInfo,
+    Ending,
+    Event,
+    Fault,
+    Outcome,
+    SafeState,
+    Tree,
+    Trial,
+    canonical_json,
+)
+
+SHARED = ("bench", "options")
+"""Fields of a trial that stand in `trees`."""
+
+Trees = Mapping[str, Tree]
+"""Benches and options by the SHA-256 of their canonical JSON."""
+
+_ESTIMATE = TypeAdapter(Estimate)
+_TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
+_DETERMINING = ("bench", "task", "seed")
+
+
+class _Part(BaseModel):
+    """Frozen, and tolerant of fields that a later program added."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class SeriesRecord(_Part):
+    """A recorded channel: what there is to say of it, and the digest of its samples."""
+
+    name: str
+    unit: str
+    label: str
+    display_unit: str
+    measured: bool = True
+    own_rate: float | None = None
+    sha256: str
+
+    @classmethod
+    def of(cls, channel: ChannelInfo, sha256: str) -> Self:
+        return cls(**vars(channel), sha256=sha256)
+
+    @property
+    def info(self) -> ChannelInfo:
+        return ChannelInfo(
+            self.name, self.unit, self.label, self.display_unit, self.measured, self.own_rate
+        )
+
+
+class PreviewRecord(_Part):
+    """The digests of a long recording's preview: its times, and one channel."""
+
+    channel: str
+    samples: int = Field(ge=0)
+    time: str
+    values: str
+
+
+class EventRecord(_Part):
+    """Something that happened, at the trial's own time (s)."""
+
+    time: float
+    text: str
+
+
+class TrialRecord(_Part):
+    """A trial as it was executed.
+
+    Attributes:
+        trial: the resolved trial, with the digest of a tree in place of each of `SHARED`.
+        label: of the trial, for people.
+        fingerprint: `Trial.fingerprint`, when it was executed.
+        attempt: how often the trial had been executed with this one, from 1.
+        started, ended: ISO 8601.
+        samples: length of every series; None when no channel was announced.
+        time: digest of the time base.
+        windows: parts that an analysis uses, where they are not the one in `trial`.
+        estimates: numbers that were found while it ran, each with its interval.
+        measured_by: which code found them, with its version.
+    """
+
+    trial: Tree
+    label: str
+    fingerprint: str
+    attempt: int = Field(ge=1)
+    started: str
+    ended: str
+    outcome: Outcome
+    reason: str
+    safe_state: SafeState
+    fault: Fault | None = None
+    telemetry: Tree = {}
+    samples: int | None = Field(default=None, ge=0)
+    time: str = ""
+    channels: tuple[SeriesRecord, ...] = ()
+    preview: PreviewRecord | None = None
+    events: tuple[EventRecord, ...] = ()
+    windows: tuple[Window, ...] = ()
+    estimates: tuple[Estimate, ...] = ()
+    measured_by: str = ""
+
+    @property
+    def mode(self) -> str:
+        """What the bench did: `Task.mode`."""
+        task = self.trial["task"]
+        return str(task["mode"]) if isinstance(task, dict) else ""
+
+    @property
+    def number(self) -> int:
+        return int(self.trial["number"])  # type: ignore[arg-type]
+
+    @property
+    def tree_names(self) -> frozenset[str]:
+        """The digests of the trees that it needs."""
+        return frozenset(str(self.trial[name]) for name in SHARED)
+
+    @property
+    def ending(self) -> Ending:
+        return Ending(self.outcome, self.reason, self.safe_state, self.fault, self.telemetry)
+
+    @property
+    def series(self) -> tuple[ChannelInfo, ...]:
+        """The channels as they were announced."""
+        return tuple(channel.info for channel in self.channels)
+
+    def restored(self, trees: Trees) -> Trial:
+        """The trial itself. Raises LookupError when a tree is missing, ValueError."""
+        return restored_trial(self.trial, trees)
+
+    def fingerprint_of(self, trees: Trees) -> str:
+        """The fingerprint of the trial as it was stored.
+
+        `Trial.fingerprint` would be another one as soon as a later program gives a trial a further
+        field, with a default that old archives do not have.
+        """
+        tree = {**self.trial, **{name: trees[str(self.trial[name])] for name in SHARED}}
+        truth = {"truth": tree["truth"]} if tree.get("truth") else {}
+        return text_digest(canonical_json({name: tree[name] for name in _DETERMINING} | truth))
+
+    @cached_property
+    def text(self) -> str:
+        """As it is archived: canonical JSON. Optional fields that say nothing are left out."""
+        tree = self.model_dump(mode="json", exclude_defaults=True)
+        return canonical_json(tree)
+
+    @property
+    def sha256(self) -> str:
+        return text_digest(self.text)
+
+
+def restored_trial(described: Tree, trees: Trees) -> Trial:
+    """A trial from what `shared_trees` made of it. Raises LookupError, ValueError."""
+    own: dict[str, JsonValue] = {**described, **{name: {} for name in SHARED}}
+    shared = {name: trees[str(described[name])] for name in SHARED}
+    # The trees were checked against their digests, and validating them again costs most.
+    return Trial.model_validate(own).model_copy(update=shared)
+
+
+def shared_trees(trial: Trial) -> tuple[Tree, dict[str, Tree]]:
+    """A trial with digests in place of its trees, and those trees by their digests."""
+    described = trial.model_dump(mode="json")
+    trees = {}
+    for name in SHARED:
+        tree = described[name]
+        described[name] = text_digest(canonical_json(tree))
+        trees[described[name]] = tree
+    return described, trees
+
+
+def trees_text(trees: Trees) -> str:
+    """Trees as JSON lines, in the order of their digests."""
+    return "".join(
+        f'{{"sha256":"{digest}","tree":{canonical_json(tree)}}}\n'
+        for digest, tree in sorted(trees.items())
+    )
+
+
+def parse_trees(text: str) -> dict[str, Tree]:
+    """Trees from JSON lines, each held against its digest. Raises ValueError naming a bad line."""
+    trees = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        match = _TREE.fullmatch(line)
+        # The text of a tree is hashed as it stands: what was written is canonical.
+        if match is None or text_digest(match[2]) != match[1]:
+            raise ValueError(f"line {number} does not match its digest")
+        trees[match[1]] = json.loads(match[2])
+    return trees
+
+
+def make_record(
+    trial: Tree,
+    label: str,
+    fingerprint: str,
+    attempt: int,
+    ending: Ending,
+    times: tuple[str, str],
+    events: Iterable[Event],
+    *,
+    series: tuple[int, str, Sequence[SeriesRecord]] | None,
+    preview: PreviewRecord | None = None,
+    windows: Iterable[Window] = (),
+    estimates: Iterable[Estimate] = (),
+) -> TrialRecord:
+    """The record of a trial that has ended.
+
+    Args:
+        trial: with digests in place of its trees: `shared_trees`.
+        label, fingerprint, attempt: see `TrialRecord`.
+        ending: how it ended.
+        times: when it started and ended, ISO 8601.
+        events: what happened meanwhile.
+        series: length of the recording, digest of its time base, and its channels.
+        preview, windows, estimates: see `TrialRecord`.
+    """
+    samples, time, channels = series or (None, "", ())
+    return TrialRecord(
+        trial=trial,
+        label=label,
+        fingerprint=fingerprint,
+        attempt=attempt,
+        started=times[0],
+        ended=times[1],
+        outcome=ending.outcome,
+        reason=ending.reason,
+        safe_state=ending.safe_state,
+        fault=ending.fault,
+        telemetry=plain(ending.telemetry),
+        samples=samples,
+        time=time,
+        channels=tuple(channels),
+        preview=preview,
+        events=tuple(EventRecord(time=float(e.time), text=e.text) for e in events),
+        windows=tuple(windows),
+        estimates=tuple(_ESTIMATE.validate_python(plain(asdict(e))) for e in estimates),
+    )
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON has it: what a backend measured of itself must not cost the trial."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    return str(value)

@@ -1,0 +1,89 @@
+"""The text files in the folder of a run in progress."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from campaign.archive.layout.files import why
+from campaign.archive.layout.header import FORMAT, PlannedTrial, RunHeader
+from campaign.errors import ArchiveError
+from campaign.trial import canonical_json
+
+HEADER = "run.json"
+PLAN = "plan.jsonl"
+SEALING = "sealed.nxs.part"
+"""The sealed file while it grows."""
+
+
+def read_header(folder: Path) -> RunHeader:
+    """The header of a run in progress. Raises ArchiveError when there is none."""
+    path = folder / HEADER
+    try:
+        document = json.loads(_read(path))
+        check_format(path, int(document["format"]))
+        return RunHeader.model_validate(document["header"])
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
+
+
+def read_format(folder: Path) -> int:
+    """The version of the format in which a run was begun."""
+    path = folder / HEADER
+    try:
+        return int(json.loads(_read(path))["format"])
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
+
+
+def header_document(header: RunHeader) -> str:
+    """The content of `run.json`."""
+    return canonical_json({"format": FORMAT, "header": header.model_dump(mode="json")}) + "\n"
+
+
+def read_plan_text(folder: Path) -> str:
+    """The plan as JSON lines."""
+    return _read(folder / PLAN)
+
+
+def read_optional(path: Path) -> str:
+    """A text file that earlier formats do not have; then empty."""
+    return _read(path) if path.exists() else ""
+
+
+def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
+    """The planned trials, in order. Raises ArchiveError naming the line that is wrong."""
+    trials = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            trials.append(PlannedTrial.model_validate_json(line))
+        except ValidationError as error:
+            raise ArchiveError(f"{path}: plan, line {number}: {first_line(error)}") from None
+    return tuple(trials)
+
+
+def check_format(path: Path, version: int) -> None:
+    """ArchiveError when the archive is newer than this program."""
+    if not 1 <= version <= FORMAT:
+        raise ArchiveError(
+            f"{path}: has format {version}; this program reads up to {FORMAT}. Use a newer one"
+        )
+
+
+def first_line(error: Exception) -> str:
+    """What went wrong in a line; for pydantic the first field and its problem."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False)[0]
+        return f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
+    return why(error)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ArchiveError(f"{path}: is not text") from None

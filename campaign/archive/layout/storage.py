@@ -1,0 +1,57 @@
+"""How values lie in a file: the form of a sample, chunks and their compression, texts, digests."""
+
+from __future__ import annotations
+
+import numpy as np
+from isal import isal_zlib
+from numpy.typing import NDArray
+
+from campaign.archive.layout.checksums import BLOCK
+
+Array = NDArray[np.float64]
+
+CHUNK = BLOCK
+"""Samples per chunk, as many as a block of `checksums` has. A power of two (see `preview`); deflate
+looks back 32 768 bytes, which is a byte of each of so many samples: shorter chunks compress worse,
+longer ones hardly better."""
+
+CHECKSUM = "sha256"
+"""Attribute of every text and number: SHA-256 of its raw bytes, little endian (text: UTF-8).
+Samples have theirs in their trial's record."""
+
+SAMPLE = np.dtype("<f8")
+
+LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
+
+
+def storable(text: str) -> str:
+    """A text as it can be stored: zeros pad one there, so none can be part of it."""
+    return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
+
+
+def pack(samples: Array, shuffled: bool) -> bytes:
+    """A chunk as HDF5's deflate filter would leave it, behind its shuffle filter or without."""
+    raw = samples.view(np.uint8)
+    raw = raw.reshape(-1, samples.itemsize).T if shuffled else raw
+    packed: bytes = isal_zlib.compress(raw.tobytes(), LEVEL)
+    return packed
+
+
+def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
+    """The `count` samples of a chunk that `pack` made; None when it holds something else.
+
+    No more memory is taken than so many samples need, whatever the chunk would expand to.
+    """
+    size = count * SAMPLE.itemsize
+    inflating = isal_zlib.decompressobj()
+    try:
+        raw = inflating.decompress(packed, size)
+        more = b"" if inflating.eof else inflating.decompress(b"", 1)
+    except isal_zlib.error:  # type: ignore[misc] # its types call the class an instance
+        return None
+    if len(raw) != size or more or not inflating.eof or inflating.unused_data:
+        return None
+    if not shuffled:
+        return np.frombuffer(raw, dtype=SAMPLE)
+    planes = np.frombuffer(raw, dtype=np.uint8).reshape(SAMPLE.itemsize, count)
+    return np.ascontiguousarray(planes.T).view(SAMPLE).reshape(count)

@@ -1,0 +1,88 @@
+"""What can still be learnt from a journal of which lines are damaged, and what its lines mean."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from campaign.archive.layout.journal import Entry, RunEnded, RunResumed, RunStarted, TrialFinished
+
+_ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
+_Kind = TypeVar("_Kind", bound=Entry)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A journal, read line by line.
+
+    Attributes:
+        entries: the lines that can be understood, in order.
+        damaged: numbers, from 1, of those that cannot.
+        torn: whether a last line was begun and never reported, which is no damage.
+        text: the lines that were reported, damaged ones included.
+    """
+
+    entries: tuple[Entry, ...]
+    damaged: tuple[int, ...]
+    torn: bool
+    text: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether it begins as a journal does, and every line can be understood."""
+        begins = bool(self.entries) and isinstance(self.entries[0], RunStarted)
+        return begins and not self.damaged and not self.torn
+
+    @property
+    def finished(self) -> dict[int, TrialFinished]:
+        """By trial, in the order of their numbers; of several attempts the last one counts."""
+        return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
+
+    @property
+    def attempts(self) -> list[TrialFinished]:
+        """Every finished attempt, in the order they finished; a line that was repeated once."""
+        return list({(e.trial, e.attempt): e for e in self.all(TrialFinished)}.values())
+
+    @property
+    def ended(self) -> RunEnded | None:
+        """How the run ended; None while it is in progress, or when it was resumed since."""
+        for entry in reversed(self.entries):
+            if isinstance(entry, RunEnded):
+                return entry
+            if isinstance(entry, RunResumed):
+                return None
+        return None
+
+    def all(self, kind: type[_Kind]) -> list[_Kind]:
+        """The lines of one kind."""
+        return [entry for entry in self.entries if isinstance(entry, kind)]
+
+
+def read_lines(content: bytes) -> Lines:
+    """Read a journal, whatever is left of it."""
+    *lines, rest = content.split(b"\n")
+    read = [_parse(line) for line in lines]
+    torn = bool(rest)
+    if read and read[-1] is None:  # a power cut may leave a last line of rubbish
+        lines, read, torn = lines[:-1], read[:-1], True
+    return Lines(
+        entries=tuple(_known(read)),
+        damaged=tuple(n for n, entry in enumerate(read, start=1) if entry is None),
+        torn=torn,
+        text=b"".join(line + b"\n" for line in lines).decode("utf-8", "replace"),
+    )
+
+
+def _known(read: Iterable[Entry | None]) -> Iterable[Entry]:
+    return (entry for entry in read if entry is not None)
+
+
+def _parse(line: bytes) -> Entry | None:
+    try:
+        return _ENTRY.validate_python(json.loads(line))
+    except (ValidationError, ValueError, RecursionError):
+        return None

@@ -1,0 +1,113 @@
+"""Reading the folder of a run in progress, or of one that was killed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
+from campaign.archive.layout.files import why
+from campaign.archive.layout.followed import planned_in, stages_in
+from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
+from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
+from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
+from campaign.archive.layout.run_folder import (
+    PLAN,
+    parse_plan,
+    read_format,
+    read_header,
+    read_optional,
+    read_plan_text,
+)
+from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.measured import measured_in, with_metrics
+from campaign.archive.reading.run_reader import RunReader
+from campaign.errors import ArchiveError
+from campaign.trial import SafeState
+
+
+def open_folder(folder: Path) -> RunReader:
+    """The run of a folder, as far as its journal tells. Raises ArchiveError when it is none."""
+    if folder.suffix != PARTIAL:
+        raise ArchiveError(f"{folder}: is a folder, but not that of a run in progress")
+    header = read_header(folder)
+    damaged = DamageList(folder)
+    story = _story(folder, damaged)
+    old = read_format(folder) <= 2
+    measured = measured_in(story.entries)
+    trials: list[ArchivedTrial] = []
+    earlier: dict[int, list[ArchivedTrial]] = {}
+    for entry, finished in entry_names(story.attempts).items():
+        with damaged.noting():
+            archived = _read_trial(folder / finished.file, finished, entry, old)
+            archived = with_metrics(archived, measured.get(finished.record))
+            if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
+                earlier.setdefault(finished.trial, []).append(archived)
+            else:
+                trials.append(archived)
+    ended = story.ended
+    planned: tuple[PlannedTrial, ...] = damaged.read(
+        lambda: parse_plan(folder / PLAN, read_plan_text(folder)), ()
+    )
+    stages = stages_in(story.entries)
+    return RunReader(
+        path=folder,
+        header=header,
+        status=ended.status if ended else RunStatus.INCOMPLETE,
+        reason=ended.reason if ended else "the run is in progress or was killed",
+        safe_state=ended.safe_state if ended else SafeState.NOT_CONFIRMED,
+        ended=ended.at if ended else "",
+        plan=planned + planned_in(stages),
+        trials=tuple(trials),
+        journal=story.text,
+        full_plan=FullPlan(folder, lambda: _plan_texts(folder), stages),
+        damaged=tuple(damaged.found),
+        earlier_attempts={number: tuple(found) for number, found in earlier.items()},
+        stages=stages,
+    )
+
+
+def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") -> ArchivedTrial:
+    """The trial in a file of its own, which must be the one that the journal tells of.
+
+    `sealed_as` is the group that it becomes when the run is sealed.
+    """
+    from campaign.archive.reading import guarded
+    from campaign.archive.reading.recorded import archived_trial
+    from campaign.archive.reading.sealed import read_entry
+
+    name = entry_name(finished.trial)
+    with guarded.open_file(path) as file, guarded.guarded(path, f"/{name}"):
+        record, trees = read_entry(path, file, name, finished.record)
+        kept = guarded.inner_group(guarded.inner_group(file, name), "record")
+        not_kept = guarded.text_at(kept, "not_kept") if "not_kept" in kept else ""
+        return archived_trial(path, name, record, trees, not_kept, sealed_as)
+
+
+def _read_trial(path: Path, finished: TrialFinished, entry: str, old: bool) -> ArchivedTrial:
+    if not old:
+        return read_trial_file(path, finished, entry)
+    from campaign.archive.reading.format_2.trials import read_trial_file as read_old_trial_file
+
+    return read_old_trial_file(path, finished.trial)
+
+
+def _plan_texts(folder: Path) -> tuple[str, str]:
+    return read_optional(folder / PLAN_TRIALS), read_optional(folder / PLAN_TREES)
+
+
+def _story(folder: Path, damaged: DamageList) -> Lines:
+    story = read_lines(damaged.read(lambda: _bytes(folder / JOURNAL), b""))
+    for number in story.damaged:
+        damaged.add(f"{JOURNAL}:{number}", "is not a line of a journal")
+    if not story.all(RunStarted) and not damaged.found:
+        damaged.add(JOURNAL, "does not tell of the start of the run")
+    return story
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None

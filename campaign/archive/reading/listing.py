@@ -1,0 +1,88 @@
+"""Which runs a results folder has, and which one a user means."""
+
+from __future__ import annotations
+
+import re
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from campaign.archive.layout.header import PARTIAL, SEALED
+from campaign.archive.reading.index import Index
+from campaign.archive.reading.summary import RunSummary
+from campaign.errors import UsageError
+
+_DATED = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}-\d{2}-\d{2}-")
+
+
+def list_runs(results: Path) -> list[RunSummary]:
+    """Every run in `results`, oldest first; a bad file is listed with its problem.
+
+    Runs that are as they were when they were listed last are not opened: see `index`.
+    """
+    index = Index.load(results)
+    runs = [index.summary(path) for path in run_paths(results)]
+    index.save()
+    return runs
+
+
+def run_paths(results: Path) -> list[Path]:
+    """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder."""
+    try:
+        found = sorted(results.iterdir()) if results.exists() else []
+    except OSError as error:
+        raise UsageError(f"{results}: cannot be read: {error.strerror}") from None
+    sealed = {path.stem: path for path in found if path.suffix == SEALED and path.is_file()}
+    partial = {path.stem: path for path in found if path.suffix == PARTIAL and path.is_dir()}
+    runs = partial | sealed
+    return [runs[name] for name in sorted(runs, key=lambda name: (bool(_DATED.match(name)), name))]
+
+
+def find_run(results: Path, name: str | None = None) -> Path:
+    """The run that a user means: a path, a name, a unique beginning of one, or None for the newest.
+
+    Raises UsageError listing what there is when it is none or several.
+    """
+    if name and (path := _as_path(name)):
+        return path
+    runs = {path.stem: path for path in run_paths(results)}
+    if not runs:
+        raise UsageError(f"{results}: there are no runs; `campaign run` makes one")
+    if name is None:
+        return list(runs.values())[-1]
+    wanted = name.removesuffix(SEALED).removesuffix(PARTIAL)
+    if wanted in runs:
+        return runs[wanted]
+    matching = [run for run in runs if wanted and run.startswith(wanted)]
+    if len(matching) == 1:
+        return runs[matching[0]]
+    if matching:
+        raise UsageError(f"{name!r} begins several runs: {_some(matching)}")
+    raise UsageError(f"{results}: there is no run {name!r}; there are {_some(list(runs))}")
+
+
+def find_runs(results: Path, name: str) -> list[Path]:
+    """The runs that a user means by a name, a path, or a pattern of either such as `2026-11-*`.
+
+    Raises UsageError when there is none.
+    """
+    if not any(mark in name for mark in "*?[") or _as_path(name):
+        return [find_run(results, name)]
+    wanted = Path(name)
+    folder = wanted.parent if wanted.parent != Path() else results
+    pattern = wanted.name.removesuffix(SEALED).removesuffix(PARTIAL)
+    found = [path for path in run_paths(folder) if fnmatchcase(path.stem, pattern)]
+    if not found:
+        raise UsageError(f"{folder}: there is no run that {name!r} matches")
+    return found
+
+
+def _as_path(name: str) -> Path | None:
+    for path in (Path(name), Path(name + SEALED), Path(name + PARTIAL)):
+        if path.is_file() or (path.is_dir() and path.suffix == PARTIAL):
+            return path
+    return None
+
+
+def _some(names: list[str]) -> str:
+    latest = names[-10:]
+    return ", ".join(latest) + (f" and {len(names) - 10} more" if len(names) > 10 else "")

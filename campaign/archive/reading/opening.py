@@ -1,0 +1,71 @@
+"""Opening a run: the sealed file, or the folder of one that is in progress or was killed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from campaign.archive.layout.files import PART, why
+from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.run_folder import check_format
+from campaign.archive.reading.folder import open_folder
+from campaign.archive.reading.run_reader import Glance, RunReader
+from campaign.errors import ArchiveError
+
+
+def open_run(path: Path) -> RunReader:
+    """Open a sealed run, or the folder of a run in progress.
+
+    What is damaged is left out and listed in `damaged`. Raises ArchiveError, naming file and place,
+    when it is no run, or when what it was or how it ended cannot be read.
+    """
+    if path.is_dir():
+        return _open_folder(path)
+    if path.suffix == PART:
+        raise ArchiveError(f"{path}: was never finished; what was is in the run's folder")
+    return read_sealed(path)
+
+
+def _open_folder(folder: Path) -> RunReader:
+    """A folder, or what became of it: it may be sealed while it is read."""
+    sealed = folder.with_suffix(SEALED)
+    try:
+        run = open_folder(folder)
+    except (ArchiveError, OSError) as error:
+        if sealed.is_file():
+            return read_sealed(sealed)
+        if isinstance(error, OSError):
+            raise ArchiveError(f"{folder}: cannot be read: {why(error)}") from None
+        raise
+    return read_sealed(sealed) if run.damaged and sealed.is_file() else run
+
+
+def read_sealed(path: Path) -> RunReader:
+    """Read a sealed file of any format, whatever its name."""
+    if sealed_format(path) <= 2:
+        from campaign.archive.reading.format_2.sealed import read_sealed as read
+    else:
+        from campaign.archive.reading.sealed import read_sealed as read
+    return read(path)
+
+
+def read_glance(path: Path) -> Glance:
+    """A sealed file at a glance, without its trials. Raises ArchiveError."""
+    if sealed_format(path) <= 2:
+        from campaign.archive.reading.format_2.sealed import read_glance as read
+    else:
+        from campaign.archive.reading.sealed import read_glance as read
+    return read(path)
+
+
+def sealed_format(path: Path) -> int:
+    """The format of a sealed file. Raises ArchiveError when it is none that this program reads."""
+    from campaign.archive.reading import guarded
+
+    with guarded.open_file(path) as file, guarded.guarded(path, "/run/provenance/format"):
+        run = guarded.member(file, "run")
+        provenance = guarded.member(run, "provenance") if run is not None else None
+        if provenance is None:
+            raise ArchiveError(f"{path}: /run: is not the archive of a run")
+        version = guarded.integer_at(provenance, "format")
+    check_format(path, version)
+    return version

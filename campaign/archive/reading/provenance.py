@@ -1,0 +1,61 @@
+"""The header of a sealed run: one dataset per field."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Container
+from typing import Any
+
+from pydantic import ValidationError
+
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_folder import first_line
+from campaign.archive.reading import guarded
+from campaign.archive.reading.damage import DamageList
+from campaign.errors import ArchiveError
+
+PROVENANCE = "/run/provenance"
+
+
+def read_provenance(
+    names: Container[str], text: Callable[[str], str], sources: dict[str, str], damaged: DamageList
+) -> RunHeader:
+    """What was known before the first trial; a field that cannot be read is noted and left out.
+
+    Args:
+        names: fields that there are.
+        text: reads one. Raises ArchiveError.
+        sources: see `RunHeader.sources`.
+        damaged: what cannot be read.
+
+    Raises ArchiveError when the name or the start cannot be read: without them it is no run.
+    """
+    tree: dict[str, Any] = {"sources": sources}
+    for name, info in RunHeader.model_fields.items():
+        if info.is_required():
+            tree[name] = text(name)
+        elif name != "sources" and name in names:
+            with damaged.noting(), guarded.guarded(damaged.path, f"{PROVENANCE}/{name}"):
+                told = text(name)
+                tree[name] = told if info.annotation is str else _json(damaged, name, told)
+    return _validated(tree, damaged)
+
+
+def _validated(tree: dict[str, Any], damaged: DamageList) -> RunHeader:
+    try:
+        return RunHeader.model_validate(tree)
+    except ValidationError as error:
+        problems = {str(p["loc"][0]): p["msg"] for p in error.errors(include_url=False)}
+    required = {name for name, info in RunHeader.model_fields.items() if info.is_required()}
+    for name, what in problems.items():
+        if name in required:
+            raise ArchiveError(f"{damaged.path}: {PROVENANCE}/{name}: {what}")
+        damaged.add(f"{PROVENANCE}/{name}", what)
+    return RunHeader.model_validate({k: v for k, v in tree.items() if k not in problems})
+
+
+def _json(damaged: DamageList, name: str, text: str) -> object:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ArchiveError(f"{damaged.path}: {PROVENANCE}/{name}: {first_line(error)}") from None

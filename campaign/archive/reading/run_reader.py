@@ -1,0 +1,130 @@
+"""An archived run, as whoever opened it sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from campaign.archive.layout.files import sha256_of
+from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
+from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.damage import Damage
+from campaign.errors import ArchiveError
+from campaign.trial import SafeState, Tree, Trial
+
+
+@dataclass(frozen=True)
+class Glance:
+    """What `campaign list` tells of a sealed run; `planned`, `finished` and `failed` count trials,
+    those that followed included.
+    """
+
+    header: RunHeader
+    planned: int
+    status: RunStatus
+    ended: str
+    finished: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class RunReader:
+    """An archived run. Samples are read only when a trial's `recording()` is asked for.
+
+    Attributes:
+        path: the sealed file, or the folder of a run in progress.
+        header: what was known before the first trial.
+        status, reason, safe_state: how the run ended. An `incomplete` run has no word of its end,
+            and its bench is not known to be safe.
+        ended: ISO 8601; empty when incomplete.
+        plan: every planned trial, executed or not; those that followed come last.
+        trials: the executed ones, in plan order, failed ones included.
+        journal: verbatim.
+        full_plan: every planned trial, whole; empty in an archive of format 1.
+        damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a
+            trial from `trials`, a line from `plan`, a field of the header is as if it had not been
+            given. Samples are looked at only when they are read, and by `problems`.
+        earlier_attempts: by trial number, the attempts that a later one replaced; no analysis sees
+            them.
+        stages: trials that followed from what others found, as the journal tells; empty before
+            there were stages. The header counts the trials of the plan without them.
+        root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
+            is in progress, and in archives of formats 1 and 2.
+    """
+
+    path: Path
+    header: RunHeader
+    status: RunStatus
+    reason: str
+    safe_state: SafeState
+    ended: str
+    plan: tuple[PlannedTrial, ...]
+    trials: tuple[ArchivedTrial, ...]
+    journal: str = field(repr=False)
+    full_plan: FullPlan = field(repr=False)
+    damaged: tuple[Damage, ...] = ()
+    earlier_attempts: Mapping[int, tuple[ArchivedTrial, ...]] = field(default_factory=dict)
+    root: str = ""
+    stages: tuple[TrialsFollowed, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return self.header.name
+
+    @property
+    def first_stage(self) -> tuple[PlannedTrial, ...]:
+        """The trials that were planned before the run began."""
+        return self.plan[: len(self.plan) - sum(len(stage.trials) for stage in self.stages)]
+
+    @property
+    def tests(self) -> tuple[Tree, ...]:
+        """The protocol's tests: name, kind, title, normalised options ..."""
+        return self.header.tests
+
+    def trials_of(self, test: str) -> tuple[ArchivedTrial, ...]:
+        """The executed trials of one test, in plan order."""
+        return tuple(trial for trial in self.trials if trial.trial.test == test)
+
+    @property
+    def sealed(self) -> bool:
+        return self.path.is_file()
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the sealed file as `sha256sum` prints it; of the journal while in progress."""
+        return sha256_of(self.path if self.sealed else self.path / JOURNAL)
+
+    def planned(self, number: int) -> Trial:
+        """The trial `number` of the plan, executed or not, ready to be executed.
+
+        Raises ArchiveError when there is none, or when the archive is of format 1, which kept the
+        executed ones only.
+        """
+        if len(self.full_plan):
+            return self.full_plan.trial(number)
+        executed = {archived.trial.number: archived.trial for archived in self.trials}
+        if number not in executed:
+            raise ArchiveError(
+                f"{self.path}: has no trial {number}; an archive of format 1 holds only those that "
+                "were executed"
+            )
+        return executed[number]
+
+    def unchanged(self) -> bool:
+        """Whether every byte of the sealed file is as it was written (reads it all)."""
+        from campaign.archive.reading import guarded
+
+        if not self.sealed:
+            return False
+        with guarded.open_file(self.path) as file:
+            digest, place = guarded.digest_at(file, "run/outcome/file_sha256")
+        return digest == sha256_of(self.path, place)
+
+    def problems(self) -> list[str]:
+        """What is damaged, samples included (reads them all, in flat memory)."""
+        known = [f"{self.path}: {damage}" for damage in self.damaged]
+        return known + [problem for trial in self.trials for problem in trial.problems()]

@@ -1,0 +1,121 @@
+"""The seal of a run: the digest of every text in it, and reading those texts by it.
+
+The index is one of the texts and holds the record of every trial, so the seal's own digest vouches
+for the whole run. It is what a signature signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import h5py
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from campaign.archive.layout import storage
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.header import FORMAT
+from campaign.archive.layout.run_folder import first_line
+from campaign.archive.reading import guarded
+from campaign.archive.reading.damage import DamageList
+from campaign.errors import ArchiveError
+from campaign.trial import canonical_json
+
+SEAL = "outcome/seal"
+
+OUTSIDE = frozenset({SEAL, "outcome/file_sha256", "not_kept/type", "not_kept/file_name"}) | {
+    "not_kept/data"
+}
+"""What of `/run` the seal does not bind: itself, the hash of the file, and which samples are not
+kept, so that samples may be dropped from a run that was signed."""
+
+
+NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/format")
+"""What of `/run` is a whole number; all else is a text."""
+
+
+class Seal(BaseModel):
+    """The digests of a run's texts by their place in `/run`; of a number, those of its digits."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    format: int
+    run: str
+    texts: dict[str, str]
+
+
+def seal_text(run: str, texts: Mapping[str, str | int]) -> str:
+    """The seal of `texts`, which are by their place in `/run`."""
+    digests = {name: text_digest(storage.storable(str(text))) for name, text in texts.items()}
+    return canonical_json({"format": FORMAT, "run": run, "texts": digests})
+
+
+class SealedTexts:
+    """The texts of `/run`, each held against the seal; where that is damaged, against its own
+    checksum, which finds damage and no exchange.
+
+    Attributes:
+        root: digest of the seal; empty when it cannot be read.
+        seal: None when it cannot be read.
+    """
+
+    def __init__(self, path: Path, file: h5py.File, damaged: DamageList) -> None:
+        self._path = path
+        self._run = guarded.inner_group(file, "run")
+        self.root, self.seal = "", None
+        with damaged.noting(), guarded.guarded(path, f"/run/{SEAL}"):
+            text = guarded.text_at(*self._parent(SEAL))
+            try:
+                self.seal = Seal.model_validate_json(text)
+            except ValidationError as error:
+                raise ArchiveError(f"{path}: /run/{SEAL}: {first_line(error)}") from None
+            self.root = text_digest(text)
+
+    def names(self, group: str) -> list[str]:
+        """What the group at `group` in `/run` holds, or held when it was sealed."""
+        sealed = self.seal.texts if self.seal else {}
+        there = guarded.names(guarded.inner_group(self._run, group))
+        inside = f"{group}/"
+        was = (place.removeprefix(inside) for place in sealed if place.startswith(inside))
+        return sorted({*there, *was})
+
+    def notes(self, prefix: str) -> list[str]:
+        """The groups of `/run` whose names begin with `prefix`; also those that were sealed."""
+        sealed = self.seal.texts if self.seal else {}
+        names = {*guarded.names(self._run), *(place.partition("/")[0] for place in sealed)}
+        return sorted(name for name in names if name.startswith(prefix))
+
+    def text(self, place: str) -> str:
+        """A text of `/run`, e.g. `journal/data`. Raises ArchiveError when it is damaged."""
+        with guarded.guarded(self._path, f"/run/{place}"):
+            parent, name = self._parent(place)
+            return guarded.text_at(parent, name, self._digest(place))
+
+    def unchecked(self, place: str) -> str:
+        """A text of `/run` as it stands there; it may be damaged. Raises ArchiveError."""
+        with guarded.guarded(self._path, f"/run/{place}"):
+            return guarded.unchecked_text_at(*self._parent(place))
+
+    def integer(self, place: str) -> int:
+        """A whole number of `/run`. Raises ArchiveError when it is damaged."""
+        with guarded.guarded(self._path, f"/run/{place}"):
+            parent, name = self._parent(place)
+            return guarded.integer_at(parent, name, self._digest(place))
+
+    def check(self, place: str) -> None:
+        """A text or a number of `/run`. Raises ArchiveError when it is damaged."""
+        if place in NUMBERS:
+            self.integer(place)
+        else:
+            self.text(place)
+
+    def _parent(self, place: str) -> tuple[h5py.Group, str]:
+        group, _, name = place.rpartition("/")
+        return (guarded.inner_group(self._run, group) if group else self._run), name
+
+    def _digest(self, place: str) -> str | None:
+        if self.seal is None or place in OUTSIDE:
+            return None
+        if place not in self.seal.texts:
+            raise ArchiveError(f"{self._path}: /run/{place}: was not there when the run was sealed")
+        return self.seal.texts[place]

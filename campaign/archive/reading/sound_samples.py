@@ -1,0 +1,89 @@
+"""Using the trials whose samples are as they were recorded, and naming the others.
+
+Samples are held against their checksums when they are read, which may be as late as an analysis
+asks a recording for a channel. An error there costs the one trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.damage import Damage
+from campaign.errors import ArchiveError
+from campaign.trial import Recording
+
+_Made = TypeVar("_Made")
+
+Trials = tuple[ArchivedTrial, ...]
+
+
+def whole_recording(trial: ArchivedTrial) -> Recording:
+    """The recording, every channel of it read now. Raises ArchiveError when one is damaged."""
+    recording = trial.recording()
+    return replace(recording, channels=dict(recording.channels.items()))
+
+
+def sound_part(path: Path, trial: ArchivedTrial) -> tuple[Recording | None, tuple[Damage, ...]]:
+    """The recording without the channels that are damaged, and what is damaged.
+
+    Args:
+        path: the run's.
+
+    None when no channel can be told from another, or when the samples were not kept.
+    """
+    if trial.not_kept:
+        return None, ()
+    try:
+        recording = trial.recording()
+    except ArchiveError as error:
+        return None, (_of_trial(path, trial, error),)
+    channels, damaged = {}, []
+    for name in recording.channels:
+        try:
+            channels[name] = recording.channels[name]
+        except ArchiveError as error:
+            damaged.append(_of_trial(path, trial, error))
+    return replace(recording, channels=channels), tuple(damaged)
+
+
+def readable(path: Path, trials: Sequence[ArchivedTrial]) -> tuple[Trials, tuple[Damage, ...]]:
+    """The trials whose every sample can be read, and what is damaged of the others."""
+    good: list[ArchivedTrial] = []
+    damaged: list[Damage] = []
+    for trial in trials:
+        _, found = sound_part(path, trial)
+        if found:
+            damaged += found
+        else:
+            good.append(trial)
+    return tuple(good), tuple(damaged)
+
+
+def without_damaged(
+    path: Path, trials: Trials, make: Callable[[Trials], _Made]
+) -> tuple[_Made, Trials, tuple[Damage, ...]]:
+    """What `make` makes of `trials`; of those that are whole when it meets one that is not.
+
+    Returns what was made, the trials of which it was made, and what is damaged of the others. On
+    undamaged trials nothing is read but by `make`. Trials whose samples were not kept are left out.
+
+    Raises ArchiveError when it meets damage even so.
+    """
+    trials = tuple(trial for trial in trials if not trial.not_kept)
+    try:
+        return make(trials), trials, ()
+    except ArchiveError:
+        good, damaged = readable(path, trials)
+        if not damaged:
+            raise
+    return make(good), good, damaged
+
+
+def _of_trial(path: Path, trial: ArchivedTrial, error: ArchiveError) -> Damage:
+    """Damage found in reading a trial is that trial's, also where the error only names the file."""
+    damage = Damage.of(path, error)
+    return damage if damage.trial else replace(damage, trial=trial.trial.name)

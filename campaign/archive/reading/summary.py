@@ -1,0 +1,108 @@
+"""A run at a glance, without its trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive.layout.followed import planned_in, stages_in
+from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
+from campaign.archive.layout.journal import JOURNAL, RunStarted
+from campaign.archive.layout.run_folder import read_header
+from campaign.archive.layout.story import read_lines
+from campaign.errors import ArchiveError
+from campaign.trial import Outcome
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """One line of `campaign list`.
+
+    Attributes:
+        created, ended: ISO 8601; `ended` is empty while the run is in progress.
+        benches: names, each once, in the order of the tests.
+        trials: finished ones, failed ones included; `planned` counts the whole plan.
+        problem: why the run cannot be read; everything but name, path and bytes is empty then.
+    """
+
+    name: str
+    path: Path
+    bytes: int
+    created: str = ""
+    ended: str = ""
+    status: RunStatus | None = None
+    protocol: str = ""
+    backend: str = ""
+    benches: tuple[str, ...] = ()
+    tags: tuple[str, ...] = ()
+    planned: int = 0
+    trials: int = 0
+    failed: int = 0
+    problem: str = ""
+
+
+def summarise(path: Path) -> RunSummary:
+    """A run at a glance, without its trials."""
+    size = 0
+    try:
+        if path.is_dir():
+            size = sum(file.stat().st_size for file in path.iterdir())
+            return _summarise_folder(path, size)
+        size = path.stat().st_size
+        return _summarise_file(path, size)
+    except (ArchiveError, OSError) as error:
+        sealed = path.with_suffix(SEALED)
+        if path.suffix == PARTIAL and sealed.is_file():
+            return summarise(sealed)  # sealed while it was looked at
+        if isinstance(error, ArchiveError):
+            return RunSummary(path.stem, path, size, problem=str(error))
+        return RunSummary(path.stem, path, size, problem=f"{path}: {error.strerror}")
+
+
+def _benches(header: RunHeader) -> tuple[str, ...]:
+    named = (test.get("bench") for test in header.tests)
+    return tuple(dict.fromkeys(bench for bench in named if isinstance(bench, str)))
+
+
+def _summarise_folder(folder: Path, size: int) -> RunSummary:
+    header = read_header(folder)
+    story = read_lines((folder / JOURNAL).read_bytes())
+    if not story.all(RunStarted):
+        raise ArchiveError(f"{folder / JOURNAL}: does not tell of the start of the run")
+    finished, ended = story.finished.values(), story.ended
+    return RunSummary(
+        name=folder.stem,
+        path=folder,
+        bytes=size,
+        created=header.created,
+        ended=ended.at if ended else "",
+        status=ended.status if ended else RunStatus.INCOMPLETE,
+        protocol=header.protocol_name,
+        backend=header.backend,
+        benches=_benches(header),
+        tags=header.tags,
+        planned=header.trials + len(planned_in(stages_in(story.entries))),
+        trials=len(finished),
+        failed=sum(f.outcome is not Outcome.COMPLETED for f in finished),
+    )
+
+
+def _summarise_file(path: Path, size: int) -> RunSummary:
+    from campaign.archive.reading import opening
+
+    run = opening.read_glance(path)
+    return RunSummary(
+        name=path.stem,
+        path=path,
+        bytes=size,
+        created=run.header.created,
+        ended=run.ended,
+        status=run.status,
+        protocol=run.header.protocol_name,
+        backend=run.header.backend,
+        benches=_benches(run.header),
+        tags=run.header.tags,
+        planned=run.planned,
+        trials=run.finished,
+        failed=run.failed,
+    )

@@ -1,0 +1,133 @@
+"""The NeXus application definition that the trials of an archive follow, `NXfriction_trial`.
+
+It says what every program may rely on: which channels there are at least, that each has a unit,
+what the bench consists of. `nxvalidate` holds a file against it: `docs/reading-archives.md`.
+
+A trial says that it follows the definition when it does. One that recorded nothing, or that comes
+from a bench without one of the required channels, is archived all the same, without saying so.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import h5py
+from h5py import h5f, h5o, h5p
+
+from campaign.archive.writing import hdf5
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_CURRENT,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
+from campaign.trial import ChannelInfo, Tree
+
+DEFINITION = "NXfriction_trial"
+VERSION = "2.0"
+
+REQUIRED = (COMMAND, GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE, MOTOR_CURRENT, DRIVE_TORQUE)
+"""The channels without which an entry does not follow the definition."""
+
+MEMBERS = ("definition", "instrument")
+"""What an entry that follows the definition has besides its samples."""
+
+_SENSORS = {"gyro": GYRO_RATE, "encoder": RELATIVE_ANGLE, "current_sensor": MOTOR_CURRENT}
+_GAIN_UNITS = {"rate": ("A s/rad", "A/rad"), "current": ("V/A", "V/(A s)")}
+
+
+def definition_path() -> Path:
+    """The definition's own file, for validators: `nxvalidate -a FILE`."""
+    return Path(__file__).with_name(f"{DEFINITION}.nxdl.xml")
+
+
+def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
+    """Whether a recording of these channels is one that the definition describes."""
+    return {channel.name for channel in channels}.issuperset(REQUIRED)
+
+
+def write_definition(entry: h5py.Group, bench: Described) -> None:
+    """Say that `entry` follows the definition, and describe its bench."""
+    hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
+    # Copying costs a tenth of making, and the runs of a process share a few benches.
+    h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
+
+
+def differences(entry: h5py.Group, bench: Described) -> Iterator[tuple[str, str]]:
+    """What of an entry's definition and instrument is not what the bench says: name, and what."""
+    definition = entry["definition"]
+    if definition[()] != DEFINITION.encode() or definition.attrs.get("version") != VERSION:
+        yield "definition", f"is not {DEFINITION} {VERSION}"
+    wanted: dict[str, h5py.Dataset] = {}
+    _template(bench)["instrument"].visititems(
+        lambda name, item: wanted.update({name: item} if isinstance(item, h5py.Dataset) else {})
+    )
+    for name, expected in wanted.items():
+        found = entry["instrument"].get(name)
+        same = isinstance(found, h5py.Dataset) and found[()] == expected[()]
+        if not same or found.attrs.get("units") != expected.attrs.get("units"):
+            yield f"instrument/{name}", "is not what the bench in the record says"
+
+
+_TEMPLATES = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class Described:
+    """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
+
+    An archive keeps benches of any origin, so nothing of their layout is taken for granted.
+    """
+
+    name: str
+    gains: tuple[tuple[str, float, float], ...]
+
+    @classmethod
+    def of(cls, bench: Tree) -> Described:
+        loops = bench.get("controller")
+        gains = (
+            (loop, *found)
+            for loop in _GAIN_UNITS
+            if isinstance(loops, Mapping) and (found := _parallel_gains(loops.get(loop)))
+        )
+        return cls(str(bench.get("name", "")), tuple(gains))
+
+
+@lru_cache(maxsize=32)
+def _template(bench: Described) -> h5py.File:
+    """A file in memory that holds the instrument."""
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(1 << 14, False)
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    label = f"instrument-{next(_TEMPLATES)}".encode()  # HDF5 knows files in memory by their names
+    file = h5py.File(h5f.create(label, h5f.ACC_TRUNC, fapl=access))
+    instrument = hdf5.make_group(file, "instrument", "NXinstrument")
+    hdf5.put_text(instrument, "name", bench.name)
+    for name, channel in _SENSORS.items():
+        sensor = hdf5.make_group(instrument, name, "NXsensor")
+        hdf5.put_text(sensor, "short_name", channel)
+    motor = hdf5.make_group(instrument, "motor", "NXactuator")
+    hdf5.put_text(motor, "physical_quantity", "torque")
+    for loop, proportional, integral in bench.gains:
+        controller = hdf5.make_group(motor, f"{loop}_controller", "NXpid_controller")
+        unit, integral_unit = _GAIN_UNITS[loop]
+        hdf5.put_number(controller, "K_p", proportional, units=unit)
+        hdf5.put_number(controller, "K_i", integral, units=integral_unit)
+    return file
+
+
+def _parallel_gains(controller: object) -> tuple[float, float] | None:
+    """Proportional and integral gain (SI) of a controller of a bench; None when it does not say."""
+    if not isinstance(controller, Mapping):
+        return None
+    proportional, integral = controller.get("proportional"), controller.get("integral")
+    if not isinstance(proportional, int | float) or not isinstance(integral, int | float):
+        return None
+    ideal = controller.get("form") == "ideal"  # its integral gain multiplies inside the other
+    return float(proportional), float(proportional * integral if ideal else integral)

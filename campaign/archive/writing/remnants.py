@@ -1,0 +1,101 @@
+"""What a killed process leaves behind in a results folder, and removing what this program wrote.
+
+Nothing that it did not write is ever removed: files are known by their names, and a folder goes
+only when it is empty.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from pathlib import Path
+
+from campaign.archive.layout.files import PART, sync_folder
+from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
+from campaign.archive.layout.header import PARTIAL, SEALED
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
+
+_OWN = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
+_TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs")
+
+
+def is_own(name: str) -> bool:
+    """Whether this program gives such a name to a file in the folder of a run."""
+    whole = name.removesuffix(PART)
+    return name in _OWN or whole in _OWN or _TRIAL_FILE.fullmatch(whole) is not None
+
+
+def remove_folder(folder: Path) -> list[Path]:
+    """Remove a run's folder with what this program wrote there; returns what else there was.
+
+    What else there was stays where it is, and so does the folder then.
+    """
+    others = []
+    # What tells of the run goes last: half removed, it is still seen to be a run's folder.
+    for path in sorted(folder.iterdir(), key=lambda path: path.name in (HEADER, JOURNAL)):
+        if is_own(path.name) and not path.is_dir():
+            path.unlink()
+        else:
+            others.append(path)
+    if not others:
+        folder.rmdir()
+    sync_folder(folder.parent)
+    return others
+
+
+def take_over(folder: Path, target: Path) -> None:
+    """Move what this program did not write from a run's folder into another."""
+    for path in sorted(folder.iterdir()):
+        if not is_own(path.name) or path.is_dir():
+            path.rename(target / path.name)
+
+
+def find_remnants(results: Path) -> dict[Path, str]:
+    """What killed processes left in a results folder, and what it is."""
+    found = {}
+    with contextlib.suppress(OSError):
+        names = {path.name for path in results.iterdir()}
+        for name in sorted(names):
+            if (what := _remnant(name, names)) and not _in_use(results, name):
+                found[results / name] = what
+    return found
+
+
+def clear_beginning(results: Path, run: str) -> None:
+    """Remove a folder of a run that was never finished; the caller holds the run's lock.
+
+    A folder beside its sealed file is left alone: should that file be damaged, it may have the run.
+    """
+    part = results / f"{run}{PARTIAL}{PART}"
+    if part.is_dir():
+        remove_folder(part)
+
+
+def _remnant(name: str, names: set[str]) -> str:
+    if name.endswith(PARTIAL + PART):
+        return "the beginning of a run's folder, which was never finished"
+    if name.endswith(PARTIAL) and name.removesuffix(PARTIAL) + SEALED in names:
+        return "what is left of the folder of a run that is sealed; verify that run first"
+    if name.startswith(".") and name.endswith(".lock"):
+        return "the lock of a process that was killed; it locks nothing"
+    return ""
+
+
+def _in_use(results: Path, name: str) -> bool:
+    """Whether a process is writing that run just now."""
+    run = name.removesuffix(PART).removesuffix(PARTIAL).removesuffix(SEALED)
+    lock = results / (name if name.endswith(".lock") else f".{run}.lock")
+    if os.name == "nt" or not lock.exists():
+        return False
+    import fcntl
+
+    with lock.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+    return False

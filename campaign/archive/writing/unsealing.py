@@ -1,0 +1,159 @@
+"""From a sealed run back to the folder of a run in progress, so that it can be gone on with.
+
+The folder is built and checked under a name that no reader takes for a run. It gets its real name
+while the sealed file is still there, and counts from the moment that this is gone: at every instant
+one whole run is on the disk, and it is clear which one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.entries import entry_name, entry_names
+from campaign.archive.layout.files import (
+    PART,
+    publish,
+    sha256_of,
+    sync_folder,
+    why,
+    write_atomically,
+)
+from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
+from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.journal import JOURNAL, Entry, Story, TrialFinished, parse_journal
+from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
+from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
+from campaign.archive.reading import guarded
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.folder import read_trial_file
+from campaign.archive.reading.seal import SealedTexts
+from campaign.archive.reading.sealed import read_not_kept, read_sealed
+from campaign.archive.writing import hdf5
+from campaign.archive.writing.remnants import remove_folder, take_over
+from campaign.archive.writing.trial_file import write_record, write_root
+from campaign.errors import ArchiveError
+from campaign.trial import canonical_json
+
+_MEMBERS = ("title", "start_time", "end_time", "record", "data", "preview")
+"""What a trial's own file has; the rest is made anew when the run is sealed."""
+
+
+def unseal(sealed: Path) -> Path:
+    """Replace a sealed run by its folder; returns that.
+
+    The caller holds the run's lock. Raises ArchiveError, leaving the sealed run as it was, when it
+    is damaged or the folder cannot be written.
+    """
+    folder = sealed.with_suffix(PARTIAL)
+    part = folder.with_name(folder.name + PART)
+    try:
+        _check_sealed(sealed)
+        if part.is_dir() and remove_folder(part):
+            raise ArchiveError(f"{part}: holds files that are not the program's; move them away")
+        part.mkdir()
+        _fill(sealed, part)
+        if folder.is_dir():  # a remnant: where both are found, the sealed run counts
+            take_over(folder, part)
+            remove_folder(folder)
+        part.rename(folder)
+        sync_folder(folder.parent)
+        sealed.unlink()
+    except (OSError, RuntimeError, ValueError, ArchiveError) as error:
+        with contextlib.suppress(OSError):
+            remove_folder(part)
+        raise ArchiveError(
+            f"{sealed}: could not be opened for going on: {why(error)}; it is as it was"
+        ) from None
+    sync_folder(folder.parent)
+    return folder
+
+
+def _check_sealed(sealed: Path) -> None:
+    with guarded.open_file(sealed) as file:
+        digest, place = guarded.digest_at(file, "run/outcome/file_sha256")
+    if sha256_of(sealed, place) != digest:
+        raise ArchiveError(f"{sealed}: does not match its own hash; it was damaged or changed")
+
+
+def _fill(sealed: Path, folder: Path) -> None:
+    """Write everything that the run's folder had when it was sealed."""
+    run = read_sealed(sealed)
+    if run.damaged:
+        raise ArchiveError(str(run.damaged[0]))
+    with guarded.open_file(sealed) as file, guarded.guarded(sealed, "/run"):
+        texts = SealedTexts(sealed, file, DamageList(sealed))
+        notes = {PLAN: "plan", PLAN_TRIALS: "plan_trials", PLAN_TREES: "trees"}
+        for name, note in notes.items():
+            write_atomically(folder / name, texts.text(f"{note}/data"))
+        write_atomically(folder / HEADER, header_document(run.header))
+        story = parse_journal(sealed, run.journal.encode())
+        lines = {text_digest(line): line for line in texts.text("index/data").splitlines()}
+        trees = parse_trees(texts.text("trees/data"))
+        not_kept = read_not_kept(texts)
+        written = {}
+        for entry, finished in entry_names(story.files).items():
+            with _trial_file(folder, finished) as target:
+                if entry in not_kept:
+                    _write_record(target, finished, lines[finished.record], trees, not_kept[entry])
+                else:
+                    _copy_back(file, entry, target, finished)
+            written[finished.file] = _publish(folder, finished)
+    write_atomically(folder / JOURNAL, _journal(story, written))
+
+
+def _part(folder: Path, finished: TrialFinished) -> Path:
+    return folder / (finished.file + PART)
+
+
+@contextlib.contextmanager
+def _trial_file(folder: Path, finished: TrialFinished) -> Iterator[h5py.File]:
+    with hdf5.closing(hdf5.create_file(_part(folder, finished))) as file:
+        yield file
+        entry = file[entry_name(finished.trial)]
+        write_root(file, guarded.text_at(entry, "start_time"), entry)
+
+
+def _copy_back(source: h5py.File, entry: str, target: h5py.File, finished: TrialFinished) -> None:
+    there = guarded.group_at(source, entry, "NXentry")
+    members = [member for member in _MEMBERS if member in there]
+    hdf5.copy_entry_back(source, entry, target, entry_name(finished.trial), members)
+
+
+def _write_record(
+    target: h5py.File, finished: TrialFinished, line: str, trees: Trees, not_kept: str
+) -> None:
+    """The entry of a trial whose samples were not kept: it has no group in the sealed run."""
+    record = TrialRecord.model_validate_json(line)
+    entry = hdf5.make_group(target, entry_name(finished.trial), "NXentry")
+    hdf5.put_text(entry, "title", record.label)
+    write_record(entry, record, line, {name: trees[name] for name in record.tree_names}, not_kept)
+
+
+def _publish(folder: Path, finished: TrialFinished) -> TrialFinished:
+    """Read a trial's new file back and name it; returns the journal's word of it, with its hash."""
+    part = _part(folder, finished)
+    digest, size = sha256_of(part), part.stat().st_size
+    problems = list(read_trial_file(part, finished).problems())
+    if problems:
+        raise ArchiveError("; ".join(problems[:3]))
+    publish(part, folder / finished.file)
+    return finished.model_copy(update={"sha256": digest, "bytes": size})
+
+
+def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
+    """The journal as it was, but for the hashes of the trial files, which are new ones."""
+
+    def line(entry: Entry, text: str) -> str:
+        if isinstance(entry, TrialFinished):
+            new = written[entry.file]
+            told = entry.model_copy(update={"sha256": new.sha256, "bytes": new.bytes})
+            return canonical_json(told.model_dump(mode="json"))
+        return text
+
+    lines = story.text.splitlines()
+    return "".join(line(*both) + "\n" for both in zip(story.entries, lines, strict=True))

@@ -1,0 +1,225 @@
+"""From recordings of a velocity map to its points, and from points to fits of both directions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
+from campaign.estimate import Estimate, Window
+from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
+from campaign.experiments.interface import TrialData, bench_of, metrics
+from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.identification.ripple import (
+    FASTEST,
+    Harmonic,
+    dominant_periods,
+    harmonic,
+)
+from campaign.identification.steady_sliding import SteadySliding, steady_sliding
+from campaign.physics.bench import Bench
+from campaign.result import Array
+from campaign.trial import Recording
+
+UNSTEADY = 0.25
+"""Share of its mean by which the rate of a window may change, or be uncertain."""
+DESCRIBES = "it describes the window"
+"""Why some metrics of a window have no interval."""
+
+
+def told_periods(bench: Bench) -> float | None:
+    """Periods per revolution of the largest ripple that the bench describes; None without one."""
+    found = [
+        (each.ripple.amplitude * float(getattr(each, "static_torque", 1.0)), each.ripple.periods)
+        for each in bench.friction.values()
+        if each.ripple.amplitude > 0
+    ]
+    return max(found)[1] if found else None
+
+
+def measure(data: TrialData) -> tuple[Estimate, ...]:
+    """Metrics of one run out and back: rate and friction torque of each direction, and its ripple.
+
+    Names end with the direction. Raises ValueError for a window without samples.
+    """
+    bench, windows, recording = bench_of(data.trial), windows_of(data.trial), data.recording()
+    found: list[Estimate] = []
+    for name in DIRECTIONS:
+        own = windows[name]
+        whole = windows.get(WHOLE.format(name), own)
+        ripple = _ripple(_Samples.of(recording, whole), bench)
+        cut = _Samples.of(recording, own)
+        sliding = steady_sliding(
+            cut.time,
+            cut.rate,
+            cut.torque,
+            cut.angle,
+            bench.axis.inertia,
+            ripple.periods if ripple else None,
+        )
+        found += _metrics(name, sliding, ripple)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Samples of one window, those that were lost left out; SI, shape (n,)."""
+
+    time: Array
+    rate: Array
+    torque: Array
+    angle: Array | None
+
+    @classmethod
+    def of(cls, recording: Recording, window: Window) -> _Samples:
+        cut = recording.window(window.start, window.stop)
+        angle = cut[RELATIVE_ANGLE] if RELATIVE_ANGLE in cut.channels else None
+        columns = [cut.time, cut[GYRO_RATE], cut[DRIVE_TORQUE]]
+        there = np.isfinite(np.sum(columns if angle is None else [*columns, angle], axis=0))
+        time, rate, torque = (column[there] for column in columns)
+        return cls(time, rate, torque, None if angle is None else angle[there])
+
+
+def _ripple(cut: _Samples, bench: Bench) -> Harmonic | None:
+    """The ripple that the run shows, at the period that the bench tells or else at its own."""
+    if len(cut.time) < 3 or cut.angle is None:
+        return None
+    angle, rate, torque = cut.angle, cut.rate, cut.torque
+    inertia = bench.axis.inertia
+    periods = told_periods(bench) or dominant_periods(angle, rate, torque, inertia)
+    if periods is None or periods * abs(float(np.mean(rate))) > 2.0 * np.pi * FASTEST:
+        return None
+    try:
+        return harmonic(angle, rate, torque, inertia, periods)
+    except ValueError:
+        return None
+
+
+def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterator[Estimate]:
+    yield replace(found.rate, name=f"rate_{name}")
+    yield replace(found.torque, name=f"friction_torque_{name}")
+    plain = {
+        "spread": (found.spread, "N m"),
+        "acceleration": (found.acceleration, "rad/s^2"),
+        "effective_samples": (found.effective, ""),
+        "first_angle": (found.first, "rad"),
+        "last_angle": (found.last, "rad"),
+    }
+    if ripple is not None:
+        plain |= {
+            "ripple_periods": (ripple.periods, ""),
+            "ripple_cosine": (ripple.cosine, "N m"),
+            "ripple_sine": (ripple.sine, "N m"),
+            "ripple_error": (ripple.error, "N m"),
+            "ripple_centre": (ripple.centre, "rad"),
+            "ripple_travel": (ripple.travel, "rad"),
+        }
+    for word, (value, unit) in plain.items():
+        if np.isfinite(value):
+            yield Estimate.without_interval(f"{word}_{name}", value, unit, DESCRIBES)
+
+
+@dataclass(frozen=True)
+class MapPoint:
+    """One point of the map: signed, SI.
+
+    Attributes:
+        speed: as commanded.
+        rate, torque: with the interval that the window shows; the torque with its systematic parts.
+        spread: the torque's 1 sigma in the window.
+        window, rule: its length, and what set it.
+        acceleration: residual one (rad/s^2).
+        first, last: angles between which the window lies (rad); NaN where none was recorded.
+        harmonic: the ripple that its run shows, where it is long enough.
+        repeat: which repetition it is of.
+        ripple: what `without_ripple` has taken out of the torque (N m).
+        error: deviation of the torque without its ripple (N m), that of the ripple included; NaN
+            where the window shows none.
+    """
+
+    speed: float
+    rate: Estimate
+    torque: Estimate
+    spread: float
+    window: float
+    rule: str
+    acceleration: float
+    first: float
+    last: float
+    harmonic: Harmonic | None
+    repeat: int
+    error: float
+    ripple: float = 0.0
+
+    @property
+    def sign(self) -> float:
+        """+1 or -1: the direction."""
+        return 1.0 if self.speed > 0 else -1.0
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the load slid all through the window: it neither stuck nor sped up in it."""
+        least = UNSTEADY * abs(self.rate.value)
+        spread = 0.0 if np.isnan(self.rate.half_width) else self.rate.half_width
+        return abs(self.acceleration) * self.window <= least and spread <= least
+
+
+def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint], list[MapPoint]]:
+    """The points at which the load slid steadily, and the others, which are told in `notes`."""
+    kept = [point for point in points if point.is_steady]
+    left = [replace(p, rule=f"{p.rule}; not steady") for p in points if not p.is_steady]
+    if left:
+        speeds = ", ".join(f"{np.rad2deg(point.speed):.3g}" for point in left)
+        notes.append(
+            f"{len(left)} of {len(points)} points are left out of the fit, for the load did not "
+            f"slide steadily in their windows ({speeds} deg/s): raise settle_angle, max_time or "
+            "the integral gain of the rate loop, or begin at a higher speed."
+        )
+    return kept, left
+
+
+def points_of(items: Iterable[TrialData], bench: Bench, notes: list[str]) -> list[MapPoint]:
+    """The points of several trials on `bench`; what one lacks is added to `notes`."""
+    found: list[MapPoint] = []
+    for item in items:
+        try:
+            found += map_points(item, bench)
+        except ValueError as error:
+            notes.append(f"{item.trial.label} has no points: {error}.")
+    return found
+
+
+def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
+    """The two points of one trial on `bench`, out and back."""
+    rule = rule_of(data.trial)
+    found = metrics(data, measure)
+    windows = windows_of(data.trial)
+    speed = speed_of(data.trial)
+    for name, sign in DIRECTIONS.items():
+        torque, acceleration = found[f"friction_torque_{name}"], found[f"acceleration_{name}"].value
+        torque = with_systematic(torque, bench, TORQUE_CONSTANT, torque.value)
+        torque = with_systematic(torque, bench, INERTIA, bench.axis.inertia * acceleration)
+        ripple = None
+        if f"ripple_periods_{name}" in found:
+            words = ("periods", "cosine", "sine", "error", "centre", "travel")
+            ripple = Harmonic(*(found[f"ripple_{word}_{name}"].value for word in words))
+        yield MapPoint(
+            speed=speed * sign,
+            rate=found[f"rate_{name}"],
+            torque=torque,
+            spread=found[f"spread_{name}"].value,
+            window=windows[name].stop - windows[name].start,
+            rule=rule,
+            acceleration=acceleration,
+            first=_value(found, f"first_angle_{name}"),
+            last=_value(found, f"last_angle_{name}"),
+            harmonic=ripple,
+            repeat=data.trial.repeat,
+            error=np.nan if torque.standard_error is None else torque.standard_error,
+        )
+
+
+def _value(found: Mapping[str, Estimate], name: str) -> float:
+    return found[name].value if name in found else np.nan

@@ -1,0 +1,310 @@
+"""Runs of a friction-velocity map: what is planned for each speed, and which parts are measured.
+
+Each trial runs out at one speed and back at the same, so it ends where it began and needs no
+homing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
+from campaign.estimate import Window
+from campaign.experiments.interface import bench_of, validated
+from campaign.experiments.shared.rig import Rig
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.signals import Polyline
+from campaign.trial import Role, Task, Trial, TrialRequest, canonical_json
+from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
+
+SMALLEST_WINDOW = 10
+"""samples: fewer say nothing about a mean and a slope."""
+DIRECTIONS = {"positive": 1.0, "negative": -1.0}
+WHOLE = "settled {}"
+"""Name of the window of all that a run has behind its settling, by direction."""
+MEMORIES = 7.0
+"""lengths of friction's memory, Ts / sigma0, after which a reversal is over: 2 exp(-7) is 0.2 %."""
+
+ROUNDING = 1e-9
+"""of an angle, by which a difference of times may fall short of it."""
+
+
+class VelocityMapOptions(Options):
+    """Options of a friction-velocity map."""
+
+    slowest: AngularRate = Field(default=float(np.deg2rad(0.05)), gt=0)
+    """Lowest speed of the map..."""
+    fastest: AngularRate = Field(default=float(np.deg2rad(65.0)), gt=0)
+    """...and its highest..."""
+    points: int = Field(default=80, ge=1, le=10_000)
+    """...and how many from one to the other, evenly in their logarithm: dense at low speed."""
+    speeds: tuple[AngularRate, ...] = ()
+    """Speeds of your own instead of slowest, fastest and points. Each is run in both directions."""
+    max_travel: Angle = Field(default=float(np.deg2rad(60.0)), gt=0)
+    """Longest way of one run, ramps included."""
+    max_time: Time = Field(default=20.0, gt=0)
+    """Longest motion of one run; the shorter of this and max_travel counts."""
+    window_time: Time = Field(default=2.0, gt=0)
+    """Shortest settled window that is averaged..."""
+    window_angle: Angle = Field(default=float(np.deg2rad(5.0)), gt=0)
+    """...or the time to travel this, whichever takes longer; as far as the run has room."""
+    settle_time: Time = Field(default=0.3, ge=0)
+    """After the ramp, before the window: for the loop to settle..."""
+    settle_angle: Angle = Field(default=float(np.deg2rad(0.75)), ge=0)
+    """...or the time to travel this, whichever takes longer: friction's own memory is an angle.
+    With Ts / sigma0 of 0.1 deg, 0.75 deg leaves a thousandth of it, also after a reversal."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(300.0)), gt=0)
+    """Of the ramps."""
+    rest: Time = Field(default=0.5, ge=0)
+    """Standstill before each run."""
+    warm_up_speed: AngularRate = Field(default=float(np.deg2rad(20.0)), gt=0)
+    """Speed of the warm-up."""
+    warm_up_cycles: int = Field(default=3, ge=0, le=1000)
+    """Moves out and back before the first point; 0 for no warm-up."""
+    compensation: str = "none"
+    """Compensation while the map is measured; a map is normally taken without."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+    start_angles: tuple[Angle, ...] = ()
+    """Where runs begin: each speed is run from each, and its torques are averaged. Several, half a
+    period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
+
+    def without_effect(self) -> frozenset[str]:
+        found = {"slowest", "fastest", "points"} if self.speeds else set()
+        return frozenset(found | (set() if self.warm_up_cycles else {"warm_up_speed"}))
+
+
+def map_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
+    """Speeds of the map (rad/s), as written or rising. Raises ValueError for an empty range."""
+    if options.speeds:
+        if min(options.speeds) <= 0:
+            raise ValueError("speeds are positive; each is run in both directions")
+        return options.speeds
+    # In round numbers of degrees, as they are written: the last bits are those of a list.
+    low, high = (round(float(np.rad2deg(v)), 12) for v in (options.slowest, options.fastest))
+    if high < low:
+        raise ValueError("fastest must not be below slowest")
+    return tuple(float(v) for v in np.deg2rad(np.geomspace(low, high, options.points)))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Times of one out-and-back trial (s), from the trial's start.
+
+    Attributes:
+        ramp, cruise: length of one ramp, and of the constant speed between two.
+        window: length of the settled window, at the end of each cruise.
+        rule: what set the window's length.
+        settle: what is left out at the beginning of each cruise.
+    """
+
+    speed: float
+    rest: float
+    ramp: float
+    cruise: float
+    window: float
+    rule: str
+    settle: float
+
+    @property
+    def settled(self) -> float:
+        """How long the speed is held once it has settled."""
+        return self.cruise - self.settle
+
+    @property
+    def leg(self) -> float:
+        return self.rest + 2 * self.ramp + self.cruise
+
+    def window_of(self, direction: float) -> tuple[float, float]:
+        """Start and stop of the window of the run in `direction` (+1 out, -1 back)."""
+        stop = self.rest + self.ramp + self.cruise + (self.leg if direction < 0 else 0.0)
+        return stop - self.window, stop
+
+    def windows(self) -> tuple[Window, ...]:
+        """The averaged part of each direction, and all of it that is settled."""
+        found = []
+        for name, direction in DIRECTIONS.items():
+            start, stop = self.window_of(direction)
+            found.append(Window(name, start, stop))
+            begin = stop - self.cruise + self.settle
+            found.append(Window(WHOLE.format(name), min(begin, start), stop))
+        return tuple(found)
+
+    def command(self) -> Polyline:
+        """The rate command: rest, out, rest, back, rest."""
+        times, values = [0.0], [0.0]
+        for speed in (self.speed, -self.speed):
+            for span, value in (
+                (self.rest, 0.0),
+                (self.ramp, speed),
+                (self.cruise, speed),
+                (self.ramp, 0.0),
+            ):
+                times.append(times[-1] + span)
+                values.append(value)
+        return Polyline(times=tuple(times), values=tuple(values))
+
+
+REQUIRED = {
+    GYRO_RATE: "the rate of each point",
+    DRIVE_TORQUE: "the friction torque of each point",
+}
+"""Channels of a map, whatever is made of it."""
+OWN = ("speed", "start_angle")
+"""What tells the trials of one map apart; whatever else is swept makes another map."""
+CAN_USE = {RELATIVE_ANGLE: "look for a ripple of friction over position"}
+
+
+def windows_of(trial: Trial) -> dict[str, Window]:
+    """Windows of a trial by name; an archive of a program that named none is planned again."""
+    windows = trial.windows or _replanned(trial).windows()
+    return {window.name: window for window in windows}
+
+
+def rule_of(trial: Trial) -> str:
+    """What set the length of the trial's window, in words."""
+    run, own = _replanned(trial), windows_of(trial)["positive"]
+    # Runs of a pilot, and those that follow it, have other windows than the options tell.
+    return run.rule if math.isclose(own.stop - own.start, run.window) else "the pilot"
+
+
+def settled_angle(trial: Trial) -> float:
+    """Angle (rad) that a run moves at constant speed before what counts as settled."""
+    run, whole = _replanned(trial), windows_of(trial).get(WHOLE.format("positive"))
+    settle = run.settle if whole is None else run.cruise - (whole.stop - whole.start)
+    return settle * run.speed
+
+
+def speed_of(trial: Trial) -> float:
+    """Commanded speed (rad/s)."""
+    return float(str(trial.point["speed"]))
+
+
+def _replanned(trial: Trial) -> Run:
+    known = {k: v for k, v in trial.options.items() if k in VelocityMapOptions.model_fields}
+    return plan_run(speed_of(trial), validated(VelocityMapOptions, known))
+
+
+def settling_advice(rig: Rig, settled: float) -> str:
+    """What to do when runs settle for too short an angle (rad); empty when they do not."""
+    memory, turned = rig.presliding or 0.0, rig.unwinding
+    turned = turned if turned > memory else 0.0  # less is over while friction forgets
+    needed = MEMORIES * memory + turned
+    if settled >= needed * (1.0 - ROUNDING):
+        return ""
+    wanted, known, lag = (np.rad2deg(angle) for angle in (needed, memory, turned))
+    integral = f", and the loop's integral turns round in {lag:.2g} deg" if turned else ""
+    return f"settle for {wanted:.2g} deg or more: Ts/sigma0 is {known:.3g} deg{integral}"
+
+
+def plan_run(speed: float, options: VelocityMapOptions) -> Run:
+    """The run at `speed` (rad/s). ValueError when it cannot settle within the travel allowed."""
+    ramp = speed / options.acceleration
+    by_travel = options.max_travel / speed - ramp
+    by_time = options.max_time - 2 * ramp
+    cruise = min(by_travel, by_time)
+    settle = max(options.settle_time, options.settle_angle / speed)
+    room = cruise - settle
+    if room <= 0:
+        raise ValueError(
+            f"at {np.rad2deg(speed):.4g} deg/s the run lasts {max(cruise, 0):.3g} s at constant "
+            f"speed but takes {settle:.3g} s to settle; raise max_travel, max_time or "
+            "acceleration, or drop that speed"
+        )
+    by_angle = options.window_angle / speed
+    wanted = max(options.window_time, by_angle)
+    if wanted > room:
+        limit = "max_travel" if by_travel < by_time else "max_time"
+        rule, wanted = f"all that {limit} leaves", room
+    else:
+        rule = "window_angle" if by_angle > options.window_time else "window_time"
+    return Run(speed, options.rest, ramp, cruise, wanted, rule, settle)
+
+
+def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
+    """What to do where runs of a map settle for too short an angle, once for each bench."""
+    told: dict[str, list[float]] = {}
+    rigs: dict[str, Rig] = {}
+    for trial in trials:
+        key = canonical_json(trial.bench)
+        rig = rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
+        if advice := settling_advice(rig, settled_angle(trial)):
+            told.setdefault(advice, []).append(float(np.rad2deg(speed_of(trial))))
+    for advice, speeds in told.items():
+        yield f"At {min(speeds):.3g} to {max(speeds):.3g} deg/s: {advice}."
+
+
+def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
+    """The warm-up, then one trial out and back for each speed and each angle to start from."""
+    yield from warm_ups(options)
+    rig = Rig(bench)
+    for speed in map_speeds(options):
+        yield from run_requests(plan_run(speed, options), options, rig)
+
+
+def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[TrialRequest]:
+    """A trial of the run for each angle to start from. ValueError for too few samples."""
+    if run.window * options.sample_rate < SMALLEST_WINDOW:
+        raise ValueError(
+            f"at {np.rad2deg(run.speed):.4g} deg/s the window of {run.window:.3g} s holds fewer "
+            f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
+        )
+    (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
+    told = f"window {run.window:.3g} s, {np.rad2deg(run.window * run.speed):.3g} deg: {run.rule}"
+    advice = settling_advice(rig, run.speed * run.settle)
+    many = bool(options.start_angles)
+    for start_angle in _starts(options):
+        yield TrialRequest(
+            Task(
+                mode="rate",
+                command=run.command(),
+                compensation=options.compensation,
+                duration=2 * run.leg + options.rest,
+                window=(first, last),
+                sample_rate=options.sample_rate,
+                start_angle=start_angle,
+            ),
+            point={"speed": run.speed} | ({"start_angle": start_angle} if many else {}),
+            note=f"{told}; {advice}" if advice else told,
+            windows=run.windows(),
+        )
+
+
+def _starts(options: VelocityMapOptions) -> tuple[float, ...]:
+    """Angles to start from (rad)."""
+    return options.start_angles or (-0.5 * options.max_travel,)
+
+
+def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:
+    """The warm-up, where one is wanted."""
+    if options.warm_up_cycles:
+        yield _warm_up(options, _starts(options)[0])
+
+
+def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
+    relaxed = options.model_copy(update={"settle_time": 0.0, "settle_angle": 0.0})
+    run = plan_run(options.warm_up_speed, relaxed)
+    once = run.command()
+    times, values = [0.0], [0.0]
+    for cycle in range(options.warm_up_cycles):
+        times += [cycle * once.times[-1] + t for t in once.times[1:]]
+        values += once.values[1:]
+    return TrialRequest(
+        Task(
+            mode="rate",
+            command=Polyline(times=tuple(times), values=tuple(values)),
+            duration=times[-1] + options.rest,
+            window=(0.0, times[-1]),
+            sample_rate=options.sample_rate,
+            start_angle=start_angle,
+        ),
+        role=Role.WARM_UP,
+        point={"speed": options.warm_up_speed},
+        note=f"{options.warm_up_cycles} moves out and back",
+    )

@@ -1,0 +1,218 @@
+"""What a friction-velocity map says, as tables, findings and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.experiments.friction_map.fits import DIGITS, MapFits
+from campaign.experiments.friction_map.points import MapPoint, told_periods
+from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.intervals import with_error
+from campaign.identification.sampled import where_it_scatters
+from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
+from campaign.identification.velocity_map import MODELS, DirectionFit, Model, correlation, doubts
+from campaign.result import Cell, Column, Finding, Table, Value
+
+FITTED: tuple[Model, ...] = ("free", "2")
+"""Models whose parameters are findings."""
+MODEL_LABELS = {"free": "δ free", "2": "δ = 2", "none": "no Stribeck effect"}
+ERROR_OF = "the standard error of the column before it"
+MISFIT = 2.0
+"""by which the residuals of delta = 2 exceed those of delta free, to be told."""
+
+
+def map_findings(fits: MapFits, place: Mapping[str, Value]) -> Iterator[Finding]:
+    """Every parameter by direction, δ free before δ = 2."""
+    for model in FITTED:
+        estimates = fits.estimates(model)
+        for parameter in PARAMETERS:
+            for direction, found in estimates.items():
+                where = {**place, "direction": direction, "exponent": model}
+                yield Finding.of(found[parameter], where)
+
+
+def point_table(points: Sequence[MapPoint], suffix: str, where: str) -> Table:
+    """The points as measured, and as they are fitted where a ripple was taken out of them."""
+    rippled = any(point.ripple for point in points)
+    more = (
+        Column("ripple", "Ripple", "N m", "N m", reason="it follows from the ripple of long runs"),
+        Column("without_ripple", "Friction torque without ripple", "N m", "N m"),
+    )
+    return Table(
+        key=f"map{suffix}",
+        title=f"Points of the friction-velocity map{f' ({where})' if where else ''}",
+        columns=(
+            Column("speed", "Commanded rate", "rad/s", "deg/s", exact=True),
+            Column("rate", "Measured rate", "rad/s", "deg/s"),
+            Column("torque", "Friction torque", "N m", "N m"),
+            Column(
+                "spread",
+                "Spread in the window (1σ)",
+                "N m",
+                "N m",
+                reason="it describes the window's samples",
+            ),
+            Column("window", "Window", "s", "s", exact=True),
+            Column("rule", "Window set by"),
+            *(more if rippled else ()),
+        ),
+        rows=tuple(_point_row(point) for point in sorted(points, key=lambda p: p.speed)),
+        note="Mean drive torque over the settled window, less inertia times residual acceleration. "
+        "The interval is that of the window: what friction changes from trial to trial is not in "
+        "it, and shows in the fit.",
+    )
+
+
+def _point_row(point: MapPoint) -> dict[str, Cell]:
+    torque = point.torque
+    clean = replace(torque, value=torque.value - point.ripple, low=None, high=None)
+    if torque.standard_error is not None and torque.freedom is not None:
+        told = with_error("", clean.value, "N m", point.error, torque.freedom, torque.method)
+        clean = replace(told, systematic=torque.systematic)
+    return {
+        "speed": point.speed,
+        "rate": where_it_scatters(point.rate, abs(point.rate.value), DIGITS),
+        "torque": where_it_scatters(torque, abs(torque.value), DIGITS),
+        "spread": point.spread,
+        "window": point.window,
+        "rule": point.rule,
+        "ripple": point.ripple,
+        "without_ripple": where_it_scatters(clean, abs(clean.value), DIGITS),
+    }
+
+
+def parameter_table(fits: MapFits, suffix: str, where: str) -> Table:
+    """Table 4.3: parameters by direction, δ free and δ = 2."""
+    free, fixed = fits.estimates("free"), fits.estimates("2")
+    rows: list[dict[str, Cell]] = []
+    for parameter in PARAMETERS:
+        row: dict[str, Cell] = {"parameter": SYMBOLS[parameter], "unit": UNITS[parameter]}
+        for name, found in free.items():
+            row[name] = found[parameter]
+            row[f"{name}_2"] = fixed[name][parameter]
+            row[f"{name}_error"] = found[parameter].standard_error
+        rows.append(row)
+    rms: dict[str, Cell] = {"parameter": "residual (rms)", "unit": "N m"}
+    for name, fit in fits.fits.items():
+        rms |= {name: _rms(fit, "free"), f"{name}_2": _rms(fit, "2")}
+    return Table(
+        key=f"parameters{suffix}",
+        title=f"Static friction parameters{f' ({where})' if where else ''}",
+        columns=(
+            Column("parameter", "Parameter"),
+            Column("unit", "Unit"),
+            Column("positive", "Positive"),
+            Column("positive_error", "± (1σ)", reason=ERROR_OF),
+            Column("negative", "Negative"),
+            Column("negative_error", "± (1σ)", reason=ERROR_OF),
+            Column("nominal", "Nominal"),
+            Column("positive_2", "Positive, δ = 2"),
+            Column("negative_2", "Negative, δ = 2"),
+            Column("nominal_2", "Nominal, δ = 2"),
+        ),
+        rows=(*rows, rms),
+        thesis=("4.3",),
+        note="δ free is for the static model and this table; δ = 2 is what the LuGre model uses. "
+        "Nominal is the mean of both directions, whose errors go together.",
+    )
+
+
+def _rms(fit: DirectionFit, model: Model) -> Estimate:
+    value, reason = fit.fits[model].rms, "it describes the residuals"
+    return Estimate.without_interval("residual", value, "N m", reason)
+
+
+def model_table(fits: MapFits, suffix: str, where: str) -> Table:
+    """How well each model of the Stribeck effect describes the points of each direction."""
+    rows: list[dict[str, Cell]] = []
+    for direction, fit in fits.fits.items():
+        for model in MODELS:
+            found = fit.fits[model]
+            rows.append(
+                {
+                    "direction": direction,
+                    "model": MODEL_LABELS[model],
+                    "parameters": found.fitted,
+                    "points": len(fit.speed),
+                    "rms": found.rms,
+                    "chi_square": found.chi_square,
+                    "bic": found.bic,
+                    "preferred": "yes" if model == fit.preferred else "",
+                }
+            )
+    criterion = "a criterion to compare models by"
+    return Table(
+        key=f"models{suffix}",
+        title=f"Models of the Stribeck effect{f' ({where})' if where else ''}",
+        columns=(
+            Column("direction", "Direction"),
+            Column("model", "Model"),
+            Column("parameters", "Parameters", exact=True),
+            Column("points", "Speeds", exact=True),
+            Column("rms", "Residual (rms)", "N m", "N m", reason="it describes the residuals"),
+            Column("chi_square", "χ²", reason=criterion),
+            Column("bic", "BIC", reason=criterion),
+            Column("preferred", "Lowest BIC"),
+        ),
+        rows=tuple(rows),
+        note="All models of a direction have the weights of the one with δ free, so that χ² and "
+        "BIC can be compared.",
+    )
+
+
+def map_notes(fits: MapFits, where: str) -> Iterator[str]:
+    """What a reader should know of the fits, and what to do about it."""
+    there = f" ({where})" if where else ""
+    for name, fit in fits.fits.items():
+        start = f"{name.capitalize()} direction{there}"
+        yield from (f"{start}, δ free: {doubt}." for doubt in doubts(fit))
+        yield f"{start}: {_scatter(fit)}."
+        if fit.preferred != "free" or fit.misfit > MISFIT:
+            yield (
+                f"{start}: {MODEL_LABELS[fit.preferred]} has the lowest BIC; the residuals of "
+                f"δ = 2 are {fit.misfit:.2g} times those of δ free. Intervals hold for each model "
+                "by itself, not for the choice among them."
+            )
+        yield f"{start}: {_ripple(fits, name)}."
+    together = correlation(fits.fits["positive"], fits.fits["negative"])
+    yield f"Residuals of both directions{there} correlate by {together:.2g}."
+
+
+def _scatter(fit: DirectionFit) -> str:
+    if fit.between == 0:
+        return "points scatter by no more than their windows show"
+    return f"points scatter by {100 * fit.between:.2g} % of their torque beyond their windows"
+
+
+def _ripple(fits: MapFits, direction: str) -> str:
+    ripple, told = fits.ripples[direction], told_periods(fits.bench)
+    points = [point for point in fits.points if point.sign == DIRECTIONS[direction]]
+    if ripple is not None:
+        turn = 2.0 * np.pi / ripple.periods
+        short = sum(abs(point.last - point.first) < turn for point in points)
+        source = "as the bench describes it" if told else "as these runs show it"
+        return (
+            f"a ripple of {ripple.periods:.4g} periods per revolution, {source}, and "
+            f"{100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} runs, was taken "
+            f"out of all points; {short} windows are shorter than its period"
+        )
+    least = np.rad2deg(min(abs(point.speed) * point.window for point in points))
+    return (
+        "no ripple over position was found in runs long enough to show one; if friction has one, "
+        f"windows that are shorter than its period (the shortest is {least:.2g} deg) see it at "
+        "one place: start_angles averages it"
+    )
+
+
+def fitted_torque(point: MapPoint, fits: MapFits) -> Estimate:
+    """A point's torque without ripple, with its whole deviation: window and between points."""
+    fit = fits.fits["positive" if point.sign > 0 else "negative"]
+    value = point.torque.value - point.ripple
+    error = float(np.hypot(np.nan_to_num(point.error), fit.between * value))
+    told = with_error("friction_torque", value, "N m", error, fit.freedom, "window and scatter")
+    return with_systematic(told, fits.bench, TORQUE_CONSTANT, value)

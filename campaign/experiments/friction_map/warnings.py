@@ -1,0 +1,104 @@
+"""What the plan of a friction-velocity map can know before anything moves, and what to do about it.
+
+Only of what the bench describes: where friction is not described nothing is warned of.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from campaign.experiments.friction_map.runs import (
+    Run,
+    VelocityMapOptions,
+    map_speeds,
+    plan_run,
+    settling_advice,
+)
+from campaign.experiments.shared.rig import Rig
+from campaign.identification.ripple import FASTEST, LEAST_PERIODS
+from campaign.identification.stribeck import PARAMETERS
+from campaign.identification.velocity_map import FEWEST_BELOW
+from campaign.physics.bench import Bench
+from campaign.physics.true_values import stribeck_parameters
+
+LEAST_RUNS = 2
+"""that have to show a ripple whose period is known, for it to be taken out of all points."""
+
+
+def map_warnings(options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
+    """Sentences, without a full stop, of a map that was planned with these options."""
+    runs = [plan_run(speed, options) for speed in sorted(set(map_speeds(options)))]
+    yield from _too_few(runs)
+    if getattr(options, "pilot", False):  # it decides where others run, and how long they settle
+        return
+    yield from _none_below(runs, bench)
+    yield from _settling(runs, bench)
+    yield from _ripple(runs, options, bench)
+
+
+def _too_few(runs: Sequence[Run]) -> Iterator[str]:
+    if len(runs) <= len(PARAMETERS):
+        yield (
+            f"{len(runs)} speeds cannot determine the {len(PARAMETERS)} parameters of the Stribeck "
+            f"curve and their scatter: {len(PARAMETERS) + 1} are the fewest, some ten more give "
+            "intervals that say something"
+        )
+
+
+def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
+    """Of the larger Stribeck velocity, where the directions have two; none without an effect."""
+    known = [stribeck_parameters(bench, sign) for sign in (1.0, -1.0)]
+    velocity = max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
+    below = sum(run.speed < velocity for run in runs)
+    if velocity > 0 and below < FEWEST_BELOW:
+        yield (
+            f"{below} of {len(runs)} speeds are below the Stribeck velocity of "
+            f"{_degrees(velocity)} deg/s: static_torque is extrapolated; run {FEWEST_BELOW} or "
+            f"more below it, from {_degrees(0.1 * velocity)} deg/s on"
+        )
+
+
+def _settling(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
+    rig = Rig(bench)
+    told: dict[str, list[float]] = {}
+    for run in runs:
+        if advice := settling_advice(rig, run.settle * run.speed):
+            told.setdefault(advice, []).append(run.speed)
+    for advice, speeds in told.items():
+        yield f"at {_range(speeds)} runs settle for too short an angle: {advice}"
+
+
+def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
+    """Of a ripple that windows do not average, several starts neither, and the analysis cannot
+    take out, for too few runs are long and slow enough to show it.
+    """
+    period = Rig(bench).ripple_period
+    if period is None or len(set(options.start_angles)) > 1:
+        return
+    short = [run.speed for run in runs if run.window * run.speed < period]
+    slow = [run for run in runs if run.speed < FASTEST * period]
+    showing = [run for run in slow if run.settled * run.speed >= LEAST_PERIODS * period]
+    if not short or len(showing) >= LEAST_RUNS:
+        return
+    told = f"a period of friction's ripple, {_degrees(period)} deg"
+    if options.max_travel < period:
+        yield (
+            f"max_travel of {_degrees(options.max_travel)} deg is shorter than {told}: every run "
+            "sees it at one place; raise it, or write two start_angles half a period apart"
+        )
+        return
+    yield (
+        f"at {_range(short)} windows are shorter than {told}, and it cannot be taken out: of the "
+        f"runs below {_degrees(FASTEST * period)} deg/s {len(showing)} span one, and {LEAST_RUNS} "
+        "have to; raise max_travel or max_time, or write two start_angles half a period apart"
+    )
+
+
+def _range(speeds: Sequence[float]) -> str:
+    low, high = _degrees(min(speeds)), _degrees(max(speeds))
+    return f"{low} deg/s" if low == high else f"{low} to {high} deg/s"
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.3g}"

@@ -1,0 +1,1 @@
+"""What experiments make of their metrics: means, tables, figures, remarks."""

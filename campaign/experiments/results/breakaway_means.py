@@ -1,0 +1,206 @@
+"""What the ramps of a breakaway test say together: means, and what ramp rate and dwell shift."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.systematic import shared_parts
+from campaign.identification.intervals import (
+    difference,
+    judged,
+    shifted_by,
+    student,
+    welch,
+    with_error,
+)
+from campaign.result import Value
+
+MEASURED = ("breakaway_torque", "bristle_stiffness", "stiffness_at_rest")
+"""Quantities that a ramp measures."""
+QUANTITIES = (*MEASURED, "bristle_damping")
+CAUSES = {"ramp rate": "torque_rate", "dwell": "rest"}
+"""What may shift all ramps of a test alike, and the option that would show it when swept."""
+BOTH = "both"
+
+
+@dataclass(frozen=True)
+class Ramps:
+    """The ramps of one place in the sweep.
+
+    Attributes:
+        trials: that completed.
+        places: conditions of each, with its direction.
+        found: metrics of each by name.
+    """
+
+    trials: tuple[TrialData, ...]
+    places: tuple[Mapping[str, Value], ...]
+    found: tuple[Mapping[str, Estimate], ...]
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """In the order in which they were run."""
+        return tuple(dict.fromkeys(str(place["direction"]) for place in self.places))
+
+    def values(self, quantity: str, direction: str = BOTH) -> list[Estimate]:
+        """What the ramps of a direction found of a quantity, those that did."""
+        return [
+            own[quantity]
+            for place, own in zip(self.places, self.found, strict=True)
+            if quantity in own and direction in (BOTH, place["direction"])
+        ]
+
+
+def means_of(ramps: Ramps) -> dict[str, dict[str, Estimate]]:
+    """Means over the positions by direction (`both` first, where there are two) and quantity."""
+    by_direction = {
+        direction: {
+            quantity: mean(quantity, found)
+            for quantity in QUANTITIES
+            if (found := ramps.values(quantity, direction))
+        }
+        for direction in ramps.directions
+    }
+    if len(by_direction) < 2:
+        return by_direction
+    one, other = by_direction.values()
+    both = {name: _between(one[name], other[name]) for name in one if name in other}
+    return {BOTH: both, **by_direction}
+
+
+def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
+    """Mean over ramps: Student's t over them, never narrower than their own intervals explain.
+
+    Ramps without an interval of their own have a mean with one where they scatter so much more than
+    their residuals that these do not matter.
+    """
+    value = float(np.mean([each.value for each in found]))
+    unit, count = found[0].unit, len(found)
+    systematic = shared_parts(found)
+    told = next((each for each in found if each.origin is Origin.ASSUMED or _bound(each)), None)
+    if told is not None:
+        return replace(told, value=value, standard_error=None, freedom=None, systematic=systematic)
+    own = [each.standard_error or 0.0 for each in found]
+    inner = math.sqrt(float(np.mean(np.square(own))) / count)
+    inner_freedom = float(sum(each.freedom or 0.0 for each in found))
+    reason = next((each.reason for each in found if not each.has_interval), "")
+    if count == 1:
+        return replace(found[0], systematic=systematic)
+    outer = float(np.std([each.value for each in found], ddof=1)) / math.sqrt(count)
+    if reason and outer < 3.0 * inner:
+        return Estimate.without_interval(quantity, value, unit, reason, systematic=systematic)
+    method = f"mean of {count} ramps, Student's t"
+    scatter = with_error(quantity, value, unit, outer, count - 1, method, systematic=systematic)
+    within = with_error(quantity, value, unit, inner, inner_freedom, method, systematic=systematic)
+    return judged(max((scatter, within), key=_width))
+
+
+def _bound(estimate: Estimate) -> bool:
+    return estimate.kind in ("at least", "at most")
+
+
+def _width(estimate: Estimate) -> float:
+    return 0.0 if not estimate.has_interval else estimate.half_width
+
+
+def _between(one: Estimate, other: Estimate) -> Estimate:
+    """Mean of the means of two directions, whose ramps are independent of each other."""
+    value = 0.5 * (one.value + other.value)
+    systematic = shared_parts((one, other))
+    told = next((each for each in (one, other) if not each.has_interval), None)
+    if told is not None:
+        more = {"origin": told.origin, "kind": told.kind, "method": told.method}
+        return Estimate.without_interval(
+            one.name, value, one.unit, told.reason, systematic=systematic, **more
+        )
+    errors = [each.standard_error or 0.0 for each in (one, other)]
+    freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
+    method = "mean of both directions, Welch"
+    error = 0.5 * math.hypot(*errors)
+    found = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
+    return judged(found)
+
+
+def with_comparisons(groups: Sequence[Ramps]) -> list[Ramps]:
+    """The groups with systematic parts by ramp rate and dwell, as groups beside them show."""
+    return [_compared(ramps, groups) for ramps in groups]
+
+
+def _compared(ramps: Ramps, groups: Sequence[Ramps]) -> Ramps:
+    sizes = {
+        (quantity, source): _shift(ramps, groups, quantity, source)
+        for quantity in MEASURED
+        for source in CAUSES
+    }
+    found = tuple(
+        {
+            name: _with_parts(each, [(source, sizes[name, source]) for source in CAUSES])
+            if name in MEASURED
+            else each
+            for name, each in own.items()
+        }
+        for own in ramps.found
+    )
+    return replace(ramps, found=found)
+
+
+def _with_parts(estimate: Estimate, parts: Sequence[tuple[str, float | None]]) -> Estimate:
+    for source, size in parts:
+        estimate = shifted_by(estimate, source, size)
+    return estimate
+
+
+def _shift(ramps: Ramps, groups: Sequence[Ramps], quantity: str, source: str) -> float | None:
+    """How far ramp rate or dwell moves a quantity (1 sigma); None where no group beside shows it.
+
+    A ramp rate's shift is carried on to the rate zero in a straight line; a dwell's is the
+    difference. Only what is beyond scatter counts.
+    """
+    option = CAUSES[source]
+    sizes = []
+    for other in groups:
+        if not _differ_only_in(option, ramps, other):
+            continue
+        here, there = ramps.values(quantity), other.values(quantity)
+        if not here or not there:
+            continue
+        change = difference(quantity, mean(quantity, here), mean(quantity, there), here[0].unit)
+        if change.standard_error is None:
+            sizes.append(abs(change.value))
+            continue
+        free = change.freedom or math.inf
+        significant = abs(change.value) > student(free) * change.standard_error
+        sizes.append(abs(change.value) * _reach(option, ramps, other) if significant else 0.0)
+    return max(sizes) / math.sqrt(3.0) if sizes else None  # evenly likely up to there (GUM 4.3.7)
+
+
+def _option(ramps: Ramps, name: str) -> float:
+    value = ramps.trials[0].trial.options.get(name)
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _reach(option: str, ramps: Ramps, other: Ramps) -> float:
+    if option != "torque_rate":
+        return 1.0
+    own, beside = _option(ramps, option), _option(other, option)
+    return own / abs(beside - own)
+
+
+def _differ_only_in(option: str, one: Ramps, other: Ramps) -> bool:
+    if one is other or _option(one, option) == _option(other, option):
+        return False
+    return _rest(one, option) == _rest(other, option)
+
+
+def _rest(ramps: Ramps, option: str) -> dict[str, Value]:
+    return dict(_others(ramps.places[0], ("measurement", "position", "direction", option)))
+
+
+def _others(place: Mapping[str, Value], own: Sequence[str]) -> Iterator[tuple[str, Value]]:
+    return ((name, value) for name, value in place.items() if name not in own)

@@ -1,0 +1,221 @@
+"""What one recording of the observer-gain study says, and what the recordings at one gain say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
+from campaign.estimate import Estimate
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.pointing_error import error_of, found, measured_part, of_each
+from campaign.identification.intervals import LEVEL
+from campaign.identification.sine_amplitude import amplitude
+from campaign.identification.stabilization_error import over_blocks, over_trials
+from campaign.physics import observer_loop as theory
+from campaign.physics.bench import Bench
+from campaign.result import Array
+from campaign.signals import Sine
+from campaign.trial import Outcome, Recording
+
+ERROR = "stabilization_error"
+ERROR_THEORY = "error_by_equation_5_4"
+NOISE = "noise_rate"
+REJECTION = "disturbance_rejection"
+BY_THEORY = "an equation says so, not a measurement"
+ENOUGH = 6
+"""frequencies whose lowest and highest answer enclose the median in 97 % of cases (sign test)."""
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """|w/Td| at one frequency (Hz): measured and by Eq. 5.4 (rad/s per N m)."""
+
+    frequency: float
+    measured: Estimate
+    expected: float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What was found at one gain, SI; None where it was not measured, or not stable.
+
+    Attributes:
+        corner: Hz; 0 is without observer.
+        gain: N K0, N m s/rad at the load.
+        error, error_theory: stabilization error (rad).
+        noise, noise_theory: true rate of the load from the gyro's noise (rad/s, 1 sigma).
+        rejection: by rising frequency.
+        unstable: why its trials ended early; empty when they did not.
+    """
+
+    corner: float
+    gain: float
+    error: Estimate | None
+    error_theory: Estimate | None
+    noise: Estimate | None
+    noise_theory: float | None
+    rejection: tuple[Rejection, ...]
+    unstable: str
+
+
+def own_observer(bench: Bench, name: str) -> tuple[float, float | None]:
+    """Corner frequency (Hz) of the bench's observer, and the inertia it assumes (kg m^2)."""
+    if name not in bench.compensation:
+        named = ", ".join(bench.compensation) or "none"
+        raise ValueError(f"the bench has no compensation '{name}'; it has {named}")
+    observer = bench.compensation[name]
+    if observer.method != "observer":
+        raise ValueError(f"'{name}' is no disturbance observer: its method is '{observer.method}'")
+    return theory.corner_frequency(bench, observer.gain, observer.inertia), observer.inertia
+
+
+def is_noisy(bench: Bench) -> bool:
+    """Whether its gyro has noise that a sampled controller sees."""
+    return bench.controller.sample_rate is not None and bench.sensors.gyro.noise > 0
+
+
+def _corner(data: TrialData) -> float:
+    return float(str(data.trial.point["corner"]))
+
+
+def _inertia(data: TrialData, bench: Bench) -> float | None:
+    """The inertia that the observer assumes (kg m^2)."""
+    return own_observer(bench, str(data.trial.options["observer"]))[1]
+
+
+def measure(data: TrialData) -> list[Estimate]:
+    """The number that a trial is about; beside the error, what Eq. 5.4 makes of its friction."""
+    return found(_measured(data, measured_part(data)))
+
+
+def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
+    task, measured = data.trial.task, data.trial.point["measured"]
+    if measured == "error":
+        yield error_of(cut, task)
+        if FRICTION_TORQUE in cut.channels:
+            bench = bench_of(data.trial)
+            value = predicted_error(cut, bench, _corner(data), _inertia(data, bench))
+            yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY)
+    elif measured == "noise" and LOAD_RATE in cut.channels:
+        yield over_blocks(cut[LOAD_RATE], NOISE, "rad/s")
+    elif measured == "rejection" and isinstance(task.disturbance, Sine):
+        per_torque = cut[GYRO_RATE] / task.disturbance.amplitude
+        frequency = task.disturbance.frequency
+        yield amplitude(REJECTION, cut.time, per_torque, frequency, "rad/s/(N m)")
+
+
+def gain_of(corner: float, group: Sequence[TrialData]) -> Gain:
+    """What all trials at one corner frequency (Hz) say."""
+    ended = [i for i in group if i.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)]
+    completed = [item for item in group if item.ending.outcome is Outcome.COMPLETED]
+    by_kind: dict[str, list[TrialData]] = {"error": [], "noise": [], "rejection": []}
+    for item in completed:
+        by_kind[str(item.trial.point["measured"])].append(item)
+    bench = bench_of(group[0].trial)
+    inertia = _inertia(group[0], bench)
+    return Gain(
+        corner=corner,
+        gain=2 * np.pi * corner * (inertia or bench.axis.inertia),
+        error=_together(by_kind["error"], ERROR),
+        error_theory=_together(by_kind["error"], ERROR_THEORY),
+        noise=_together(by_kind["noise"], NOISE),
+        noise_theory=theory.noise_rate(bench, corner, inertia) if is_noisy(bench) else None,
+        rejection=tuple(_rejections(by_kind["rejection"], bench, corner, inertia)),
+        unstable=ended[0].ending.reason if ended else "",
+    )
+
+
+def _together(group: Sequence[TrialData], name: str) -> Estimate | None:
+    """A metric of the repetitions of a trial; None where no recording has it."""
+    estimates = of_each(group, measure, name)
+    if not estimates:
+        return None
+    if name == ERROR_THEORY:
+        return replace(estimates[0], value=float(np.mean([each.value for each in estimates])))
+    return over_trials(estimates)
+
+
+def _rejections(
+    group: Sequence[TrialData], bench: Bench, corner: float, inertia: float | None
+) -> Iterator[Rejection]:
+    by_frequency: dict[float, list[TrialData]] = {}
+    for item in group:
+        frequency = float(str(item.trial.point["disturbance_frequency"]))
+        by_frequency.setdefault(frequency, []).append(item)
+    for frequency, items in sorted(by_frequency.items()):
+        measured = _together(items, REJECTION)
+        expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
+        if measured is not None:
+            yield Rejection(frequency, measured, float(expected))
+
+
+def predicted_error(
+    recording: Recording, bench: Bench, corner: float, inertia: float | None
+) -> float:
+    """Error (rad, 1 sigma) that Eq. 5.4 makes of the friction of a recording of whole cycles.
+
+    The true friction is the disturbance; its spectrum through w/Td and the integration to an angle
+    gives the error. A simulator alone knows it.
+    """
+    time = recording.time
+    count = len(time)
+    step = float(np.ptp(time)) / (count - 1)
+    frequency: Array = np.fft.rfftfreq(count, step)[1:].astype(float)
+    torque = np.fft.rfft(recording[FRICTION_TORQUE])[1:] / count
+    s = 2j * np.pi * frequency
+    high_pass = 2 * np.pi * bench.controller.pointing_high_pass
+    angle = torque * theory.rejection(bench, corner, inertia, frequency) / (s + high_pass)
+    twice = np.full(len(angle), 2.0)
+    if count % 2 == 0:
+        twice[-1] = 1.0
+    return float(np.sqrt(np.sum(twice * np.abs(angle) ** 2)))
+
+
+def measured_corner(gain: Gain, without: Gain) -> Estimate | None:
+    """Corner frequency (Hz) that explains by how much the observer reduced |w/Td|.
+
+    By Eq. 5.4 the ratio of the two is s / (s + a), so that (1 / ratio)^2 - 1 = (a / w)^2. The value
+    is the median over the frequencies; its interval, from the lowest to the highest answer,
+    encloses the median of such answers however they are distributed.
+    """
+    known = {point.frequency: point.measured.value for point in without.rejection}
+    pairs = [
+        (point.frequency, known[point.frequency] / point.measured.value)
+        for point in gain.rejection
+        if known.get(point.frequency) and point.measured.value > 0
+    ]
+    corners = [f * np.sqrt(ratio**2 - 1) for f, ratio in pairs if ratio > 1]
+    if not corners:
+        return None
+    name, value = "observer_corner_frequency", float(np.median(corners))
+    if len(corners) < ENOUGH:
+        reason = f"{len(corners)} frequencies; from {ENOUGH} on their range encloses it"
+        return Estimate.without_interval(name, value, "Hz", reason)
+    low, high = float(min(corners)), float(max(corners))
+    method = f"median and range of what {len(corners)} frequencies say"
+    return Estimate(name, value, "Hz", low, high, LEVEL, method)
+
+
+def worst_ratio(gain: Gain) -> Estimate | None:
+    """Measured |w/Td| over Eq. 5.4, where it is farthest from 1; None where none was measured."""
+    if not gain.rejection:
+        return None
+    worst = max(gain.rejection, key=lambda point: abs(point.measured.value / point.expected - 1))
+    return multiple(worst.measured, 1.0 / worst.expected, "ratio", "")
+
+
+def multiple(estimate: Estimate, factor: float, name: str, unit: str) -> Estimate:
+    """An estimate times a positive number that is exact."""
+    error = estimate.standard_error
+    return replace(
+        estimate,
+        name=name,
+        unit=unit,
+        value=factor * estimate.value,
+        low=None if estimate.low is None else factor * estimate.low,
+        high=None if estimate.high is None else factor * estimate.high,
+        standard_error=None if error is None else factor * error,
+    )

@@ -1,0 +1,225 @@
+"""What the sensitivity study says: thresholds and ranks of parameters, their table and figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.experiments.shared.common import method_label
+from campaign.experiments.shared.pointing_error import ends
+from campaign.identification.threshold import Threshold, crossing, passing
+from campaign.result import (
+    Array,
+    Axis,
+    Cell,
+    Column,
+    Curve,
+    Figure,
+    Finding,
+    Mark,
+    Panel,
+    Table,
+    Value,
+)
+
+SYMBOLS = {
+    "bristle_stiffness": "σ0",
+    "bristle_damping": "σ1",
+    "viscous_friction": "σ2",
+    "static_torque": "Ts",
+    "coulomb_torque": "Tc",
+    "stribeck_velocity": "vs",
+}
+
+
+@dataclass(frozen=True)
+class Response:
+    """Error over the change of one parameter; changes increase, 0 among them.
+
+    Attributes:
+        change: shape (n,), relative.
+        errors: rad, one for each change: over its repetitions.
+        dots: every trial's (change, error), shape (m, 2).
+    """
+
+    change: Array
+    errors: tuple[Estimate, ...]
+    dots: Array
+
+    @cached_property
+    def error(self) -> Array:
+        """Values of the errors (rad), shape (n,)."""
+        return np.array([error.value for error in self.errors])
+
+    @property
+    def unchanged(self) -> Estimate:
+        """The error with the model as it is."""
+        return self.errors[int(np.argmin(np.abs(self.change)))]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What one parameter's response says.
+
+    Attributes:
+        threshold: smallest relative change at which the error passes, or a bound of it.
+        rank: 1 the most important.
+    """
+
+    parameter: str
+    response: Response
+    threshold: Estimate
+    rank: Estimate
+
+    @property
+    def symbol(self) -> str:
+        return SYMBOLS.get(self.parameter, self.parameter)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the threshold was passed by a change that was tried."""
+        return self.threshold.kind == "number" and bool(np.isfinite(self.threshold.value))
+
+
+def ranking(responses: Mapping[str, Response], threshold: float) -> dict[str, int]:
+    """Rank of each parameter, 1 the most important: by the threshold, then by the largest error."""
+
+    def order(parameter: str) -> tuple[float, float]:
+        response = responses[parameter]
+        passed = crossing(response.change, response.error, threshold)
+        largest = float(np.max(response.error))
+        return (np.inf if passed is None else passed), -largest
+
+    return {name: rank for rank, name in enumerate(sorted(responses, key=order), start=1)}
+
+
+def judge(responses: Mapping[str, Response], limit: Threshold) -> tuple[Judged, ...]:
+    """Threshold and rank of each parameter, in the order of `responses`."""
+    thresholds = {
+        name: passing("sensitivity_threshold", response.change, response.errors, limit)
+        for name, response in responses.items()
+    }
+    ranks = ranking(responses, limit.value)
+    return tuple(
+        Judged(name, response, thresholds[name], _rank(name, ranks, thresholds))
+        for name, response in responses.items()
+    )
+
+
+def _rank(name: str, ranks: Mapping[str, int], thresholds: Mapping[str, Estimate]) -> Estimate:
+    """A place in an order: what has no interval, but neighbours that may stand in its place."""
+    near = [
+        SYMBOLS.get(other, other)
+        for other, estimate in thresholds.items()
+        if other != name and _may_be_alike(estimate, thresholds[name])
+    ]
+    reason = "a place in an order, not a size"
+    if near:
+        reason += (
+            f"; by the intervals of the thresholds it may change places with {', '.join(near)}"
+        )
+    rank = float(ranks[name])
+    return Estimate.without_interval("sensitivity_rank", rank, "", reason, kind="count")
+
+
+def _may_be_alike(one: Estimate, other: Estimate) -> bool:
+    """Whether what is known of two thresholds leaves their order open."""
+    first, second = _range(one), _range(other)
+    return first[0] <= second[1] and second[0] <= first[1]
+
+
+def _range(threshold: Estimate) -> tuple[float, float]:
+    if threshold.kind == "at least":
+        return threshold.value, np.inf
+    low, high = threshold.combined
+    value = threshold.value if np.isfinite(threshold.value) else 0.0
+    return (value if low is None else low), (
+        np.inf if high is None and low is not None else value if high is None else high
+    )
+
+
+def sensitivity_findings(judged: Sequence[Judged], told: Mapping[str, Value]) -> Iterator[Finding]:
+    """Threshold and rank of each parameter; a threshold that nothing passes is a lower bound."""
+    for one in judged:
+        where = {**told, "parameter": one.parameter}
+        yield Finding.of(one.threshold, where)
+        yield Finding.of(one.rank, where)
+
+
+def _row(one: Judged) -> dict[str, Cell]:
+    response = one.response
+    bound = "not determined" if np.isnan(one.threshold.value) else f"{one.threshold.value:.0%}"
+    return {
+        "parameter": one.parameter,
+        "symbol": one.symbol,
+        "threshold": one.threshold,
+        "rank": one.rank,
+        "unchanged": response.unchanged,
+        "lowest_change": float(response.change[0]),
+        "low": response.errors[0],
+        "highest_change": float(response.change[-1]),
+        "high": response.errors[-1],
+        "said": "" if one.passed else f"none below {bound}",
+    }
+
+
+def sensitivity_table(judged: Sequence[Judged], limit: Threshold) -> Table:
+    """A row for each parameter, the most important first."""
+    return Table(
+        key="sensitivity",
+        title=f"Change of each parameter at which the error passes {limit.value * 1e3:.3g} mrad",
+        columns=(
+            Column("symbol", "Parameter"),
+            Column("parameter", "Name"),
+            Column("threshold", "Change", "", "percent"),
+            Column("said", "Within the changes tried"),
+            Column("rank", "Rank"),
+            Column("unchanged", "Error, unchanged", "rad", "mrad"),
+            Column("lowest_change", "Largest decrease", "", "percent", exact=True),
+            Column("low", "Error there", "rad", "mrad"),
+            Column("highest_change", "Largest increase", "", "percent", exact=True),
+            Column("high", "Error there", "rad", "mrad"),
+        ),
+        rows=tuple(_row(one) for one in sorted(judged, key=lambda one: one.rank.value)),
+        thesis=("figure 5.14",),
+        note="The smaller of decrease and increase counts, interpolated between the changes tried. "
+        "Parameters that never pass are ranked by their largest error; the change that stands "
+        "there is a bound.",
+    )
+
+
+def sensitivity_figure(judged: Sequence[Judged], limit: Threshold, compensation: str) -> Figure:
+    """Figure 5.14: a panel for each parameter, all of one scale."""
+    top = 1.08 * max(float(np.max(one.response.dots[:, 1])) for one in judged)
+    scale = (0.0, max(top, 1.1 * limit.value))
+    error = Axis("Stabilization error (1σ)", "rad", "mrad", limits=scale)
+    panels = []
+    for one in judged:
+        response = one.response
+        said = f"passes at {one.threshold.value:.0%}" if one.passed else "not passed"
+        marks = [Mark(f"{limit.value * 1e3:.3g} mrad", y=limit.value)]
+        low, high = ends(response.errors)
+        change, dots = response.change, response.dots
+        curves = [Curve(change, response.error, "mean", "measured", "line", low=low, high=high)]
+        if len(dots) > len(change):
+            curves.append(Curve(dots[:, 0], dots[:, 1], "each trial", "measured", "points"))
+        axis = Axis(f"Change of {one.symbol}", "", "percent")
+        title = f"{one.symbol}: {said}, rank {one.rank.value:.0f}"
+        panels.append(Panel(axis, error, curves, title, marks))
+    return Figure(
+        key="sensitivity",
+        title=f"Error over the change of each parameter, {method_label(compensation)}",
+        caption="Each panel changes one parameter of the compensation's model and leaves the "
+        "others and the true friction alone. The steeper the valley, the better the parameter has "
+        "to be known; the horizontal line is the threshold, the band the 95 % interval of the "
+        "mean. All panels have one scale.",
+        alt="Stabilization error over the relative change of each model parameter, one panel per "
+        "parameter, with a dot for every trial and a line at the threshold.",
+        panels=tuple(panels),
+        thesis=("5.14",),
+        across=2,
+    )

@@ -1,0 +1,1 @@
+"""What several experiments use. None of these modules is an experiment."""

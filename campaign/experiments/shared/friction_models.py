@@ -1,0 +1,148 @@
+"""What the virtual experiments on friction share: one bench with its friction in several models."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import JsonValue, ValidationError
+
+from campaign.estimate import Estimate
+from campaign.experiments.interface import Metrics, TrialData, metrics
+from campaign.experiments.shared.common import grouped
+from campaign.identification.intervals import shifted_by
+from campaign.identification.sampled import together
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.result import Column, Value
+from campaign.trial import Tree
+
+LABELS = {"stribeck": "static model", "lugre": "LuGre model"}
+SERIES = {"stribeck": "static"}
+"""Models that are drawn like the compensation built on them; any other has its own name's look."""
+
+
+def model_label(name: str) -> str:
+    """A friction model as it is called on the page."""
+    return LABELS.get(name, f"{name} model")
+
+
+def model_series(name: str) -> str:
+    """The series, and so the look, of a friction model's curves."""
+    return SERIES.get(name, name)
+
+
+def in_models(
+    bench: Bench, models: Sequence[str]
+) -> Iterator[tuple[dict[str, JsonValue], Tree | None]]:
+    """Sweep point and bench for each model; the bench as it is (None) when none is named."""
+    if not models:
+        yield {}, None
+    for name in models:
+        yield {"model": name}, with_model(bench, name)
+
+
+def with_model(bench: Bench, name: str) -> Tree:
+    """The normalised bench with every friction interface described by the model `name`.
+
+    Parameters that both models have are kept; others are dropped, and with them what scatter and
+    preload say of them. Raises ValueError, with a message for the user, for an unknown model and
+    for one that needs more than the bench says.
+    """
+    known = friction_models()
+    if name not in known:
+        close = difflib.get_close_matches(name, list(known), 1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
+        raise ValueError(
+            f"no friction model is called '{name}'; there are {', '.join(known)}{hint}"
+        )
+    options = known[name].options
+    tree: Any = bench.model_dump(mode="json", include={"friction"})
+    friction: dict[str, Any] = {}
+    for interface, fields in tree["friction"].items():
+        kept = {k: v for k, v in fields.items() if k in options.model_fields} | {"model": name}
+        try:
+            friction[interface] = options.model_validate(kept, context={"si": True})
+        except ValidationError as error:
+            where = ", ".join(".".join(map(str, e["loc"])) for e in error.errors())
+            raise ValueError(
+                f"friction.{interface} of the bench '{bench.name}' cannot be described by the "
+                f"model '{name}': see {where}"
+            ) from None
+    described: Tree = bench.with_friction(friction).model_dump(mode="json")
+    return described
+
+
+@dataclass(frozen=True)
+class Place:
+    """Trials that differ only in what their experiment varies itself.
+
+    Attributes:
+        point: the rest of the sweep that they share.
+        label: the same for people; empty when there is nothing to tell apart.
+    """
+
+    point: dict[str, Value]
+    label: str
+    trials: tuple[TrialData, ...]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Of a table that lists several places."""
+        return tuple(
+            Column(path, "Model" if path == "model" else path, exact=True) for path in self.point
+        )
+
+    def by(self, name: str) -> dict[float, tuple[TrialData, ...]]:
+        """Its trials by what the experiment varies as `name` (SI), ascending; repeats together."""
+        found: dict[float, list[TrialData]] = {}
+        for item in self.trials:
+            found.setdefault(float(str(item.trial.point[name])), []).append(item)
+        return {value: tuple(found[value]) for value in sorted(found)}
+
+
+OF_ONE = (
+    "Without repeats an interval is of the one recording: repeat the test to see how trials "
+    "scatter. What the time step of a simulation adds, --check-step tells."
+)
+"""For the note of a table of such experiments."""
+
+
+def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
+    """Numbers that only a simulation can know, with what its step adds: nobody has said how much.
+
+    No sample shows it, and no repeat. Half the step may change such a number by a thousandth, while
+    its cycles agree to the last digit.
+    """
+    return tuple(
+        each if each.kind == "count" else shifted_by(each, "time step of the simulation", None)
+        for each in found
+    )
+
+
+def combined(
+    trials: Sequence[TrialData], measure: Callable[[TrialData], Sequence[Estimate]]
+) -> dict[str, Estimate]:
+    """The metrics of repeats, by name, as `sampled.together` puts them; of those that all have."""
+    each = [metrics(item, measure) for item in trials]
+    names = [name for name in each[0] if all(name in found for found in each)]
+    return Metrics({name: together([found[name] for found in each]) for name in names})
+
+
+def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[Place, ...]:
+    """Trials by model and sweep, in plan order; `own` is what the experiment varies itself."""
+    found = []
+    for group in grouped(trials, own).values():
+        point: dict[str, Value] = {
+            path: value
+            for path, value in group[0].trial.point.items()
+            if path not in own and isinstance(value, str | int | float | bool)
+        }
+        words = [
+            model_label(str(value)) if path == "model" else f"{path} = {value}"
+            for path, value in point.items()
+        ]
+        found.append(Place(point, ", ".join(words), group))
+    return tuple(found)

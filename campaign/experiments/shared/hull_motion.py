@@ -1,0 +1,112 @@
+"""How the hull moves in a stabilization test: a sine, a measured series, or a ship in a seaway."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from campaign.experiments.shared.motion_series import kind_of, motion_signal, read_series
+from campaign.options import Options, TextFile
+from campaign.physics.ship_motion import ShipRoll, roll_acceleration
+from campaign.signals import MultiSine, Polyline
+from campaign.units import TIME, Frequency, Length, Time
+
+
+class SineMotion(Options):
+    """A sinusoidal acceleration, of the test's `frequency` and `acceleration`."""
+
+    kind: Literal["sine"] = "sine"
+    """A sinusoidal acceleration."""
+
+
+class SeriesMotion(Options):
+    """A measured time series, from a CSV file with a header line."""
+
+    kind: Literal["series"]
+    """A measured time series."""
+    file: TextFile
+    """Path of the CSV file, relative to the protocol."""
+    time: str = "s"
+    """Unit of the time column."""
+    value: str
+    """Unit of the value column: it says whether it is an angle, a rate or an acceleration."""
+    time_column: str = "time"
+    """Header of the time column."""
+    value_column: str = "value"
+    """Header of the value column."""
+    lead_in: Time = Field(default=1.0, gt=0)
+    """Before the series, for the hull to come from rest to the rate with which it begins."""
+    settle: Time = Field(default=2.0, ge=0)
+    """Beginning of the series that is not measured, for the transient to pass."""
+
+    @model_validator(mode="after")
+    def _readable(self) -> SeriesMotion:
+        TIME.parse(f"1 {self.time}")
+        kind_of(self.value)
+        if self.file.text is not None:
+            end = self._samples()[0][-1]
+            if self.settle >= end:
+                raise ValueError(f"the series lasts {end:.4g} s, no longer than settle")
+        return self
+
+    def _samples(self) -> tuple[Any, Any]:
+        if self.file.text is None:
+            raise ValueError(f"the text of {self.file.name} is not at hand")
+        return read_series(
+            self.file.text,
+            self.file.name,
+            self.time_column,
+            self.value_column,
+            self.time,
+            self.value,
+        )
+
+    def signal(self) -> tuple[Polyline, float, float]:
+        """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""
+        time, value = self._samples()
+        signal = motion_signal(time, value, kind_of(self.value), self.lead_in)
+        return signal, self.lead_in + self.settle, self.lead_in + float(time[-1])
+
+
+class ShipMotion(Options):
+    """Roll of a ship in irregular beam seas; `campaign.physics.ship_motion` has the equations."""
+
+    kind: Literal["ship"]
+    """Roll of a ship in a seaway."""
+    significant_height: Length = Field(default=2.5, gt=0, le=30)
+    """Hs of Bretschneider's wave spectrum."""
+    peak_period: Time = Field(default=8.8, gt=0.5, le=30)
+    """Period of the waves with the most energy."""
+    natural_period: Time = Field(default=8.0, gt=0.5, le=60)
+    """Of the ship's roll."""
+    damping_ratio: float = Field(default=0.1, gt=0, le=2)
+    """Of the ship's roll."""
+    slope_coefficient: float = Field(default=0.75, gt=0, le=1)
+    """Effective wave slope over the slope at the surface."""
+    cutoff: Frequency = Field(default=0.35, gt=0, le=5)
+    """Above it waves no longer roll the ship; 0.35 Hz is a wave of 13 m, about a frigate's beam."""
+    components: int = Field(default=60, ge=10, le=500)
+    """Sines that the spectrum is cut into."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """Which sea it is. Methods are comparable only in the same one; sweep it for several."""
+    settle: Time = Field(default=20.0, ge=0)
+    """Beginning that is not measured."""
+    duration: Time = Field(default=300.0, gt=0)
+    """What is measured."""
+
+    def signal(self) -> tuple[MultiSine, float, float]:
+        """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""
+        ship = ShipRoll(
+            self.significant_height,
+            self.peak_period,
+            self.natural_period,
+            self.damping_ratio,
+            self.slope_coefficient,
+            self.cutoff,
+        )
+        signal = roll_acceleration(ship, self.components, self.seed)
+        return signal, self.settle, self.settle + self.duration
+
+
+Motion = Annotated[SineMotion | SeriesMotion | ShipMotion, Field(discriminator="kind")]

@@ -1,0 +1,187 @@
+"""What a compensation's friction model says when one parameter differs (Figures 5.12 and 5.13).
+
+The model runs alone on a prescribed sinusoidal rate, with no plant and no loop around it: as it is,
+and with each parameter lower and higher. The parameters of presliding show around a reversal, over
+time; those of sliding show over the rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
+from campaign.estimate import Window
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.common import method_label
+from campaign.physics.bench import Bench
+from campaign.result import Axis, Curve, Figure, Panel
+from campaign.signals import Sine
+from campaign.trial import Recording, Task, TrialRequest
+
+CYCLES = 1.5
+"""of the prescribed rate; the reversal that is shown is the second, when the bristles move."""
+AROUND = 0.05
+"""of a cycle, before and after that reversal."""
+REVERSAL = "reversal"
+CYCLE = "cycle"
+SLOW = 0.35
+"""Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
+FAST = ("viscous_friction",)
+DYNAMIC = ("bristle_stiffness", "bristle_damping")
+LABELS = {
+    "bristle_stiffness": "bristle stiffness σ0",
+    "bristle_damping": "bristle damping σ1",
+    "viscous_friction": "viscous friction σ2",
+    "static_torque": "static torque Ts",
+    "coulomb_torque": "Coulomb torque Tc",
+    "stribeck_velocity": "Stribeck velocity vs",
+}
+
+
+def model_trials(
+    bench: Bench,
+    options: Any,
+    parameters: Sequence[str],
+    varied: Callable[[Bench, Any, str, float], Any],
+) -> Iterator[TrialRequest]:
+    """The model as it is, and each parameter lower and higher by `options.model_change`."""
+    amplitude = options.acceleration / (2 * np.pi * options.frequency)
+    duration = CYCLES / options.frequency
+    task = Task(
+        mode="prescribed",
+        command=Sine(amplitude=amplitude, frequency=options.frequency),
+        compensation=options.compensation,
+        duration=duration,
+        window=(0.0, duration),
+        sample_rate=options.sample_rate,
+    )
+    size = options.model_change
+    places = [("", 0.0)] + [(p, c) for p in parameters for c in (-size, size)]
+    for parameter, change in places:
+        try:
+            tree = varied(bench, options, parameter, change) if parameter else None
+        except ValueError:  # said among the skipped changes
+            continue
+        yield TrialRequest(
+            task,
+            point={"parameter": parameter, "change": change, "repetition": 1},
+            note="the model alone, at a prescribed rate",
+            bench=tree,
+            windows=model_windows(task),
+            requires=(),  # nothing but figures comes of it
+            can_use=(COMPENSATION_TORQUE, RELATIVE_RATE),
+        )
+
+
+def model_windows(task: Task) -> tuple[Window, Window]:
+    """What is shown of the model's output, for its plan; for archives without any, too.
+
+    The reversal after half a cycle, which is a third into its window, and one whole cycle.
+    """
+    command = task.command
+    frequency = command.frequency if isinstance(command, Sine) else 1.0
+    middle, around = 0.5 / frequency, AROUND / frequency
+    return (
+        Window(REVERSAL, middle - around, middle + 2 * around),
+        Window(CYCLE, middle, 1.5 / frequency),
+    )
+
+
+def _cut(data: TrialData, name: str) -> tuple[Window, Recording]:
+    """A window of the trial, and what was recorded in it."""
+    windows = (*data.trial.windows, *model_windows(data.trial.task))
+    window = next(each for each in windows if each.name == name)
+    return window, data.recording().window(window.start, window.stop)
+
+
+def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
+    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for, as far as they can be
+    drawn from what was recorded.
+    """
+    runs: dict[str, dict[float, TrialData]] = {}
+    for data in measured:
+        if data.trial.task.mode == "prescribed":
+            point = data.trial.point
+            by_change = runs.setdefault(str(point["parameter"]), {})
+            by_change[float(str(point["change"]))] = data
+    plain = runs.pop("", {}).get(0.0)
+    if plain is None:
+        return
+    dynamic = [name for name in runs if name in DYNAMIC]
+    static = [name for name in runs if name not in DYNAMIC]
+    shown = [plain, *(data for by_change in runs.values() for data in by_change.values())]
+    recorded = frozenset.intersection(*(data.channel_names() for data in shown))
+    if COMPENSATION_TORQUE not in recorded:
+        return
+    if RELATIVE_RATE not in recorded:
+        static = []
+    if dynamic:
+        yield Figure(
+            key="model-dynamic",
+            title=f"Output of the {method_label(compensation)}: parameters of presliding",
+            caption="Around a reversal of a sinusoidal rate. Stiffer bristles forget the reversal "
+            "sooner; with more damping the torque overshoots after it. Away from the reversal "
+            "the curves are one: steady sliding knows neither parameter.",
+            alt="Model friction torque over time around a reversal, for lower, unchanged and "
+            "higher bristle stiffness and bristle damping.",
+            panels=tuple(_panel(name, {**runs[name], 0.0: plain}, _reversal) for name in dynamic),
+            thesis=("5.12",),
+            across=2,
+        )
+    if static:
+        yield Figure(
+            key="model-static",
+            title=f"Output of the {method_label(compensation)}: parameters of sliding",
+            caption="Over one cycle of a sinusoidal rate. The Coulomb torque moves the whole "
+            "curve, the static torque only its slow part, and the Stribeck velocity says how slow "
+            "that is. Viscous friction shows at high rates only, so its panel reaches further.",
+            alt="Model friction torque over rate, for lower, unchanged and higher values of each "
+            "static parameter, one panel per parameter.",
+            panels=tuple(
+                _panel(name, {**runs[name], 0.0: plain}, _all if name in FAST else _slow)
+                for name in static
+            ),
+            thesis=("5.13",),
+            across=2,
+        )
+
+
+View = Callable[[TrialData], tuple[Axis, Any, Any]]
+
+
+def _panel(name: str, runs: dict[float, TrialData], view: View) -> Panel:
+    torque = Axis("Model torque", "N m", "N m")
+    curves, axis = [], Axis("")
+    for change, data in sorted(runs.items()):
+        axis, x, y = view(data)
+        series = "reference" if change == 0 else ("low" if change < 0 else "high")
+        label = "unchanged" if change == 0 else f"{change:+.0%}".replace("-", "−")
+        curves.append(Curve(x, y, label, series))
+    title = LABELS.get(name, name)
+    return Panel(axis, torque, curves, title[:1].upper() + title[1:])
+
+
+def _reversal(data: TrialData) -> tuple[Axis, Any, Any]:
+    """Torque around the reversal after half a cycle, over the time from it."""
+    window, cut = _cut(data, REVERSAL)
+    middle = window.start + (window.stop - window.start) / 3
+    axis = Axis("Time from the reversal", "s", "s")
+    return axis, cut.time - middle, cut[COMPENSATION_TORQUE]
+
+
+def _all(data: TrialData, share: float = 1.0) -> tuple[Axis, Any, Any]:
+    """Torque over rate, one whole cycle."""
+    _, cut = _cut(data, CYCLE)
+    rate = cut[RELATIVE_RATE]
+    largest = share * float(np.max(np.abs(rate), initial=0.0))
+    limits = (-largest, largest) if largest > 0 else None
+    axis = Axis("Rate", "rad/s", "deg/s", limits=limits)
+    return axis, rate, cut[COMPENSATION_TORQUE]
+
+
+def _slow(data: TrialData) -> tuple[Axis, Any, Any]:
+    """The slow part of it."""
+    return _all(data, SLOW)

@@ -1,0 +1,50 @@
+"""A newcomer sees what is an experiment and what helps, and no experiment needs another."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from campaign.experiments import experiments
+
+ROOM = Path(__file__).parents[2] / "campaign" / "experiments"
+KINDS = sorted(path for path in ROOM.glob("*.py") if path.stem not in ("__init__", "interface"))
+HELPERS = sorted(path for path in ROOM.glob("*/*.py"))
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Modules of the room that a file imports, whether by `import`, `from` or within a function."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def kinds_among(names: Iterator[str]) -> set[str]:
+    parts = [name.split(".") for name in names if name.startswith("campaign.experiments.")]
+    return {part[2] for part in parts} & {path.stem for path in KINDS}
+
+
+def test_every_module_of_the_room_is_an_experiment() -> None:
+    assert len(KINDS) == len(list(experiments()))
+    assert [path.name for path in KINDS if "\nEXPERIMENT = " not in path.read_text("utf-8")] == []
+
+
+@pytest.mark.parametrize("path", [*KINDS, *HELPERS], ids=lambda path: path.stem)
+def test_no_module_imports_an_experiment(path: Path) -> None:
+    assert kinds_among(imported(path)) == set()
+
+
+def test_an_import_of_an_experiment_would_be_seen(tmp_path: Path) -> None:
+    for line in (
+        "from campaign.experiments import velocity_map",
+        "from campaign.experiments.velocity_map import EXPERIMENT",
+        "def late():\n    import campaign.experiments.velocity_map",
+    ):
+        file = tmp_path / "one.py"
+        file.write_text(line, encoding="utf-8")
+        assert kinds_among(imported(file)) == {"velocity_map"}, line
