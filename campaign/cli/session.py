@@ -185,6 +185,7 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
 
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
+    measuring = Measuring(experiments(), session.timing)
     with progress_display(error_console()) as display:
         return run_plan(
             session.trials,
@@ -196,7 +197,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             policy=session.policy,
             attendance=attendance_of(session.kind, display, yes=session.yes),
             supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
-            measure=Measuring(experiments(), session.timing),
+            measure=measuring,
             finished=session.finished,
             stages=Stages(
                 session.stages,
@@ -204,7 +205,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
                 writer,
                 experiments(),
                 refusal_of(backend),
-                measure=Measuring(experiments(), session.timing),
+                measure=measuring,
                 finished=session.finished,
                 asked=session.asked,
             ),

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
 from campaign.archive import ArchivedTrial
 from campaign.archive.layout.followed import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
-from campaign.archive.reading.measured import Measured
+from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
@@ -50,7 +50,6 @@ class StageArchive(Protocol):
 
 UNKNOWN = Estimate.without_interval("nothing", math.nan, "", "the recording tells nothing")
 """Metrics of a recording that could not be measured."""
-Measure = Callable[[ArchivedTrial], Measured]
 
 
 class Stages:

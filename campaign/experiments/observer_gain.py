@@ -11,7 +11,7 @@ every bench.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import Chosen, Experiment, TestData, TrialData, bench_of
 from campaign.experiments.results.observer_figures import (
     error_figure,
     noise_figure,
@@ -37,8 +37,10 @@ from campaign.experiments.results.observer_metrics import (
     worst_ratio,
 )
 from campaign.experiments.shared import fitting
+from campaign.experiments.shared.choices import Choices, nice, share
 from campaign.experiments.shared.common import with_changes
 from campaign.experiments.shared.pointing_error import windows_of
+from campaign.experiments.shared.rig import MOST
 from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.options import Options
 from campaign.physics import observer_loop as theory
@@ -118,6 +120,22 @@ def predicted_limit(bench: Bench, name: str, highest: float) -> float | None:
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if is_stable(middle) else (low, middle)
     return high
+
+
+def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, Chosen]:
+    """The base motion, and times of noise and disturbance within the limit of duration."""
+    choices, longest = Choices(options), MOST * bench.limits.duration
+    why = share("duration", MOST)
+    if longest < SETTLE + options.noise_time:
+        choices.take("noise_time", max(0.0, nice(longest - SETTLE, "s")), f"within {why}")
+    kept = tuple(
+        f
+        for f in options.disturbance_frequencies
+        if max(SETTLE, 2.0 / f) + options.disturbance_cycles / f <= longest
+    )
+    if kept != options.disturbance_frequencies:
+        choices.take("disturbance_frequencies", kept, f"whose cycles are within {why}")
+    return {**fitting.base_motion(options, bench), **choices.told}
 
 
 def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest]:
@@ -319,7 +337,7 @@ EXPERIMENT = Experiment(
     options=ObserverGainOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting.observer_gain,
+    fit=_fit,
     perturbs_bench=True,
     measure=measure,
     requires={

@@ -209,9 +209,17 @@ def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterat
             lines = [_line(cell, test, [finding], problems) for finding in findings]
             told = sorted((line for line in lines if line is not None), key=_is_bound)  # stable
             if told and len({finding.conditions.get(SEED) for finding in findings}) > 1:
-                yield _line(cell, test, findings, problems) or told[0]
+                yield _line(cell, test, _one_of_each(findings), problems) or told[0]
             elif told:
                 yield told[0]
+
+
+def _one_of_each(findings: Iterable[Finding]) -> list[Finding]:
+    """Of every draw its first number, or else its first bound: two of one draw are no two draws."""
+    found: dict[object, Finding] = {}
+    for finding in sorted(findings, key=lambda each: each.lower_bound):  # stable
+        found.setdefault(finding.conditions.get(SEED), finding)
+    return list(found.values())
 
 
 def _is_bound(line: Line) -> bool:

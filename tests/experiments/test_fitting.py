@@ -226,6 +226,28 @@ def within(bench: Bench, **limits: float) -> Bench:
     return bench.model_copy(update={"limits": bench.limits.model_copy(update=limits)})
 
 
+@pytest.mark.parametrize(
+    ("kind", "limits"),
+    [
+        ("step_response", {"angle": 0.5 * DEG}),
+        ("observer_gain", {"duration": 12.0}),
+        ("observer_gain", {"duration": 30.0, "angle": 5.0 * DEG}),
+    ],
+)
+def test_the_platform_with_narrower_limits_is_planned(kind: str, limits: dict[str, float]) -> None:
+    bench = within(load_bench("platform"), **limits)
+    for request in requests(kind, bench):
+        assert not [margin for margin in margins(bench, request.task) if margin.broken]
+
+
+@pytest.mark.parametrize("kind", ["step_response", "frequency_response"])
+def test_no_room_to_move_is_told(kind: str) -> None:
+    bench = within(load_bench("platform"), angle=10.0 * DEG)
+    for position in ("10 deg", "-20 deg"):
+        with pytest.raises(ValueError, match="no room to move: the position"):
+            fitted(kind, bench, position=position)
+
+
 def test_a_ramp_needs_room_for_what_creeps_before_it_gives_way() -> None:
     """Twice Ts / sigma0 in half of the angle: at less a load passes its limit before it slides."""
     bench = load_bench("simulink")

@@ -178,6 +178,14 @@ def test_a_draw_that_was_lost_selects_the_others() -> None:
     assert together([*SEVEN, nothing]).known.reason == "1 of 8 draws have no number"
 
 
+def test_two_numbers_of_one_draw_are_no_two_draws() -> None:
+    """Forty findings of two seeds would have the order statistics of forty draws."""
+    many = [draw(seed, 10e-3 + 1e-5 * k * seed) for seed in (1, 2) for k in range(20)]
+    found = line_of(*many, executed=(1, 2))
+    assert len(found.draws) == 2
+    assert found.found == line_of(many[0], many[20], executed=(1, 2)).found
+
+
 def test_only_what_differs_in_nothing_else_is_a_draw() -> None:
     """Of two places in a sweep the first counts, with its draws."""
     elsewhere = [draw(seed, 20e-3 + 1e-3 * seed, frequency=2.0) for seed in range(1, 8)]

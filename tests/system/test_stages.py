@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import signal
+import threading
 import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,10 +17,15 @@ import campaign as program
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.backends.sim import SimBackend
+from campaign.cli import session
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
+from campaign.estimate import Estimate
+from campaign.execution.measuring import Measuring
+from campaign.experiments import experiments, frequency_response
+from campaign.experiments.interface import TrialData
 from tests.system.test_stage_kills import FOLLOWING, PLANNED, PROTOCOL
 from tests.system.user import campaign, write
 
@@ -164,3 +173,22 @@ def test_a_replay_finds_the_same_trials_and_serves_them(lab: Lab):
     assert f"complete: {ALL} trials done" in again.err
     replayed = open_run(find_run(lab.folder / "replayed"))
     assert samples(replayed) == samples(first)
+
+
+def test_a_stage_measures_in_a_limited_time(lab: Lab):
+    """What hung when its trial ended does not hang while the bench waits for the stage."""
+    threads, never = [], threading.Event()
+
+    def hangs(data: TrialData) -> Sequence[Estimate]:
+        threads.append(threading.current_thread().name)
+        never.wait(600)
+        return ()
+
+    kind = replace(experiments()["frequency_response"], measure=hangs)
+    with experiments().including(kind), lab.patch.context() as patch:
+        patch.setattr(frequency_response, "_measure", hangs)
+        patch.setattr(session, "Measuring", partial(Measuring, limit=0.02))
+        run = lab.run()
+    assert run.status != "interrupted"
+    assert set(threads) == {"measuring"}
+    assert len(threads) >= 2 * PLANNED, "when a trial ended, and for the stage"

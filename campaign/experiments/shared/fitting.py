@@ -19,8 +19,6 @@ from campaign.physics.bench import Bench
 
 DEG = math.pi / 180.0
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
-START = 2.0
-"""s before what an observer test measures: its `SETTLE`."""
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
 MINUTE = 60.0
@@ -274,9 +272,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     highest = 100.0 if control is None else 0.35 * control
     swing = 0.7 * (limits.angle - abs(options.position))
     if swing <= 0:
-        raise ValueError(
-            "there is no room to swing: its position is at the limit of angle or beyond"
-        )
+        raise ValueError(NO_ROOM)
     cycles = options.settle_cycles + options.cycles
     lowest = {
         "a usual size": min(0.5, 0.1 * highest),
@@ -325,22 +321,6 @@ def base_motion(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     return choices.told
 
 
-def observer_gain(options: Any, bench: Bench) -> Mapping[str, Chosen]:
-    """The base motion, and times of noise and disturbance within the limit of duration."""
-    choices, longest = Choices(options), MOST * bench.limits.duration
-    why = share("duration", MOST)
-    if longest < START + options.noise_time:
-        choices.take("noise_time", max(0.0, nice(longest - START, "s")), f"within {why}")
-    kept = tuple(
-        f
-        for f in options.disturbance_frequencies
-        if max(START, 2.0 / f) + options.disturbance_cycles / f <= longest
-    )
-    if kept != options.disturbance_frequencies:
-        choices.take("disturbance_frequencies", kept, f"whose cycles are within {why}")
-    return {**base_motion(options, bench), **choices.told}
-
-
 def _periods_in_time(choices: Choices, longest: float) -> float:
     """Frequency (Hz) of a sine whose cycles last `longest` (s) at most: fewer of them, or faster.
 
@@ -366,9 +346,7 @@ def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     drive = 0.5 * min(limits.acceleration, rig.torque / bench.axis.inertia)
     room = limits.angle - abs(options.position)
     if room <= 0:
-        raise ValueError(
-            "there is no room to move: its position is at the limit of angle or beyond"
-        )
+        raise ValueError(NO_ROOM)
     step = choices.least(
         "step",
         "deg/s",
