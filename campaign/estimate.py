@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 ROUNDING = 1e-9
 """Share of a number by which it may lie outside of its interval: unit conversions round."""
 
-Kind = Literal["number", "count", "quantile", "at least", "at most"]
+Kind = Literal["number", "share", "count", "quantile", "at least", "at most"]
 
 
 class Origin(StrEnum):
@@ -51,7 +51,8 @@ class Estimate:
         method: how value and interval were found, in words.
         reason: why there is no interval, or why the value is not determined.
         origin: where the number comes from.
-        kind: what sort of number it is; a bound (`at least`, `at most`) says that the truth lies
+        kind: what sort of number it is; a share lies between 0 and 1, and so do its `combined`
+            ends; a bound (`at least`, `at most`) says that the truth lies
             on that side of it and has no interval of its own.
         standard_error: 1 sigma of the value (SI), where that is meaningful.
         freedom: degrees of freedom behind `standard_error`, or effective size of the sample.
@@ -127,6 +128,11 @@ class Estimate:
         wide = float(ndtri(0.5 + 0.5 * level)) * shift
         low = None if self.low is None else self.value - math.hypot(self.value - self.low, wide)
         high = None if self.high is None else self.value + math.hypot(self.high - self.value, wide)
+        if self.kind == "share":
+            low, high = (
+                None if low is None else max(low, 0.0),
+                None if high is None else min(high, 1.0),
+            )
         return low, high
 
     @property

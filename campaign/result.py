@@ -7,20 +7,21 @@ is the unit a reader is shown, and the report converts. Nothing here knows HTML 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal, Self
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import InstanceOf
 
 from campaign.estimate import Estimate, Origin
 
-Array = NDArray[np.float64]
+Array = Annotated[NDArray[np.float64], InstanceOf()]
 Value = float | int | str | bool | None
 Cell = Value | Estimate
 """What stands in a cell of a table: an estimate where it is a number that was found."""
-Style = Literal["line", "points", "line+points", "band", "thin"]
+Style = Literal["line", "points", "line+points", "band", "thin", "loop"]
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,42 @@ def bare(cell: Cell) -> Value:
 
 
 @dataclass(frozen=True)
+class Amount:
+    """A number within a sentence: an estimate (SI), and the unit that a reader is shown."""
+
+    estimate: Estimate
+    display: str = ""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """How many times more or less, within a sentence: an estimate of a ratio.
+
+    Words are said only of an interval that lies on one side of 1; of any other it is said that the
+    data show no difference.
+
+    Attributes:
+        above: what a ratio above 1 means: `less`, where it is the error without over that with.
+        below: what one below 1 means; the reciprocal is told.
+    """
+
+    estimate: Estimate
+    above: str = "more"
+    below: str = "less"
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """A sentence that a test comes to: words, and the numbers between them.
+
+    `Conclusion(("Friction at rest is ", Amount(static, "N m"), "."))`. A sentence is made from
+    estimates, never from text that somebody expected to be true.
+    """
+
+    parts: tuple[str | Amount | Factor, ...]
+
+
+@dataclass(frozen=True)
 class Column:
     """A column of a table.
 
@@ -133,18 +170,24 @@ class Table:
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: label without unit, `unit` of the data (SI), `display` unit on the page."""
+    """An axis: label without unit, `unit` of the data (SI), `display` unit on the page.
+
+    Attributes:
+        limits: in `unit`; an end that is not finite follows from what is drawn.
+        places: names along the axis in place of numbers, each with where it stands (in `unit`).
+    """
 
     label: str
     unit: str = ""
     display: str = ""
     scale: Literal["linear", "log"] = "linear"
-    limits: tuple[float, float] | None = None  # in `unit`
+    limits: tuple[float, float] | None = None
+    places: tuple[tuple[float, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of a panel.
+    """One curve of a panel; a `loop` is a line with arrows that show which way it runs.
 
     Attributes:
         x, y: shape (n,), in the units of the panel's axes.
@@ -152,7 +195,17 @@ class Curve:
             (`none`, `static`, `lugre`, `observer`, `measured`, `fit`, `reference`, or any text).
         y_low: for `band`: the lower edge, shape (n,); `y` is then the upper one.
         low, high: 95 % interval of `y`, shape (n,), NaN where there is none: bars on points, a band
-            behind a line.
+            behind a line. Where an end is infinite, `y` is a bound, and an arrow goes that way.
+        quantity: which finding each `y` is, where it is one; published values of it are then drawn
+            beside the curve, as hollow marks.
+        along: the condition of that finding that runs along x, by its name.
+        conditions: the finding's other conditions (SI).
+        law: what gives a fitted `y`, a function of x (n,) and of parameters by name; a published
+            set of them is then drawn as a curve of its own. A function of a module, so that a
+            figure can go from one process to another.
+        parameters: units (SI) of the law's parameters, by the quantities that they are.
+        aside: how far to the right of `x` (in its unit) the curve is drawn, with what is published
+            of it, where it would else lie on another; a drawing alone knows it, `x` stays true.
     """
 
     x: Array
@@ -163,6 +216,12 @@ class Curve:
     y_low: Array | None = None
     low: Array | None = None
     high: Array | None = None
+    quantity: str = ""
+    along: str = ""
+    conditions: Mapping[str, Value] = field(default_factory=dict)
+    law: Callable[[Array, Mapping[str, float]], Array] | None = None
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    aside: float = 0.0
 
     @classmethod
     def of(
@@ -173,23 +232,43 @@ class Curve:
         series: str = "",
         style: Style = "points",
     ) -> Self:
-        """Estimates over `x`, shape (n,), with their intervals (systematic parts included)."""
-        ends = [each.combined if each.has_interval else (None, None) for each in found]
-        low, high = (
-            np.array([np.nan if end[side] is None else end[side] for end in ends], dtype=float)
-            for side in (0, 1)
-        )
+        """Estimates over `x`, shape (n,), with their intervals (systematic parts included).
+
+        Those that are bounds have arrows.
+        """
+        low, high = np.array([ends_of(each) for each in found], dtype=float).reshape(-1, 2).T
         y = np.array([each.value for each in found], dtype=float)
         return cls(x, y, label, series, style, low=low, high=high)
 
 
+def ends_of(estimate: Estimate) -> tuple[float, float]:
+    """Low and high for a curve, systematic parts included: NaN where there is none.
+
+    The open side of a bound is infinite.
+    """
+    low, high = (math.nan if end is None else end for end in estimate.combined)
+    if estimate.kind == "at least":
+        return low, math.inf
+    return (-math.inf, high) if estimate.kind == "at most" else (low, high)
+
+
 @dataclass(frozen=True)
 class Mark:
-    """A labelled position in a panel: a vertical and/or horizontal line, in axis units."""
+    """A labelled position in a panel, in axis units: a line across it, a point, or a stretch.
+
+    Attributes:
+        x, y: where a vertical or a horizontal line lies; both for a point (`point`).
+        point: a dot at (x, y) with the label beside it instead of lines.
+        until: end of a shaded stretch that begins at the one of `x` and `y` that is given.
+        series: whose colour it has; "" is nobody's.
+    """
 
     label: str
     x: float | None = None
     y: float | None = None
+    point: bool = False
+    until: float | None = None
+    series: str = ""
 
 
 @dataclass(frozen=True)
@@ -213,6 +292,8 @@ class Figure:
         alt: what the figure shows, for who cannot see it.
         thesis: numbers of the published figures it stands for, e.g. ("5.4",).
         across: panels side by side; further ones go below.
+        trials: numbers of the trials that it shows; empty for all measurements of its test.
+        one_scale: panels whose y axes are alike share their limits, so that they can be compared.
     """
 
     key: str
@@ -222,16 +303,23 @@ class Figure:
     panels: tuple[Panel, ...]
     thesis: tuple[str, ...] = ()
     across: int = 1
+    trials: tuple[int, ...] = ()
+    one_scale: bool = False
 
 
 @dataclass(frozen=True)
 class Result:
     """What one test's analysis found.
 
-    `notes` are sentences for the report: caveats, assumptions, what failed and why.
+    Attributes:
+        notes: sentences for the report: caveats, assumptions, what failed and why.
+        conclusions: what the test comes to, the most important sentence first.
+        telling: key of the figure that tells it best; "" for the first.
     """
 
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
+    conclusions: tuple[Conclusion, ...] = ()
+    telling: str = ""

@@ -9,13 +9,14 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
+from campaign.access.results import Results
 from campaign.access.run import RunView
 from campaign.access.telling import tell
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
 from campaign.archive import find_run, open_run
 
-__all__ = ["RunView", "TestView", "TrialView", "open_view"]
+__all__ = ["Results", "RunView", "TestView", "TrialView", "open_view"]
 
 
 def open_view(

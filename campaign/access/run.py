@@ -6,9 +6,11 @@ import difflib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from campaign.access.results import Results, results_view
 from campaign.access.tables import trials_table
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
@@ -88,6 +90,17 @@ class RunView:
         A trial that cannot be read has no row; `attrs["damaged"]` names it.
         """
         return trials_table(self.archive.trials, self.damaged)
+
+    @cached_property
+    def results(self) -> Results:
+        """What analysis finds in all tests: read from `RUN-results.nxs`, or analysed by now.
+
+        A file of another run or of another version of the program, or one that is damaged, is not
+        used, and an ArchiveWarning says why; `origin` says which it was. Raises ArchiveError when
+        the run was opened with `strict` and the file is damaged or of another run, or a trial would
+        be left out of the analysis.
+        """
+        return results_view(self.archive, strict=self.strict, measure_anew=self.measure_anew)
 
     def test(self, name: str) -> TestView:
         """The test of that name.

@@ -23,11 +23,16 @@ def tell(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
     text = in_one_line(path, damaged)
     if strict:
         raise ArchiveError(text)
+    warn(text)
+
+
+def warn(text: str) -> None:
+    """An ArchiveWarning at the line that called the program."""
     warnings.warn(text, ArchiveWarning, stacklevel=_of_the_caller())
 
 
 def _of_the_caller() -> int:
-    """The `stacklevel`, seen from `tell`, of the first line that is not the program's own."""
+    """The `stacklevel`, seen from `warn`, of the first line that is not the program's own."""
     frame, level = inspect.currentframe(), 0
     while frame is not None and _is_ours(frame.f_code.co_filename):
         frame, level = frame.f_back, level + 1

@@ -242,13 +242,24 @@ def test_a_changed_trial_file_is_named_and_nothing_is_touched(tmp_path, kit):
 
 def test_a_damaged_sealed_run_is_not_taken_apart(tmp_path, kit):
     path, _ = interrupted(tmp_path, kit)
-    damaged = bytearray(path.read_bytes())
-    damaged[len(damaged) // 2] ^= 1
-    path.write_bytes(damaged)
-    with pytest.raises(ArchiveError, match="own hash; it was damaged or changed; it is as it was"):
-        RunWriter.resume(path, **RESUMED)
-    assert path.read_bytes() == damaged
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    whole = path.read_bytes()
+    with h5py.File(path) as file:
+        samples = file["trial_00001/data"]
+        # A sample, and the beginning of what HDF5 finds the format of the archive by.
+        sample = next(
+            each.id.get_chunk_info(0).byte_offset
+            for each in samples.values()
+            if isinstance(each, h5py.Dataset) and each.chunks
+        )
+        number = h5py.h5o.get_info(file["run/provenance"].id).addr
+    for place, told in ((sample, "own hash; it was damaged or changed"), (number + 8, "cannot be")):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1
+        path.write_bytes(damaged)
+        with pytest.raises(ArchiveError, match=f"{told}.*; it is as it was$"):
+            RunWriter.resume(path, **RESUMED)
+        assert path.read_bytes() == damaged
+        assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
 def test_what_has_ended_or_is_no_run_is_refused(tmp_path, kit):

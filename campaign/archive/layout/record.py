@@ -125,12 +125,6 @@ class TrialRecord(_Part):
     measured_by: str = ""
 
     @property
-    def mode(self) -> str:
-        """What the bench did: `Task.mode`."""
-        task = self.trial["task"]
-        return str(task["mode"]) if isinstance(task, dict) else ""
-
-    @property
     def number(self) -> int:
         return int(self.trial["number"])  # type: ignore[arg-type]
 

@@ -69,6 +69,18 @@ def lost_trials(run: RunReader) -> dict[int, Damage]:
     return {n: damage for n, damage in lost if n is not None and n not in there}
 
 
+def hidden_trials(run: RunReader) -> int:
+    """How many planned trials nobody knows of whether they were executed; 0 where that is known.
+
+    The journal tells it and, of a sealed run, the index as well: one of them is enough.
+    """
+    places = [damage.place for damage in run.damaged]
+    untold = any("journal" in place for place in places) and (
+        not run.sealed or any("/index" in place for place in places)
+    )
+    return max(0, len(run.plan) - len(run.trials) - len(lost_trials(run))) if untold else 0
+
+
 def of_test(run: RunReader, test: str) -> tuple[Damage, ...]:
     """What touches one test: its trials, those of which nobody knows whose they are, and the run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
@@ -61,7 +62,7 @@ def open_folder(folder: Path) -> RunReader:
         plan=planned + planned_in(stages),
         trials=tuple(trials),
         journal=story.text,
-        full_plan=FullPlan(folder, lambda: _plan_texts(folder), stages),
+        full_plan=FullPlan(folder, partial(_plan_texts, folder), stages),
         damaged=tuple(damaged.found),
         earlier_attempts={number: tuple(found) for number, found in earlier.items()},
         stages=stages,

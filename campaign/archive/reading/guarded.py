@@ -12,13 +12,14 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5g, h5o, h5s, h5t
+from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.layout.files import why
@@ -64,9 +65,31 @@ def guarded(path: Path, place: str = "") -> Iterator[None]:
         raise ArchiveError(f"{where}: cannot be read: {why(error)}") from None
 
 
+_HELD: ContextVar[Mapping[Path, h5py.File]] = ContextVar("held files", default={})  # noqa: B039
+"""Of this thread, the files that stay open until the block that holds them ends."""
+
+
+@contextlib.contextmanager
+def held_open(path: Path) -> Iterator[None]:
+    """Within the block, this thread opens the file once: every trial of it comes from there.
+
+    Opening costs more than reading a channel of a short trial. A file that cannot be opened is not
+    held, and whoever reads it is told.
+    """
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ArchiveError):
+            file = stack.enter_context(open_file(path))
+            token = _HELD.set({**_HELD.get(), path: file})
+            stack.callback(_HELD.reset, token)
+        yield
+
+
 @contextlib.contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
     """An HDF5 file for reading; ArchiveError when it is none."""
+    if (held := _HELD.get().get(path)) is not None:
+        yield held
+        return
     with guarded(path):
         if not path.is_file():
             raise ArchiveError(f"{path}: there is no such file")
@@ -111,7 +134,7 @@ def check_dataset(parent: h5py.Group, name: str) -> int:
     if dataset.shape == () and dataset.dtype.kind == "S":
         text_at(parent, name)
     elif dataset.shape == () and dataset.dtype in (np.dtype("<i8"), SAMPLE):
-        _check(dataset, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
+        _check(dataset.id, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
     else:
         check_samples(samples_at(parent, name))
     return int(dataset.id.get_storage_size())
@@ -134,15 +157,15 @@ def unchecked_text_at(parent: h5py.Group, name: str) -> str:
     return _raw_text(parent, name)[1].decode("utf-8", "replace")
 
 
-def _raw_text(parent: h5py.Group, name: str) -> tuple[h5py.Dataset, bytes]:
-    dataset = _dataset_at(parent, name)
+def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
+    dataset, plan = _dataset_id(parent, name)
     kind = dataset.dtype
-    if dataset.shape != () or kind.kind != "S" or dataset.chunks is not None:
+    if dataset.rank or kind.kind != "S" or plan.get_layout() == h5d.CHUNKED:
         raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
-    if dataset.id.get_storage_size() != kind.itemsize:
+    if dataset.get_storage_size() != kind.itemsize:
         raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
     value = np.empty((), dtype=kind)
-    dataset.id.read(h5s.ALL, h5s.ALL, value)
+    dataset.read(h5s.ALL, h5s.ALL, value)
     return dataset, bytes(value[()])
 
 
@@ -165,28 +188,28 @@ def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
         raise ArchiveError(f"{_place(parent, name)}: is not a 64-bit whole number")
     value = np.asarray(dataset[()], dtype="<i8")
     if digest is None:
-        _check(dataset, value.tobytes())
+        _check(dataset.id, value.tobytes())
     else:
-        _check(dataset, str(int(value)).encode(), digest)
+        _check(dataset.id, str(int(value)).encode(), digest)
     return int(value)
 
 
 def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
     """A sample dataset whose stated size is backed by what is stored; not read yet."""
-    dataset = _dataset_at(parent, name)
-    shape, plan = dataset.id.shape, dataset.id.get_create_plist()
+    identifier, plan = _dataset_id(parent, name)
+    shape = identifier.shape
     chunks = plan.get_chunk() if plan.get_layout() == h5d.CHUNKED else None
-    if len(shape) != 1 or dataset.id.dtype != SAMPLE or chunks is None:
+    if len(shape) != 1 or identifier.dtype != SAMPLE or chunks is None:
         raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
     length, chunk = shape[0], chunks[0]
     if not 0 < chunk <= _LARGEST_CHUNK:
         raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
-    stored = dataset.id.get_storage_size()
+    stored = identifier.get_storage_size()
     if length * SAMPLE.itemsize > stored * _MOST_EXPANSION:
         raise ArchiveError(
             f"{_place(parent, name)}: states {length} samples but stores {stored} bytes"
         )
-    return dataset
+    return h5py.Dataset(identifier)
 
 
 def read_samples(dataset: h5py.Dataset) -> Array:
@@ -194,7 +217,16 @@ def read_samples(dataset: h5py.Dataset) -> Array:
     values = np.empty(dataset.id.shape, dtype=SAMPLE)
     if len(values):
         dataset.id.read(h5s.ALL, h5s.ALL, values)
-    _check(dataset, values.data)
+    _check(dataset.id, values.data)
+    return values.astype(np.float64, copy=False)
+
+
+def read_whole(parent: h5py.Group, name: str) -> Array:
+    """A series that has no checksum of its own: whoever asks has checked the file. Shape (n,)."""
+    dataset = samples_at(parent, name)
+    values = np.empty(dataset.id.shape, dtype=SAMPLE)
+    if len(values):
+        dataset.id.read(h5s.ALL, h5s.ALL, values)
     return values.astype(np.float64, copy=False)
 
 
@@ -208,15 +240,19 @@ def check_samples(dataset: h5py.Dataset) -> None:
     step = dataset.chunks[0] * max(1, _CHECKED_AT_ONCE // dataset.chunks[0])
     for start in range(0, length, step):
         digest.update(np.ascontiguousarray(dataset[start : start + step]).data)
-    compare(dataset, digest.hexdigest())
+    _compare(dataset.id, digest.hexdigest())
 
 
 def attribute(item: h5py.HLObject, name: str) -> str:
     """A text attribute; ArchiveError when there is none."""
+    return _text_attribute(item.id, name)
+
+
+def _text_attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> str:
     identifier = _attribute(item, name)
     kind = identifier.get_type()
     if not isinstance(kind, h5t.TypeStringID):
-        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a text")
+        raise ArchiveError(f"{_named(item)}@{name}: is not a text")
     value = np.empty((), dtype=_TEXT if kind.is_variable_str() else kind.dtype)
     identifier.read(value)
     return bytes(value[()]).decode("utf-8")
@@ -226,25 +262,25 @@ def text_list(item: h5py.HLObject, name: str) -> list[str]:
     """An attribute that is a list of texts; empty when there is none."""
     if name not in item.attrs:
         return []
-    identifier = _attribute(item, name)
+    identifier = _attribute(item.id, name)
     if len(identifier.shape) != 1 or h5py.check_string_dtype(identifier.dtype) is None:
         raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a list of texts")
     return [str(text) for text in item.attrs[name]]
 
 
-def _attribute(item: h5py.HLObject, name: str) -> h5a.AttrID:
+def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
     raw = name.encode()
-    file = h5f.get_name(item.id)
+    file = h5f.get_name(item)
     if file not in _SOUND:  # looked at here, as nothing else that is read lies in the heaps
         _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
     if not _SOUND[file]:
         raise ArchiveError(f"{os.fsdecode(file)}: cannot be read: its attributes are damaged")
     try:
-        identifier = h5a.open(item.id, raw)
+        identifier = h5a.open(item, raw)
     except KeyError:
-        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is missing") from None
+        raise ArchiveError(f"{_named(item)}@{name}: is missing") from None
     if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
-        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is too large")
+        raise ArchiveError(f"{_named(item)}@{name}: is too large")
     return identifier
 
 
@@ -261,18 +297,30 @@ def own_id(parent: h5py.Group, name: str) -> Any:
     raw = name.encode()
     if "/" in name or name == ".":  # on a path, only the last link would be looked at
         raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
-    if not raw or raw not in parent.id:
+    group = parent.id
+    try:
+        link = group.links.get_info(raw) if raw else None
+    except _DAMAGE:
+        if raw in group:
+            raise
+        link = None
+    if link is None:
         raise ArchiveError(f"{_place(parent, name)}: is missing")
-    if parent.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
+    if link.type != h5py.h5l.TYPE_HARD:
         raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
-    return h5o.open(parent.id, raw)
+    return h5o.open(group, raw)
 
 
 def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
-    dataset = own(parent, name)
-    if not isinstance(dataset, h5py.Dataset):
+    return h5py.Dataset(_dataset_id(parent, name)[0])
+
+
+def _dataset_id(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, h5py.h5p.PropDCID]:
+    """A dataset whose samples lie in this very file, and how they are laid out there."""
+    found = own_id(parent, name)
+    if not isinstance(found, h5d.DatasetID):
         raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
-    plan = dataset.id.get_create_plist()
+    plan = found.get_create_plist()
     layout = plan.get_layout()
     if layout == h5d.VIRTUAL or (layout == h5d.CONTIGUOUS and plan.get_external_count()):
         raise ArchiveError(f"{_place(parent, name)}: lies in another file, which is not opened")
@@ -281,20 +329,24 @@ def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
         raise ArchiveError(
             f"{_place(parent, name)}: is stored with a filter other than shuffle and deflate"
         )
-    return dataset
+    return found, plan
 
 
-def _check(dataset: h5py.Dataset, raw: Any, digest: str | None = None) -> None:
-    compare(dataset, hashlib.sha256(raw).hexdigest(), digest)
+def _check(dataset: h5d.DatasetID, raw: Any, digest: str | None = None) -> None:
+    _compare(dataset, hashlib.sha256(raw).hexdigest(), digest)
 
 
-def compare(dataset: h5py.Dataset, found: str, digest: str | None = None) -> None:
+def _compare(dataset: h5d.DatasetID, found: str, digest: str | None = None) -> None:
     """ArchiveError unless a digest is what it ought to be: `digest`, or the dataset's attribute."""
-    if (attribute(dataset, CHECKSUM) if digest is None else digest) != found:
+    if (_text_attribute(dataset, CHECKSUM) if digest is None else digest) != found:
         raise ArchiveError(
-            f"{dataset.file.filename}: {dataset.name}: does not match its checksum; "
-            "it was damaged or changed"
+            f"{_named(dataset)}: does not match its checksum; it was damaged or changed"
         )
+
+
+def _named(item: h5g.GroupID | h5d.DatasetID) -> str:
+    """File and path, for messages."""
+    return f"{os.fsdecode(h5f.get_name(item))}: {os.fsdecode(h5i.get_name(item))}"
 
 
 def _place(parent: h5py.Group, name: str) -> str:

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from campaign.archive.layout.header import PARTIAL, SEALED
+from campaign.archive.layout.results import ENDING, results_path
 from campaign.archive.reading.index import Index
 from campaign.archive.reading.summary import RunSummary
 from campaign.errors import UsageError
@@ -26,7 +27,10 @@ def list_runs(results: Path) -> list[RunSummary]:
 
 
 def run_paths(results: Path) -> list[Path]:
-    """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder."""
+    """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder.
+
+    Results of a run are none, whether or not that run is beside them.
+    """
     try:
         found = sorted(results.iterdir()) if results.exists() else []
     except OSError as error:
@@ -34,7 +38,29 @@ def run_paths(results: Path) -> list[Path]:
     sealed = {path.stem: path for path in found if path.suffix == SEALED and path.is_file()}
     partial = {path.stem: path for path in found if path.suffix == PARTIAL and path.is_dir()}
     runs = partial | sealed
-    return [runs[name] for name in sorted(runs, key=lambda name: (bool(_DATED.match(name)), name))]
+    order = sorted(runs, key=lambda name: (bool(_DATED.match(name)), name))
+    return _without_results([runs[name] for name in order])
+
+
+def _without_results(paths: list[Path]) -> list[Path]:
+    """Those of `paths` that are no results; only what is called as results are is opened.
+
+    A run may be called so, too. What tells nothing of itself counts by its name: as results where
+    a run of that name is beside it.
+    """
+    if not any(path.name.endswith(ENDING) for path in paths):
+        return paths
+    from campaign.archive.reading.results_file import holds_results
+
+    beside = {results_path(path) for path in paths}
+
+    def is_run(path: Path) -> bool:
+        if not path.name.endswith(ENDING):
+            return True
+        results = holds_results(path)
+        return path not in beside if results is None else not results
+
+    return [path for path in paths if is_run(path)]
 
 
 def find_run(results: Path, name: str | None = None) -> Path:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from campaign.archive.layout.files import PART, why
 from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.results import ENTRY
 from campaign.archive.layout.run_folder import check_format
 from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.run_reader import Glance, RunReader
@@ -62,6 +63,10 @@ def sealed_format(path: Path) -> int:
     from campaign.archive.reading import guarded
 
     with guarded.open_file(path) as file, guarded.guarded(path, "/run/provenance/format"):
+        if ENTRY in file and "run" not in file:
+            raise ArchiveError(
+                f"{path}: holds no run but what was found in one; the run itself is beside it"
+            )
         run = guarded.member(file, "run")
         provenance = guarded.member(run, "provenance") if run is not None else None
         if provenance is None:

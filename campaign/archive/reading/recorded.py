@@ -6,6 +6,7 @@ from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Va
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 import h5py
 import numpy as np
@@ -95,14 +96,25 @@ class RecordedSamples:
         return self.path, self.entry
 
 
-Read = Callable[[Iterable[SeriesRecord]], Iterator[Channel]]
-"""Reads channels, one after another. Raises ArchiveError."""
+class _Named(Protocol):
+    """What an archive says of a channel besides its samples."""
+
+    @property
+    def name(self) -> str: ...
 
 
-class LazyChannels(Mapping[str, Channel]):
-    """Channels by name; the samples of each are read once, when it is first asked for."""
+_Told = TypeVar("_Told", bound=_Named)
 
-    def __init__(self, told: Iterable[SeriesRecord], read: Read) -> None:
+
+class LazyChannels(Mapping[str, Channel], Generic[_Told]):
+    """Channels by name; the samples of each are read once, when it is first asked for.
+
+    `read` reads those that it is handed, one after another; it raises ArchiveError.
+    """
+
+    def __init__(
+        self, told: Iterable[_Told], read: Callable[[Iterable[_Told]], Iterator[Channel]]
+    ) -> None:
         self._read_from = read
         self._told = {channel.name: channel for channel in told}
         self._read: dict[str, Channel] = {}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -97,6 +98,22 @@ class RunReader:
     def sha256(self) -> str:
         """Hash of the sealed file as `sha256sum` prints it; of the journal while in progress."""
         return sha256_of(self.path if self.sealed else self.path / JOURNAL)
+
+    @property
+    def identity(self) -> str:
+        """The digest that stands for all of the run: `root`, and `sha256` where there is none."""
+        return self.root or self.sha256
+
+    @contextmanager
+    def held_open(self) -> Iterator[None]:
+        """Within the block, this thread reads samples from a file that is opened once."""
+        if not self.sealed:
+            yield
+            return
+        from campaign.archive.reading import guarded
+
+        with guarded.held_open(self.path):
+            yield
 
     def planned(self, number: int) -> Trial:
         """The trial `number` of the plan, executed or not, ready to be executed.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -60,7 +61,7 @@ def read_sealed(path: Path) -> RunReader:
             plan=plan + planned_in(stages),
             trials=trials,
             journal=story.text,
-            full_plan=FullPlan(path, lambda: _plan_texts(path), stages),
+            full_plan=FullPlan(path, partial(_plan_texts, path), stages),
             damaged=tuple(damaged.found),
             earlier_attempts=earlier,
             root=texts.root,

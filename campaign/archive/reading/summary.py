@@ -20,8 +20,12 @@ class RunSummary:
 
     Attributes:
         created, ended: ISO 8601; `ended` is empty while the run is in progress.
+        title, operator: as the header has them.
+        tests: names, in the protocol's order.
         benches: names, each once, in the order of the tests.
         trials: finished ones, failed ones included; `planned` counts the whole plan.
+        untold: how many planned trials the journal, damaged, does not tell of: they may have been
+            executed.
         problem: why the run cannot be read; everything but name, path and bytes is empty then.
     """
 
@@ -31,13 +35,17 @@ class RunSummary:
     created: str = ""
     ended: str = ""
     status: RunStatus | None = None
+    title: str = ""
     protocol: str = ""
     backend: str = ""
+    operator: str = ""
+    tests: tuple[str, ...] = ()
     benches: tuple[str, ...] = ()
     tags: tuple[str, ...] = ()
     planned: int = 0
     trials: int = 0
     failed: int = 0
+    untold: int = 0
     problem: str = ""
 
 
@@ -64,12 +72,17 @@ def _benches(header: RunHeader) -> tuple[str, ...]:
     return tuple(dict.fromkeys(bench for bench in named if isinstance(bench, str)))
 
 
+def _tests(header: RunHeader) -> tuple[str, ...]:
+    return tuple(str(test.get("name", "")) for test in header.tests)
+
+
 def _summarise_folder(folder: Path, size: int) -> RunSummary:
     header = read_header(folder)
     story = read_lines((folder / JOURNAL).read_bytes())
     if not story.all(RunStarted):
         raise ArchiveError(f"{folder / JOURNAL}: does not tell of the start of the run")
     finished, ended = story.finished.values(), story.ended
+    planned = header.trials + len(planned_in(stages_in(story.entries)))
     return RunSummary(
         name=folder.stem,
         path=folder,
@@ -77,13 +90,17 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
         created=header.created,
         ended=ended.at if ended else "",
         status=ended.status if ended else RunStatus.INCOMPLETE,
+        title=header.title,
         protocol=header.protocol_name,
         backend=header.backend,
+        operator=header.operator,
+        tests=_tests(header),
         benches=_benches(header),
         tags=header.tags,
-        planned=header.trials + len(planned_in(stages_in(story.entries))),
+        planned=planned,
         trials=len(finished),
         failed=sum(f.outcome is not Outcome.COMPLETED for f in finished),
+        untold=max(0, planned - len(finished)) if story.damaged else 0,
     )
 
 
@@ -98,8 +115,11 @@ def _summarise_file(path: Path, size: int) -> RunSummary:
         created=run.header.created,
         ended=run.ended,
         status=run.status,
+        title=run.header.title,
         protocol=run.header.protocol_name,
         backend=run.header.backend,
+        operator=run.header.operator,
+        tests=_tests(run.header),
         benches=_benches(run.header),
         tags=run.header.tags,
         planned=run.planned,

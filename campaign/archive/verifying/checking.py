@@ -41,7 +41,7 @@ from campaign.archive.verifying.result import (
     Verification,
 )
 from campaign.archive.writing import nexus
-from campaign.archive.writing.trial_file import shown_of
+from campaign.archive.writing.default_plot import Aim
 from campaign.errors import ArchiveError
 
 _HASH = "outcome/file_sha256"
@@ -305,6 +305,7 @@ class _Check:
         """The samples, each series against its digest, and that there are no others."""
         if self._left_out(group):
             return
+        aim = Aim.of_tree(record.trial)
         for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
                 data = guarded.group_at(group, inner, "NXdata")
@@ -319,7 +320,7 @@ class _Check:
                 for name in sorted(_PLOT - set(data.attrs)):
                     self.problems.add(f"{place}/{inner}@{name}", "is missing")
                 shown = [name for name in told if name != "time"]
-                if guarded.attribute(data, "signal") != shown_of(record.mode, shown):
+                if guarded.attribute(data, "signal") not in aim.accepted(shown):
                     self.problems.add(f"{place}/{inner}@signal", "is not the channel to plot first")
                 if guarded.text_list(data, "axes") != ["time"]:
                     self.problems.add(f"{place}/{inner}@axes", "is not the time")

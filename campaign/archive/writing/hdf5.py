@@ -110,6 +110,22 @@ def put_number(group: h5py.Group, name: str, value: float, **attributes: str) ->
         put_attribute(dataset, key, text)
 
 
+def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -> h5py.Dataset:
+    """Numbers, shape (n,), as samples are stored."""
+    column = SampleColumns(group, {name: attributes})
+    column.append([values])
+    column.finish()
+    return group[name]
+
+
+def put_texts(group: h5py.Group, name: str, texts: Sequence[str], **attributes: str) -> None:
+    """A list of texts of variable length, for other programs: no reader here opens such a one."""
+    told = np.array([storable(text) for text in texts], dtype=_STRING)
+    dataset = group.create_dataset(name, data=told, dtype=_STRING, track_times=False)
+    for key, value in attributes.items():
+        put_attribute(dataset, key, value)
+
+
 def _put_scalar(
     group: h5py.Group, name: str, kind: h5t.TypeID, value: NDArray[Any], raw: bytes
 ) -> h5py.Dataset:
@@ -143,12 +159,12 @@ def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
 
 
 def attach_time(group: h5py.Group, time: str = "time") -> None:
-    """Make `time` the dimension scale of the plotted datasets in `group`."""
+    """Make `time`, or another axis, the dimension scale of every series in `group`."""
     scale = h5d.open(group.id, time.encode())
     h5ds.set_scale(scale, time.encode())
-    plotted = [group.attrs["signal"], *group.attrs.get("auxiliary_signals", ())]
-    for name in plotted:
-        h5ds.attach_scale(h5d.open(group.id, name.encode()), scale, 0)
+    for name in group.id:
+        if name not in (time.encode(), b"title"):
+            h5ds.attach_scale(h5d.open(group.id, name), scale, 0)
 
 
 def copy_entry(source: h5py.File, name: str, target: h5py.File, new_name: str) -> None:

@@ -35,7 +35,10 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
     with _locked(folder) as lock:
         clear_beginning(folder.parent, folder.stem)
         if sealed.is_file():
-            _check_sealed(sealed)
+            try:
+                _check_sealed(sealed)
+            except ArchiveError as error:
+                raise ArchiveError(f"{error}; it is as it was") from None
             from campaign.archive.writing.unsealing import unseal
 
             unseal(sealed)

@@ -15,6 +15,7 @@ from h5py import h5d
 
 from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
+from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
@@ -26,6 +27,7 @@ from campaign.archive.reading.recorded import PLOTTED, TIME, check_unit, parse_r
 from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.reading.series import layout_of, series_at
 from campaign.archive.writing import hdf5, nexus
+from campaign.archive.writing.default_plot import telling_trial
 from campaign.archive.writing.trial_file import write_root
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome, Tree, canonical_json
@@ -245,15 +247,14 @@ def _by_number(entry: str) -> tuple[int, float]:
 
 
 def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:
-    """What a viewer opens first: the first completed measurement, else the first with samples."""
-    roles = {p.number: p.role for p in parse_plan(folder, read_plan_text(folder))}
+    """What a viewer opens first: see `default_plot`."""
+    plan = parse_plan(folder, read_plan_text(folder))
+    completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
     with_samples = [
-        n for n in story.finished if (name := entry_name(n)) in file and "data" in file[name]
-    ]
-    telling = (
         n
-        for n in with_samples
-        if story.finished[n].outcome is Outcome.COMPLETED and roles.get(n) == "measurement"
-    )
-    best = next(telling, next(iter(with_samples), None))
+        for n in sorted(story.finished)
+        if (name := entry_name(n)) in file and "data" in file[name]
+    ]
+    followed = planned_in(stages_in(story.entries))
+    best = telling_trial((*plan, *followed), completed, with_samples)
     return None if best is None else file[entry_name(best)]

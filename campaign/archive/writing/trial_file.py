@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,29 +32,15 @@ from campaign.archive.layout.record import (
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.recorded import trial_of_record
 from campaign.archive.writing import hdf5
+from campaign.archive.writing.default_plot import Aim, beside
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
-from campaign.channels import FRICTION_TORQUE, GYRO_RATE, RELATIVE_RATE
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
 from campaign.trial import ChannelInfo, Ending, Event, Trial
 
 Array = NDArray[np.float64]
 
-TELLING = {
-    "rate": GYRO_RATE,
-    "torque": RELATIVE_RATE,
-    "prescribed": FRICTION_TORQUE,
-    "spring": RELATIVE_RATE,
-}
-"""By a task's mode, the channel that the default plot shows; else it is the first one."""
-
 _CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
-
-
-def shown_of(mode: str, names: Sequence[str]) -> str:
-    """Of the channels that a trial recorded, the one that the default plot shows."""
-    telling = TELLING.get(mode, "")
-    return telling if telling in names else names[0]
 
 
 Written = tuple[int, str, list[SeriesRecord]]
@@ -104,14 +90,15 @@ class TrialFile:
         hdf5.put_text(self._entry, "title", trial.label)
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
-        """Announce the channels. See `TELLING` for the one that the default plot shows."""
+        """Announce the channels. `default_plot` says which one viewers show first."""
         if self._columns is not None:
             raise BackendError(f"{self._trial.name}: the channels were announced twice")
         _check_names(self._trial, channels)
         self._channels = channels
         names = [channel.name for channel in channels]
-        self._shown = names.index(shown_of(self._trial.task.mode, names))
-        others = [name for name in names if name != names[self._shown]]
+        aim = Aim.of(self._trial.task, self._trial.requires)
+        self._shown = names.index(aim.channel(names))
+        others = beside(channels[self._shown], channels)
         data = (
             None if self._not_kept else _plot_group(self._entry, "data", names[self._shown], others)
         )

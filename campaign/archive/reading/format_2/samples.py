@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 
 import h5py
@@ -11,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 from campaign.archive.reading import guarded
+from campaign.archive.reading.recorded import LazyChannels
 from campaign.errors import ArchiveError
 from campaign.trial import Channel, ChannelInfo, Ending, Event, Recording
 
@@ -42,8 +44,17 @@ _EVENTS = TypeAdapter(list[_Event])
 _CHANNELS = TypeAdapter(list[ChannelInfo])
 
 
+@lru_cache(maxsize=64)
+def _announced(text: str) -> tuple[ChannelInfo, ...]:
+    """The channels of a text that is the same for every trial of a test."""
+    return tuple(_CHANNELS.validate_json(text))
+
+
 def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
-    """A trial's samples and events, checked; a trial that recorded nothing has no channels."""
+    """A trial's events and times, checked, and each channel when it is asked for.
+
+    A trial that recorded nothing has no channels.
+    """
     with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry_name}"):
         entry = guarded.group_at(file, entry_name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
@@ -53,9 +64,20 @@ def read_recording(path: Path, entry_name: str, ending: Ending) -> Recording:
             return Recording(np.empty(0), {}, events, ending)
         data = guarded.group_at(entry, "data", "NXdata")
         time = guarded.read_samples(guarded.samples_at(data, "time"))
-        infos = _CHANNELS.validate_json(guarded.text_at(record, "channels"))
-        channels = {info.name: _channel(data, info, len(time)) for info in infos}
-        return Recording(time, channels, events, ending)
+        infos = _announced(guarded.text_at(record, "channels"))
+    channels = LazyChannels(infos, partial(_read_channels, path, entry_name, len(time)))
+    return Recording(time, channels, events, ending)
+
+
+def _read_channels(
+    path: Path, entry_name: str, length: int, infos: Iterable[ChannelInfo]
+) -> Iterator[Channel]:
+    """Channels, read now, one after another. Raises ArchiveError."""
+    with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry_name}"):
+        # Their classes were looked at when the times were read.
+        data = guarded.inner_group(guarded.inner_group(file, entry_name), "data")
+        for info in infos:
+            yield _channel(data, info, length)
 
 
 def read_channels(path: Path, entry_name: str) -> tuple[ChannelInfo, ...]:
@@ -63,7 +85,7 @@ def read_channels(path: Path, entry_name: str) -> tuple[ChannelInfo, ...]:
     with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry_name}"):
         entry = guarded.group_at(file, entry_name, "NXentry")
         record = guarded.group_at(entry, "record", "NXcollection")
-        return tuple(_CHANNELS.validate_json(guarded.text_at(record, "channels")))
+        return _announced(guarded.text_at(record, "channels"))
 
 
 def check_recordings(path: Path, entries: Iterable[str]) -> Iterator[str]:

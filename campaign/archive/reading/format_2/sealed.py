@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -43,7 +44,7 @@ def read_sealed(path: Path) -> RunReader:
             plan=damaged.read(lambda: parse_plan(path, _note(path, run, "plan")), ()),
             trials=trials,
             journal=story.text,
-            full_plan=FullPlan(path, lambda: _plan_texts(path)),
+            full_plan=FullPlan(path, partial(_plan_texts, path)),
             earlier_attempts=read_earlier(path, damaged),
             damaged=tuple(damaged.found),
         )

@@ -1,0 +1,106 @@
+"""Reading `RUN-results.nxs`: whole, as it was written, and of the run beside it; or not at all.
+
+The file may have been cut, changed or exchanged, so nothing of it is used before the hash of the
+whole file was found right. What made it and what it is of is then for the reader to judge.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+from pydantic import ValidationError
+
+from campaign.archive.layout.files import sha256_of
+from campaign.archive.layout.results import ENTRY, FORMAT, HASH, RECORD, RunResults
+from campaign.archive.layout.results_text import from_text
+from campaign.archive.layout.run_folder import first_line
+from campaign.archive.reading import guarded
+from campaign.errors import ArchiveError
+from campaign.result import Array
+
+
+def is_results_file(path: Path) -> bool:
+    """Whether a file holds results of this program, of whatever run, sound or not."""
+    try:
+        with guarded.open_file(path) as file:
+            run = guarded.inner_group(guarded.inner_group(file, ENTRY), "run")
+            return guarded.attribute(file, "creator") == "campaign" and "format" in run
+    except ArchiveError:
+        return False
+
+
+def holds_results(path: Path) -> bool | None:
+    """Whether a file holds results in place of a run, of any version; None when it tells neither.
+
+    Looks at no more than the names at the top of it.
+    """
+    try:
+        with guarded.open_file(path) as file:
+            names = guarded.names(file)
+    except ArchiveError:
+        return None
+    if "run" in names:
+        return False
+    return True if ENTRY in names else None
+
+
+def read_results(path: Path, root: str) -> RunResults:
+    """The results in a file, of the run that `root` stands for.
+
+    Raises ArchiveError, which says in one line why they are not used: the file is none, is not
+    whole, was changed, has a newer layout, or is of another run.
+    """
+    found = read_any_results(path)
+    if found.root != root:
+        raise ArchiveError(
+            f"{path}: holds the results of another run, or of this one before it was gone on with: "
+            f"of {found.run}, {found.root[:12]}…, and this is {root[:12]}…"
+        )
+    return found
+
+
+def read_any_results(path: Path) -> RunResults:
+    """The results in a file, of whatever run.
+
+    Raises ArchiveError in one line: the file is none, is not whole, was changed, or has a newer
+    layout.
+    """
+    with guarded.open_file(path) as file, guarded.guarded(path, f"/{ENTRY}"):
+        if ENTRY not in guarded.names(file):
+            raise ArchiveError(f"{path}: holds no results")
+        entry = guarded.inner_group(file, ENTRY)
+        _check_format(path, entry)
+        digest, place = guarded.digest_at(entry, HASH)
+        if sha256_of(path, place) != digest:
+            raise ArchiveError(f"{path}: does not match its own hash; it was damaged or changed")
+        return _record(path, entry)
+
+
+def _check_format(path: Path, entry: h5py.Group) -> None:
+    version = guarded.integer_at(guarded.inner_group(entry, "run"), "format")
+    if not 1 <= version <= FORMAT:
+        raise ArchiveError(
+            f"{path}: has results of layout {version}; this program reads up to {FORMAT}"
+        )
+
+
+def _record(path: Path, entry: h5py.Group) -> RunResults:
+    text = guarded.text_at(guarded.inner_group(entry, RECORD), "data")
+    known: dict[str, Array] = {}
+
+    def array(place: str) -> Array:
+        where, *cut = place.split(":")
+        if where not in known:
+            *groups, name = where.split("/")
+            parent = entry
+            for group in groups:
+                parent = guarded.inner_group(parent, group)
+            known[where] = guarded.read_whole(parent, name)
+        values = known[where]
+        return values[slice(*map(int, cut))].copy() if cut else values.copy()
+
+    try:
+        return from_text(text, array)
+    except ValidationError as error:
+        raise ArchiveError(f"{path}: /{ENTRY}/{RECORD}: {first_line(error)}") from None

@@ -1,0 +1,184 @@
+"""A panel of a figure as NeXus can plot it: curves over one x in one group.
+
+An NXdata group has one x for all of its curves. Curves of a panel that have the same x are plotted
+together, and so are those that lie beside each other, such as the two directions of a friction map;
+where one has no point it is NaN. All others get a group of their own.
+
+Curves that are drawn beside one place are not over one x: each has its points in one series then.
+
+Several viewers show the first curve of a group and no other, or draw intervals of the first alone.
+Where the curves are single points, such as one for each method, a series of all of them is first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, count
+
+import numpy as np
+
+from campaign.result import Array, Curve, Panel
+
+SYMMETRIC = 0.1
+"""Share of its half-width by which an interval may be off its middle and still be `value ± half`:
+as where numbers are written (`campaign.text.interval`)."""
+
+
+INTERVAL = {
+    "errors": "half-width of the 95 % interval",
+    "low": "lower end of the 95 % interval",
+    "high": "upper end of the 95 % interval",
+    "lower_edge": "lower edge of the band",
+}
+"""What stands beside a series, by the ending of its name."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves over one x.
+
+    Attributes:
+        x: shape (n,).
+        curves: each with its name and where in `x` it begins.
+    """
+
+    x: Array
+    curves: tuple[tuple[str, Curve, int], ...]
+
+    def spread(self, values: Array, start: int) -> Array:
+        """What a curve has at its own points, over all of `x`: NaN elsewhere; shape (n,)."""
+        if len(values) == len(self.x):
+            return values
+        whole = np.full(len(self.x), np.nan)
+        whole[start : start + len(values)] = values
+        return whole
+
+
+def plots_of(panel: Panel) -> list[Plot]:
+    """The plots of a panel, that which tells most first: it is the one that viewers open."""
+    alike: dict[tuple[bytes, float], list[Curve]] = {}
+    for curve in panel.curves:
+        alike.setdefault((_floats(curve.x).tobytes(), curve.aside), []).append(curve)
+    bundles: list[list[list[Curve]]] = []  # of curves that lie side by side, those with one x
+    for curves in alike.values():
+        beside = next((b for b in bundles if all(_apart(curves[0], c[0]) for c in b)), None)
+        if beside is None:
+            bundles.append([curves])
+        else:
+            beside.append(curves)
+    return sorted(map(_plot, bundles), key=_background)
+
+
+def joined(plot: Plot) -> Curve | None:
+    """All points of a plot as one curve, where each of its several curves is one point."""
+    curves = [curve for _, curve, _ in sorted(plot.curves, key=lambda each: each[2])]
+    if len(curves) < 2 or not len(curves) == len(plot.x) == sum(len(c.x) for c in curves):
+        return None
+
+    def ends(which: str) -> Array | None:
+        given = [getattr(curve, which) for curve in curves]
+        if all(each is None for each in given):
+            return None
+        return np.concatenate([[np.nan] if each is None else _floats(each) for each in given])
+
+    y = np.concatenate([_floats(curve.y) for curve in curves])
+    return Curve(plot.x, y, label="all", style="points", low=ends("low"), high=ends("high"))
+
+
+def half_widths(values: Array, low: Array, high: Array) -> Array | None:
+    """Half of each interval, shape (n,), NaN where there is none; None where any is lopsided."""
+    half = 0.5 * (high - low)
+    off = np.abs(high + low - 2 * values)
+    given = np.isfinite(half)
+    return half if given.any() and not np.any(off[given] > SYMMETRIC * half[given]) else None
+
+
+def names_of(wanted: Sequence[str]) -> list[str]:
+    """Names as NeXus allows them, each once."""
+    taken: dict[str, None] = {}
+    for text in wanted:
+        name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")[:50] or "unnamed"
+        taken[unused(f"n_{name}" if name[0].isdigit() else name, taken)] = None
+    return list(taken)
+
+
+def unused(name: str, taken: Container[str]) -> str:
+    """A name, with a number where somebody has it already."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return next(each for each in chain([name], numbered) if each not in taken)
+
+
+def _plot(bundle: list[list[Curve]]) -> Plot:
+    """Groups of curves side by side, in the order of x."""
+    ordered = sorted(bundle, key=lambda curves: _ends(curves[0])[0])
+    starts = np.cumsum([0, *(len(curves[0].x) for curves in ordered)])
+    placed = [
+        (curve, int(start))
+        for curves, start in zip(ordered, starts[:-1], strict=True)
+        for curve in curves
+    ]
+    placed.sort(key=lambda each: _rank(each[0]))  # stable
+    names = names_of([curve.series or curve.label or "curve" for curve, _ in placed])
+    x = np.concatenate([_floats(curves[0].x) for curves in ordered])
+    return Plot(
+        x, tuple((name, curve, start) for name, (curve, start) in zip(names, placed, strict=True))
+    )
+
+
+def _background(plot: Plot) -> int:
+    return min(_rank(curve) for _, curve, _ in plot.curves)
+
+
+def _has_ends(curve: Curve) -> bool:
+    """Whether any of its points has an interval, if only on one side."""
+    return any(
+        end is not None and np.isfinite(_floats(end)).any() for end in (curve.low, curve.high)
+    )
+
+
+def _rank(curve: Curve) -> int:
+    """How far in the background it is: what has intervals in front, then what was measured."""
+    if _has_ends(curve) and curve.style not in ("thin", "band"):
+        return 0
+    if curve.series in ("reference", "alternative") or curve.style in ("thin", "band"):
+        return 2
+    return 1
+
+
+def _apart(one: Curve, other: Curve) -> bool:
+    """Whether both run along x, and one of them is over before the other begins."""
+    if not (_runs_along(one) and _runs_along(other)):
+        return False
+    (low, high), (lowest, highest) = _ends(one), _ends(other)
+    return high < lowest or highest < low
+
+
+def _runs_along(curve: Curve) -> bool:
+    x = _floats(curve.x)
+    return len(x) > 0 and bool(np.all(np.diff(x) > 0))
+
+
+def _ends(curve: Curve) -> tuple[float, float]:
+    x = _floats(curve.x)
+    return (float(x[0]), float(x[-1])) if len(x) else (0.0, 0.0)
+
+
+def _floats(values: Array) -> Array:
+    return np.asarray(values, dtype=np.float64)
+
+
+def parts_of(curve: Curve) -> Iterator[tuple[str, Array, Array | None]]:
+    """What a curve has besides x and y: the ending of its name in the file, its numbers, and which
+    array of the curve it is; None for one that was made of others.
+    """
+    if curve.low is not None and curve.high is not None and _has_ends(curve):
+        low, high = _floats(curve.low), _floats(curve.high)
+        half = half_widths(_floats(curve.y), low, high)
+        if half is not None:
+            yield "errors", half, None
+        yield "low", low, curve.low
+        yield "high", high, curve.high
+    if curve.y_low is not None:
+        yield "lower_edge", _floats(curve.y_low), curve.y_low

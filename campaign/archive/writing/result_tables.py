@@ -1,0 +1,135 @@
+"""Tables and findings as NeXus: a dataset per column, and one column that viewers plot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import h5py
+import numpy as np
+
+from campaign.archive.writing import hdf5
+from campaign.archive.writing.plots import INTERVAL, half_widths, names_of, unused
+from campaign.estimate import Estimate
+from campaign.result import Array, Cell, Column, Finding, Table, Value, bare
+
+INDEX = "index"
+
+
+def put_table(parent: h5py.Group, name: str, table: Table, signal: str = "") -> bool:
+    """A table; returns whether it has numbers to plot, over the number of the row.
+
+    `signal` is the column to plot; else it is the first with estimates, or the first with numbers
+    that were found. A table without any is no NXdata.
+    """
+    if not table.rows:
+        return False
+    names = names_of([INDEX, *(column.name for column in table.columns)])[1:]
+    cells = {c.name: [row.get(c.name) for row in table.rows] for c in table.columns}
+    numeric = [c for c in table.columns if _is_numeric(cells[c.name])]
+    shown = next(iter(sorted(numeric, key=lambda c: _telling(c, cells[c.name], signal))), None)
+    group = hdf5.make_group(parent, name, "NXcollection" if shown is None else "NXdata")
+    hdf5.put_text(group, "title", table.title)
+    hdf5.put_attribute(group, "note", table.note)
+    own = dict(zip((column.name for column in table.columns), names, strict=True))
+    if shown is not None:
+        hdf5.put_attribute(group, "signal", own[shown.name])
+        group.attrs["axes"] = [INDEX]
+        group.attrs[f"{INDEX}_indices"] = np.array([0], dtype="<i4")
+    _put_index(group, len(table.rows))
+    for column in table.columns:
+        _put_column(group, own[column.name], column, cells[column.name], column in numeric)
+    for column in numeric:
+        _put_intervals(group, own[column.name], column, cells[column.name])
+    hdf5.attach_time(group, INDEX)
+    return shown is not None
+
+
+def put_findings(parent: h5py.Group, name: str, findings: Sequence[Finding]) -> None:
+    """Findings as a table: what was found, its interval, why there is none, and each condition."""
+    known = [finding.known for finding in findings]
+    ends = [estimate.combined for estimate in known]
+    conditions = dict.fromkeys(key for finding in findings for key in finding.conditions)
+    columns: dict[str, Sequence[Cell]] = {
+        "quantity": [each.name for each in known],
+        "value": [each.value for each in known],
+        "units": [each.unit for each in known],
+        "low": [low for low, _ in ends],
+        "high": [high for _, high in ends],
+        "standard_error": [each.standard_error for each in known],
+        "origin": [each.origin.value for each in known],
+        "kind": [each.kind for each in known],
+        "reason": [each.reason for each in known],
+        "method": [each.method for each in known],
+    }
+    columns |= {
+        f"condition {key}": [finding.conditions.get(key) for finding in findings]
+        for key in conditions
+    }
+    group = hdf5.make_group(parent, name, "NXcollection")
+    _put_index(group, len(findings))
+    names = names_of([INDEX, *columns])[1:]
+    for own, (label, cells) in zip(names, columns.items(), strict=True):
+        _put_column(group, own, Column(label, label.replace("_", " ")), cells, _is_numeric(cells))
+    hdf5.attach_time(group, INDEX)
+
+
+def _put_index(group: h5py.Group, rows: int) -> None:
+    hdf5.put_series(group, INDEX, np.arange(1.0, rows + 1), long_name="Number of the row")
+
+
+def _put_column(
+    group: h5py.Group, name: str, column: Column, cells: Sequence[Cell], numeric: bool
+) -> None:
+    if numeric:
+        hdf5.put_series(group, name, _numbers(map(bare, cells)), **_told_of(column))
+    else:
+        hdf5.put_texts(group, name, [_text(bare(cell)) for cell in cells], **_told_of(column))
+
+
+def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence[Cell]) -> None:
+    """The ends of a column's intervals, and half of each where none of them is lopsided."""
+    if not any(isinstance(cell, Estimate) for cell in cells):
+        return
+    ends = [cell.combined if isinstance(cell, Estimate) else (None, None) for cell in cells]
+    low, high = _numbers(end for end, _ in ends), _numbers(end for _, end in ends)
+    half = half_widths(_numbers(map(bare, cells)), low, high)
+    parts = {"errors": half, "low": low, "high": high}
+    for ending, values in parts.items():
+        if values is not None and np.isfinite(values).any():
+            told = _told_of(column, f", {INTERVAL[ending]}")
+            hdf5.put_series(group, unused(f"{name}_{ending}", group), values, **told)
+
+
+def _told_of(column: Column, more: str = "") -> dict[str, str]:
+    unit = f" ({column.unit})" if column.unit else ""
+    units = {"units": column.unit, "display_units": column.display or column.unit}
+    return {"long_name": f"{column.label}{more}{unit}", **(units if unit else {})}
+
+
+def _telling(column: Column, cells: Sequence[Cell], signal: str) -> int:
+    """How far it is from being what a viewer should plot."""
+    if column.name == signal:
+        return 0
+    if any(isinstance(cell, Estimate) for cell in cells):
+        return 1
+    return 3 if column.exact else 2
+
+
+def _is_numeric(cells: Sequence[Cell]) -> bool:
+    """Whether there are numbers and nothing else; True and False are words."""
+    told = [value for value in map(bare, cells) if value is not None]
+    numbers = all(isinstance(v, int | float | np.number) for v in told)
+    estimated = any(isinstance(cell, Estimate) for cell in cells)
+    return numbers and not any(isinstance(v, bool) for v in told) and bool(told or estimated)
+
+
+def _numbers(values: Iterable[Value]) -> Array:
+    return np.array([np.nan if v is None else float(v) for v in values], dtype=np.float64)
+
+
+def _text(value: Value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, float) else str(value)

@@ -1,0 +1,74 @@
+"""A run whose samples come from one open file, and a run handed to another process."""
+
+import pickle
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+
+from campaign.archive import RunReader, open_run
+from campaign.archive.reading import guarded
+from campaign.errors import ArchiveError
+from tests.archive.test_kept import KEPT
+
+SEALED = ["format-1.nxs", "format-2.nxs", "format-3.nxs"]
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the files that are opened from now on."""
+    names: list[str] = []
+    file = h5py.File
+
+    def counted(name, *args, **kwargs):
+        names.append(str(name))
+        return file(name, *args, **kwargs)
+
+    monkeypatch.setattr(guarded.h5py, "File", counted)
+    return names
+
+
+def read_all(run: RunReader) -> list[bytes]:
+    recordings = [trial.recording() for trial in run.trials if trial.ending.outcome == "completed"]
+    return [channel.samples.tobytes() for r in recordings for channel in r.channels.values()]
+
+
+@pytest.mark.parametrize("name", SEALED)
+def test_a_file_that_is_held_open_is_opened_once(name: str, opened: list[str]) -> None:
+    run = open_run(KEPT / name)
+    opened.clear()
+    every = read_all(run)
+    assert len(opened) > 1
+    opened.clear()
+    with run.held_open():
+        assert read_all(run) == every
+    assert opened == [str(run.path)]
+    opened.clear()
+    assert read_all(run) == every  # and it is closed behind the block
+    assert len(opened) > 1
+
+
+def test_a_file_that_is_gone_is_told_by_whoever_reads_it(tmp_path: Path) -> None:
+    path = Path(shutil.copy(KEPT / "format-2.nxs", tmp_path))
+    run = open_run(path)
+    path.unlink()
+    with run.held_open(), pytest.raises(ArchiveError, match="there is no such file"):
+        run.trials[0].recording()
+
+
+def test_a_folder_is_read_as_ever() -> None:
+    run = open_run(KEPT / "format-3.partial")
+    with run.held_open():
+        assert read_all(run) == read_all(run)
+
+
+@pytest.mark.parametrize("name", [*SEALED, "format-3.partial"])
+def test_an_opened_run_is_the_same_in_another_process(name: str) -> None:
+    run = open_run(KEPT / name)
+    other = pickle.loads(pickle.dumps(run))
+    assert (other.header, other.plan, other.journal) == (run.header, run.plan, run.journal)
+    assert other.trials == run.trials
+    assert read_all(other) == read_all(run)
+    assert len(other.full_plan) == len(run.full_plan)
+    assert other.planned(1) == run.planned(1)
