@@ -82,6 +82,7 @@ class Trial(Options):
         number: place in the plan, from 1.
         test, kind: the protocol's test it belongs to, and the experiment of that test.
         point: the swept values that lead to it, dotted path to value, for display and analysis.
+        told: how people say a value of `point` that has a unit: in the one the protocol writes.
         options: the test's normalised options at this point (SI).
         repeat: which repetition it is, from 1.
         seed: of everything random in it.
@@ -104,6 +105,7 @@ class Trial(Options):
     kind: str
     role: Role = Role.MEASUREMENT
     point: dict[str, JsonValue] = {}
+    told: dict[str, str] = {}
     options: Tree = {}
     repeat: int = Field(default=1, ge=1)
     seed: int = Field(ge=0, lt=2**63)
@@ -125,7 +127,8 @@ class Trial(Options):
     @property
     def label(self) -> str:
         """For people: the test, and what is particular about this trial of it."""
-        point = ", ".join(f"{path}={_short(value)}" for path, value in self.point.items())
+        told = {path: self.told.get(path) or _short(value) for path, value in self.point.items()}
+        point = ", ".join(f"{path}={value}" for path, value in told.items())
         repeat = f" #{self.repeat}" if self.repeat > 1 else ""
         role = f" ({self.role})" if self.role is not Role.MEASUREMENT else ""
         return f"{self.test}{role}{f' [{point}]' if point else ''}{repeat}"

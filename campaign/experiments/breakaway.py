@@ -7,7 +7,7 @@ an *assumed* damping ratio gives sigma1, which the ramp itself does not show.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -15,12 +15,15 @@ from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Origin, Window
+from campaign.experiments.conclusions.breakaway import breakaway_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.results.breakaway_figures import position_figure, ramp_figure
 from campaign.experiments.results.breakaway_means import Ramps, means_of, with_comparisons
 from campaign.experiments.results.breakaway_remarks import remarks
 from campaign.experiments.results.breakaway_tables import findings_of, table_of, window_table
 from campaign.experiments.shared import fitting
+from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.identification.breakaway_torque import breakaway_torque
@@ -202,10 +205,17 @@ def _analyse(data: TestData) -> Result:
         suffix = f"-{number}" if len(groups) > 1 else ""
         means = means_of(ramps)
         tables += [table_of(ramps, means, suffix), *window_table(ramps, suffix)]
-        figures += _figures(ramps, suffix)
+        figures += _figures(ramps, means, suffix)
         findings += findings_of(ramps, means)
         notes += remarks(ramps)
-    return Result(tuple(tables), tuple(figures), tuple(findings), tuple(dict.fromkeys(notes)))
+    rates = [_options(item.trial).torque_rate for item in data.completed()]
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        breakaway_conclusions(findings, rates, Settings.of(data, BreakawayOptions)),
+    )
 
 
 def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
@@ -227,13 +237,16 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
     return Ramps(tuple(trials), tuple(places), tuple(found))
 
 
-def _figures(ramps: Ramps, suffix: str) -> Iterator[Figure]:
+def _figures(
+    ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
+) -> Iterator[Figure]:
     shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
     if shown is not None:
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
-        yield ramp_figure(_samples(data), _presliding(data, torque), torque, suffix)
+        curve, place = _presliding(data, torque), ramps.places[shown]
+        yield ramp_figure(_samples(data), curve, torque, suffix, place, trials_of([data]))
     if len(ramps.found) > 2:
-        yield position_figure(ramps, suffix)
+        yield position_figure(ramps, means, suffix)
 
 
 EXPERIMENT = Experiment(

@@ -13,13 +13,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
 from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.experiments.conclusions.breakaway import component_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.results.component_figures import Shown, component_figure
 from campaign.experiments.results.component_sums import load_share, total_of
+from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.intervals import shifted_by
@@ -34,14 +36,10 @@ from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
 from campaign.result import (
-    Array,
-    Axis,
     Cell,
     Column,
-    Curve,
     Figure,
     Finding,
-    Panel,
     Result,
     Table,
     Value,
@@ -154,9 +152,13 @@ class Reading:
     torque: Estimate
 
 
+def _options(data: TrialData) -> ComponentFrictionOptions:
+    return ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
+
+
 def _count(data: TrialData, component: str) -> float:
     """One count of the torque sensor, seen at the load (N m)."""
-    options = ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
+    options = _options(data)
     bench = bench_of(data.trial)
     motor = bench.friction[component].side == "motor"
     return options.sensor_resolution * (bench.gear.ratio if motor else 1.0)
@@ -164,7 +166,7 @@ def _count(data: TrialData, component: str) -> float:
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """The reading: the largest friction of the ramp, rounded to a count of the torque sensor."""
-    options = ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
+    options = _options(data)
     recording = data.recording()
     found = breakaway_torque(
         recording.time,
@@ -210,7 +212,13 @@ def _analyse(data: TestData) -> Result:
         figures.append(_figure(readings, suffix))
         findings += _findings(readings, planned)
         notes += _remarks(readings, group[0])
-    return Result(tuple(tables), tuple(figures), tuple(findings), tuple(dict.fromkeys(notes)))
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        component_conclusions(findings, [_options(each).torque_rate for each in data.completed()]),
+    )
 
 
 def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
@@ -260,6 +268,26 @@ def _side(reading: Reading) -> str:
     return str(bench_of(reading.data.trial).friction[reading.component].side)
 
 
+def _figure(readings: list[Reading], suffix: str) -> Figure:
+    shown = [
+        Shown(
+            name,
+            tuple(reading.measurement for reading in own),
+            tuple(reading.torque for reading in own),
+            _statistics(own)["mean"],
+            own[0].data,
+            _count(own[0].data, name) if _side(own[0]) == "motor" else 0.0,
+        )
+        for name, own in _by_component(readings).items()
+    ]
+    options = ComponentFrictionOptions.model_validate(
+        readings[0].data.trial.options, context={"si": True}
+    )
+    shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
+    trials = trials_of(reading.data for reading in readings)
+    return component_figure(shown, shared, options.sliding_rate, trials, suffix)
+
+
 def _table(readings: list[Reading], suffix: str) -> Table:
     components = _by_component(readings)
     rows: list[dict[str, Cell]] = []
@@ -289,70 +317,18 @@ def _table(readings: list[Reading], suffix: str) -> Table:
 
 
 def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
-    options = ComponentFrictionOptions.model_validate(first.trial.options, context={"si": True})
+    options = _options(first)
     motor = [name for name, own in _by_component(readings).items() if _side(own[0]) == "motor"]
     if motor and options.sensor_resolution > 0:
         step = options.sensor_resolution * bench_of(first.trial).gear.ratio
         yield (
-            f"The torque sensor shows multiples of {options.sensor_resolution:g} N m. Behind the "
-            f"gear that is {step:.3g} N m at the load: the readings of {' and '.join(motor)} fall "
+            f"The torque sensor shows multiples of {options.sensor_resolution:g} N·m. Behind the "
+            f"gear that is {step:.3g} N·m at the load: the readings of {' and '.join(motor)} fall "
             "on a few steps, and their deviation is that of the sensor as much as of friction."
         )
     yield (
         "A single reading is one sample of a friction that scatters from trial to trial; only mean "
         "and deviation can be compared. Its own interval is that of this one reading."
-    )
-
-
-def _history(data: TrialData) -> tuple[Array, Array]:
-    """Size of torque (N m) and rate (rad/s) of a ramp, each (n,)."""
-    recording = data.recording()
-    return np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
-
-
-def _end(estimate: Estimate, side: int) -> float:
-    end = estimate.combined[side]
-    return math.nan if end is None else end
-
-
-def _figure(readings: list[Reading], suffix: str) -> Figure:
-    components = _by_component(readings)
-    dots = [
-        Curve(
-            np.array([float(r.measurement) for r in own]),
-            np.array([r.torque.value for r in own]),
-            name,
-            name,
-            "points",
-            low=np.array([_end(r.torque, 0) for r in own]),
-            high=np.array([_end(r.torque, 1) for r in own]),
-        )
-        for name, own in components.items()
-    ]
-    ramps = [Curve(*_history(own[0].data), name, name) for name, own in components.items()]
-    return Figure(
-        key=f"component-friction{suffix}",
-        title="Breakaway torque of the components",
-        caption="Left: the torque rises until a component begins to turn; the load takes the most. "
-        "Right: repeated readings. Motor-side readings fall on steps, one count of the sensor "
-        "times the gear ratio apart.",
-        alt="Rate over torque of one ramp for each component, and breakaway torque of each "
-        "component over the number of the measurement.",
-        panels=(
-            Panel(
-                Axis("Torque at the load", "N m", "N m"),
-                Axis("Rate", "rad/s", "deg/s"),
-                ramps,
-                "First measurement",
-            ),
-            Panel(
-                Axis("Measurement"),
-                Axis("Breakaway torque", "N m", "N m"),
-                dots,
-                "All measurements",
-            ),
-        ),
-        across=2,
     )
 
 

@@ -8,6 +8,7 @@ et al. as Canudas de Wit et al. (1995) show it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -16,7 +17,10 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.behaviour import force_rate_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
@@ -30,7 +34,18 @@ from campaign.experiments.shared.friction_models import (
 from campaign.identification.sampled import at_sample, bracketed, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Array, Axis, Cell, Column, Curve, Figure, Finding, Panel, Result, Table
+from campaign.result import (
+    Array,
+    Axis,
+    Cell,
+    Column,
+    Curve,
+    Figure,
+    Finding,
+    Panel,
+    Result,
+    Table,
+)
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Torque, TorqueRate
@@ -42,6 +57,8 @@ SLOWEST_RECORDING = 1000.0
 """Hz, for the slow ramps: the breakaway itself is as quick there."""
 STOP_FACTOR = 4.0
 """Rate that ends the trial, over the rate that counts as sliding."""
+STEP = 2e-3
+"""of a torque: what the time step of a simulation may change it by."""
 
 
 class ForceRateOptions(Options):
@@ -160,27 +177,33 @@ def _analyse(data: TestData) -> Result:
         note="The breakaway torque is the largest friction torque before the load slides. "
         + OF_ONE,
     )
-    return Result((table,), (_figure(rows),), findings, tuple(notes))
+    conclusions = force_rate_conclusions(listed, found, Settings.of(data, ForceRateOptions))
+    return Result((table,), (_figure(rows),), findings, tuple(notes), conclusions)
 
 
 def _figure(rows: dict[str, tuple[Place, list[_Breakaway]]]) -> Figure:
-    peaks, histories = [], []
+    peaks: list[Curve] = []
+    histories: dict[str, list[Curve]] = {}
+    told: list[str] = []
+    items: list[TrialData] = []
     for label, (place, own) in rows.items():
         series = model_series(str(place.point.get("model", label or "measured")))
         if own:
             peaks.append(_peaks(own, label, series))
-            histories += list(_histories(place, own, label, series))
+            for title, curve in _histories(place, own, label, series):
+                histories.setdefault(title, []).append(curve)
+            told.append(_what_shows(own, label))
+            items += place.trials
     top = max(float(curve.y.max()) for curve in peaks)
     applied = Axis("Applied torque", "N m", "N m", limits=(0.0, 1.6 * top))
     friction = Axis("Friction torque", "N m", "N m", limits=(0.0, 1.15 * top))
     line = np.array([0.0, 1.6 * top])
-    histories.append(Curve(line, line, "friction holds the load", "reference", "thin"))
+    held = Curve(line, line, "friction holds the load", "reference", "thin")
     return Figure(
         key="force-rate",
         title="Breakaway torque over the rate of the applied torque",
-        caption="Left: a dynamic model lets go earlier the faster the torque rises; a static one "
-        "always at its static torque. Right: the slowest and the fastest ramp of each model. On "
-        "the dotted line friction holds the load; below it the load gains speed.",
+        caption=f"{' '.join(told)} Behind: friction during {_ramps(histories)}. On the dotted line "
+        "friction holds the load; below it the load gains speed.",
         alt="Breakaway torque over torque rate on a logarithmic axis, and friction torque over "
         "applied torque for the slowest and the fastest ramp.",
         panels=(
@@ -190,11 +213,39 @@ def _figure(rows: dict[str, tuple[Place, list[_Breakaway]]]) -> Figure:
                 peaks,
                 "Breakaway",
             ),
-            Panel(applied, friction, histories, "Slowest and fastest ramp"),
+            *(
+                Panel(applied, friction, [*curves, held], title)
+                for title, curves in histories.items()
+            ),
         ),
         thesis=("2.8",),
-        across=2,
+        across=3,
+        trials=trials_of(items),
     )
+
+
+def _what_shows(rows: list[_Breakaway], label: str) -> str:
+    """How the breakaway torque changes from the slowest to the fastest ramp, if it does."""
+    first, last = rows[0], rows[-1]
+    who = f"{label}: breakaway" if label else "breakaway"
+    torques = [amount(row.breakaway.value, "N m") for row in (first, last)]
+    rates = [setting(row.torque_rate, "N m/s") for row in (first, last)]
+    if len(rows) == 1:
+        return sentence(f"{who} at {torques[0]} where the torque rises by {rates[0]}")
+    if not _apart(first.breakaway, last.breakaway):
+        return sentence(f"{who} at {torques[0]}, at {rates[0]} as at {rates[1]}")
+    way = "falls" if last.breakaway.value < first.breakaway.value else "rises"
+    return sentence(f"{who} {way} from {torques[0]} at {rates[0]} to {torques[1]} at {rates[1]}")
+
+
+def _apart(one: Estimate, other: Estimate) -> bool:
+    """Whether two breakaway torques differ by more than both intervals and a part in a thousand.
+
+    A simulation's time step may change them by that, which no interval has in it.
+    """
+    halves = [each.half_width for each in (one, other) if each.has_interval]
+    scatter = math.hypot(*(half for half in halves if math.isfinite(half)))
+    return abs(one.value - other.value) > max(scatter, STEP * abs(one.value))
 
 
 def _peaks(rows: list[_Breakaway], label: str, series: str) -> Curve:
@@ -202,14 +253,30 @@ def _peaks(rows: list[_Breakaway], label: str, series: str) -> Curve:
     return Curve.of(rates, [row.breakaway for row in rows], label, series, "line+points")
 
 
-def _histories(place: Place, rows: list[_Breakaway], label: str, series: str) -> Iterator[Curve]:
-    """Friction over applied torque of the slowest and the fastest ramp."""
-    rates = [row.torque_rate for row in rows]
-    for item in place.trials:
-        if item.trial.point["torque_rate"] in (rates[0], rates[-1]):
-            recording = item.recording()
-            applied = item.trial.task.disturbance.sample(recording.time)
-            yield Curve(applied, recording[FRICTION_TORQUE], label, series)
+def _ramps(histories: dict[str, list[Curve]]) -> str:
+    """The panels behind the first, as a sentence names them."""
+    return "the only ramp" if len(histories) == 1 else "the slowest and during the fastest ramp"
+
+
+def _histories(
+    place: Place, rows: list[_Breakaway], label: str, series: str
+) -> Iterator[tuple[str, Curve]]:
+    """Friction over applied torque of the slowest and of the fastest ramp, each with its panel.
+
+    One panel would show two curves of one look for each model.
+    """
+    rates = list(dict.fromkeys((rows[0].torque_rate, rows[-1].torque_rate)))
+    titles = ("Slowest ramp", "Fastest ramp") if len(rates) == 2 else ("Ramp",)
+    shown = {
+        rate: f"{title}: {setting(rate, 'N m/s')}"
+        for rate, title in zip(rates, titles, strict=True)
+    }
+    for rate, title in shown.items():
+        for item in place.trials:
+            if item.trial.point["torque_rate"] == rate:
+                recording = item.recording()
+                applied = item.trial.task.disturbance.sample(recording.time)
+                yield title, Curve(applied, recording[FRICTION_TORQUE], label, series)
 
 
 EXPERIMENT = Experiment(

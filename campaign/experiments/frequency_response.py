@@ -17,6 +17,11 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.experiments.conclusions.parts import Settings
+from campaign.experiments.conclusions.servo import (
+    closed_loop_conclusions,
+    open_loop_conclusions,
+)
 from campaign.experiments.interface import Experiment, Stage, TestData, TrialData, metrics
 from campaign.experiments.results.frequency_response_figures import (
     closed_loop_figures,
@@ -28,10 +33,12 @@ from campaign.experiments.results.frequency_response_tables import (
     closed_findings,
     closed_notes,
     closed_tables,
+    is_extrapolated,
     method,
     modes,
     quality_note,
 )
+from campaign.experiments.results.servo_marks import place_names, servo_figure
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import (
     conditions,
@@ -40,6 +47,7 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
+from campaign.experiments.shared.swept_words import words
 from campaign.identification.frequency_response import Response, make_response
 from campaign.identification.intervals import with_error
 from campaign.identification.refinement import MOST as MOST_REFINED
@@ -49,7 +57,7 @@ from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.limits import worst_friction
-from campaign.result import Figure, Finding, Result, Table, Value
+from campaign.result import Conclusion, Figure, Finding, Result, Table
 from campaign.signals import Sine
 from campaign.trial import NONE_MORE, Most, Task, Trial, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time, Torque
@@ -197,7 +205,7 @@ def _excitation(mode: str) -> str:
 def _amplitude(command: Sine, closed: bool) -> str:
     if closed:
         return f"amplitude {np.rad2deg(command.amplitude):.3g} deg/s"
-    return f"amplitude {command.amplitude:.3g} N m"
+    return f"amplitude {command.amplitude:.3g} N·m"
 
 
 def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> float:
@@ -241,7 +249,7 @@ def _torque_sine(
     swing = rate / omega
     if abs(options.position) + swing > bench.limits.angle or rate > bench.limits.rate:
         raise ValueError(
-            f"{options.torque:g} N m at {frequency:g} Hz would swing a load without friction by "
+            f"{options.torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
             f"{np.rad2deg(swing):.3g} deg at {np.rad2deg(rate):.3g} deg/s, beyond the bench's "
             "limits; lower torque or raise lowest"
         )
@@ -309,21 +317,39 @@ def _analyse(data: TestData) -> Result:
     tables: list[Table] = []
     figures: list[Figure] = []
     findings: list[Finding] = []
+    conclusions: list[Conclusion] = []
     if closed:
         tables += closed_tables(closed, paths)
         shown = [(s.label, method(s), s.response) for s in closed]
-        figures += closed_loop_figures(shown, [s.found for s in closed])
+        figures += servo_figure(closed)
+        figures += closed_loop_figures(shown, [s.found for s in closed], place_names(closed))
         findings += [finding for sweep in closed for finding in closed_findings(sweep)]
         findings += changes(closed)
         notes += closed_notes(closed)
+        settings = Settings.of(data, FrequencyResponseOptions)
+        beyond = [method(sweep) for sweep in closed if is_extrapolated(sweep)]
+        conclusions += closed_loop_conclusions(findings, _span(closed), beyond, settings)
     if opened:
         table, found, doubts = modes(opened, paths)
         tables.append(table)
         findings += found
         notes += doubts
         figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], found))
+        conclusions += open_loop_conclusions(table.rows, _span(opened))
     notes += quality_note(sweeps)
-    return Result(tuple(tables), tuple(figures), tuple(findings), tuple(dict.fromkeys(notes)))
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        tuple(conclusions),
+    )
+
+
+def _span(sweeps: Sequence[Sweep]) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) of all of them."""
+    every = np.concatenate([sweep.response.frequency for sweep in sweeps])
+    return float(every.min()), float(every.max())
 
 
 def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
@@ -331,7 +357,8 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     place.pop("frequency", None)
     loop = "closed" if first.trial.task.mode == "rate" else "open"
     label = method_label(str(place["compensation"]))
-    others = [f"{path} = {_told(place.get(path))}" for path in paths if path != "compensation"]
+    swept = {path: place.get(path) for path in paths if path != "compensation"}
+    others = words(swept, first.trial, FrequencyResponseOptions)
     found = characteristics(response) if loop == "closed" else None
     return Sweep(place, loop, ", ".join([label, *others]), response, found)
 
@@ -353,10 +380,6 @@ def _falling_amplitude(group: tuple[TrialData, ...]) -> Iterator[str]:
             f"{np.rad2deg(least.amplitude):.3g} deg/s at {least.frequency:.4g} Hz. Where friction "
             "matters, other amplitudes give other responses."
         )
-
-
-def _told(value: Value) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 EXPERIMENT = Experiment(

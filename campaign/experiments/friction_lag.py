@@ -16,7 +16,10 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate, Window
+from campaign.experiments.conclusions.behaviour import friction_lag_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
@@ -58,6 +61,8 @@ PER_CYCLE = 400
 """Samples, and straight pieces of the prescribed rate, in a cycle."""
 
 TORQUES = Axis("Friction torque", "N m", "N m")
+FLAT = 1e-4
+"""of the largest friction, up to which a loop is none that anybody sees."""
 SLOW = 0.01
 """rad/s; rates up to here are shown in mrad/s."""
 
@@ -240,21 +245,56 @@ def _analyse(data: TestData) -> Result:
     figure = Figure(
         key="friction-lag",
         title="Friction lag around the Stribeck curve",
-        caption="The rate swings above zero. Friction is larger on the way up than on the way "
-        "down, and the loop widens with the frequency; a static model has no loop and stays on "
-        "the curve of steady sliding.",
+        caption="The rate swings above zero; arrows show which way a loop runs. "
+        + " ".join(_what_shows(place, own) for place, own in loops),
         alt="Friction torque over rate: one loop per frequency around the curve of steady sliding.",
         panels=tuple(_panel(place, own) for place, own in loops),
         thesis=("2.10",),
         across=min(2, len(loops)),
+        trials=trials_of(items[0] for place in found for items in place.by("frequency").values()),
     )
-    return Result((table,), (figure,), findings, failures_note(data))
+    conclusions = friction_lag_conclusions(rows, found, Settings.of(data, FrictionLagOptions))
+    return Result((table,), (figure,), findings, failures_note(data), conclusions)
+
+
+def _what_shows(place: Place, loops: list[Loop]) -> str:
+    """How wide the loops are at the mean rate, where friction lags at all: true of the figure."""
+    start = f"{place.label}: " if place.label else ""
+    told = [loop for loop in loops if math.isfinite(loop.width.value)]
+    if not told:
+        return ""
+    level = _level(told)
+    if all(_flat(loop, level) for loop in told):
+        return sentence(f"{start}no loop shows, friction is the same up and down")
+    widths = [
+        f"{amount(loop.width.value, 'N m', digits=2)} at {loop.frequency:.4g} Hz" for loop in told
+    ]
+    higher = all(surely_above(loop.width, 0.0, FLAT * level) for loop in told)
+    up, by = ("is higher than", " by") if higher else ("less that", ":")
+    return sentence(f"{start}friction on the way up {up} on the way down{by} {listed(widths)}")
+
+
+def _level(loops: Sequence[Loop]) -> float:
+    """Largest friction of all loops (N m)."""
+    return max(float(np.nanmax(np.abs(loop.friction), initial=0.0)) for loop in loops)
+
+
+def _flat(loop: Loop, level: float) -> bool:
+    """Whether friction is the same up and down: a line, which runs no way round."""
+    return abs(loop.widest.value) <= FLAT * level
 
 
 def _panel(place: Place, loops: list[Loop]) -> Panel:
+    level = _level(loops)
     curves = [
-        Curve(loop.rate, loop.friction, f"{loop.frequency:.4g} Hz", f"loop-{number}")
-        for number, loop in enumerate(loops)
+        Curve(
+            loop.rate,
+            loop.friction,
+            f"{loop.frequency:.4g} Hz",
+            _series(loop),
+            "line" if _flat(loop, level) else "loop",
+        )
+        for loop in loops
     ]
     known = [rate for loop in loops if len(rate := loop.rate[np.isfinite(loop.rate)])]
     if not known:
@@ -264,6 +304,10 @@ def _panel(place: Place, loops: list[Loop]) -> Panel:
     curves.append(Curve(fine, steady, "steady sliding", "reference", "thin"))
     display = "mrad/s" if fine[-1] < SLOW else "deg/s"
     return Panel(_rates(display), TORQUES, curves, place.label)
+
+
+def _series(loop: Loop) -> str:
+    return f"{loop.frequency:.4g} Hz"
 
 
 def _rates(display: str) -> Axis:

@@ -16,6 +16,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.behaviour import model_output_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared.common import (
     conditions,
@@ -60,6 +61,8 @@ VARIED = ("parameter", "factor")
 UNCHANGED = "unchanged"
 RATE = Axis("Rate", "rad/s", "deg/s")
 TORQUE = Axis("Friction torque", "N m", "N m")
+LEFT = Axis("Friction less compensation", "N m", "N m")
+WHAT_IS_LEFT = "What compensation leaves is the friction of the bench less the output of its model."
 METRICS = ("peak", "at_amplitude", "at_reversal")
 JUMP = 20.0
 """times the step of the torque from sample to sample beside it."""
@@ -205,7 +208,16 @@ def _analyse(data: TestData) -> Result:
         note="Where the rate falls through zero a static model jumps, and a dynamic one still "
         "holds the torque of its bristles. " + OF_ONE,
     )
-    return Result((table,), tuple(figures), tuple(findings), failures_note(data))
+    options = ModelOutputOptions.model_validate(measured[0].trial.options, context={"si": True})
+    conclusions = model_output_conclusions(rows, options.amplitude, options.frequency)
+    return Result(
+        (table,),
+        tuple(figures),
+        tuple(findings),
+        failures_note(data),
+        conclusions,
+        telling=next((figure.key for figure in figures if figure.key.startswith("sine")), ""),
+    )
 
 
 def _cycle(data: TrialData) -> tuple[Recording, Array]:
@@ -315,21 +327,41 @@ def _sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
     near = NEAR_ZERO * max(_largest(curve.x) for curve in curves)
     zoom = Axis(RATE.label, "rad/s", "deg/s", limits=(-near, near))
     mark = (Mark("", x=0.0),)
+    left = _left(trials)
     return Figure(
         key=f"sine{suffix}",
         title="Output of the models over a sinusoidal rate",
         caption="A static model jumps where the rate changes its sign. In a dynamic one the "
         "bristles have to turn around first, so the torque comes late and without a jump, on "
-        "another branch for rising than for falling rate.",
+        "another branch for rising than for falling rate." + (f" {WHAT_IS_LEFT}" if left else ""),
         alt="Torque over rate for each model in one cycle of a sinusoidal rate, and the same near "
         "zero rate, where the static model jumps and the dynamic one makes a loop.",
         panels=(
             Panel(RATE, TORQUE, curves, "Whole cycle"),
             Panel(zoom, TORQUE, [_near(c, near) for c in curves], "Near zero rate", marks=mark),
+            *([Panel(RATE, LEFT, left, "What compensation leaves")] if left else []),
         ),
         thesis=("4.14",),
         across=2,
     )
+
+
+def _left(trials: Sequence[TrialData]) -> list[Curve]:
+    """Friction less each compensation at the same rate; nothing of several frictions."""
+    plain = [item for item in trials if "compensation" not in item.trial.point]
+    if len(plain) != 1:
+        return []
+    _, friction = _cycle(plain[0])
+    curves = []
+    for item in trials:
+        name = item.trial.point.get("compensation")
+        if name is None:
+            continue
+        cut, torque = _cycle(item)
+        if len(torque) == len(friction):
+            rest = _closed(cut[LOAD_RATE], friction - torque)
+            curves.append(Curve(*rest, _source(item), str(name)))
+    return curves
 
 
 def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:

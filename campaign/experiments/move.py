@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.channels import RELATIVE_ANGLE
+from campaign.experiments.conclusions.behaviour import move_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared.common import failures_note
 from campaign.identification.intervals import of_series, shifted_by
@@ -105,7 +106,7 @@ def _analyse(data: TestData) -> Result:
         thesis=(),
         note="The rate loop follows a rate; what friction holds back on the way, it does not undo.",
     )
-    return Result((table,), notes=notes)
+    return Result((table,), notes=notes, conclusions=move_conclusions(rows))
 
 
 def _row(data: TrialData) -> dict[str, Cell]:

@@ -19,6 +19,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.observer_gain import observer_conclusions
 from campaign.experiments.interface import Chosen, Experiment, TestData, TrialData, bench_of
 from campaign.experiments.results.observer_figures import (
     error_figure,
@@ -212,15 +213,17 @@ def _analyse(data: TestData) -> Result:
     for item in data.trials:
         groups.setdefault(float(str(item.trial.point["corner"])), []).append(item)
     gains = [gain_of(corner, group) for corner, group in sorted(groups.items())]
-    figures: list[Figure] = [
-        *error_figure(gains, own),
-        *rejection_figure(gains, own),
-        *noise_figure(gains, own),
-    ]
     limit = predicted_limit(bench, options.observer, max(gain.corner for gain in gains) or own)
+    figures: list[Figure] = [
+        *error_figure(gains, own, limit),
+        *rejection_figure(gains, own),
+        *noise_figure(gains, own, limit),
+    ]
     findings = tuple(_findings(gains, own, inertia or bench.axis.inertia, options))
     notes = tuple(_notes(gains, data, limit, options))
-    return Result((_table(gains),), tuple(figures), findings, notes)
+    ended = next((gain.unstable for gain in gains if np.isclose(gain.corner, own)), "")
+    conclusions = observer_conclusions(findings, own, ended, bench.controller.pointing_high_pass)
+    return Result((_table(gains),), tuple(figures), findings, notes, conclusions)
 
 
 def _findings(
@@ -280,7 +283,7 @@ def _notes(
     )
     if first is not None:
         yield (
-            f"Unstable from K0 = {first.gain:.4g} N m s/rad at the load (corner "
+            f"Unstable from K0 = {first.gain:.4g} N·m·s/rad at the load (corner "
             f"{first.corner:.4g} Hz): {first.unstable}. A result, not a failure; {expected}."
         )
     else:

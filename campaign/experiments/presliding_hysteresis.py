@@ -7,16 +7,20 @@ in a cycle (Figure 2.11).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
+from campaign.experiments.conclusions.behaviour import hysteresis_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import fitting
+from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import Place, in_models, places
 from campaign.identification.intervals import shifted_by
@@ -43,6 +47,8 @@ PER_CYCLE = 400
 """Straight pieces of the prescribed rate in a cycle."""
 SMALL = 1e-4
 """rad; displacements up to here are shown in microradian."""
+READABLE = 0.3
+"""of the largest amplitude: up to here a loop is shown again among its like."""
 
 
 class PreslidingHysteresisOptions(Options):
@@ -199,25 +205,63 @@ def _analyse(data: TestData) -> Result:
         for place, items in loops
         for item, own in items
     )
+    small = [amplitude for place in found for amplitude in _small(place)]
+    again = f" On the right those up to {_amplitude(max(small), display)} again." if small else ""
     figure = Figure(
         key="presliding-hysteresis",
         title="Friction over small displacements",
-        caption="Small displacements are almost elastic; larger ones leave the spring line, reach "
-        "sliding, and enclose more energy. A static model has no presliding: its loop is a box of "
-        "any size.",
-        alt="Friction torque over displacement: one closed loop per amplitude, narrow for small "
-        "amplitudes and nearly rectangular for large ones.",
-        panels=tuple(_panel(place, display) for place in found),
+        caption=f"The last cycle of each amplitude, closed; arrows show which way it runs.{again} "
+        + " ".join(_what_shows(place, items, display, energy) for place, items in loops),
+        alt="Friction torque over displacement: one closed loop per amplitude.",
+        panels=tuple(panel for place in found for panel in _panels(place, display)),
         thesis=("2.11",),
-        across=min(2, len(found)),
+        across=2,
+        trials=trials_of(item for place in found for item in place.trials),
     )
-    return Result((table,), (figure,), findings, failures_note(data))
+    settings = Settings.of(data, PreslidingHysteresisOptions)
+    conclusions = hysteresis_conclusions(rows, found, settings, (display, energy))
+    return Result((table,), (figure,), findings, failures_note(data), conclusions)
+
+
+def _what_shows(
+    place: Place, items: Sequence[tuple[TrialData, Mapping[str, Estimate]]], unit: str, energy: str
+) -> str:
+    """Energy and loss factor of the smallest and the largest loop."""
+    told = [each for each in items if math.isfinite(each[1]["hysteresis_energy"].value)]
+    if not told:
+        return ""
+    ordered = sorted(told, key=lambda each: _amplitude_of(each[0]))
+    parts = [
+        f"{amount(own['hysteresis_energy'].value, 'J', energy)} a cycle at "
+        f"{_amplitude(_amplitude_of(item), unit)} (loss factor {own['loss_factor'].value:.2g})"
+        for item, own in (ordered[0], ordered[-1])
+    ]
+    start = f"{place.label} loses" if place.label else "Lost are"
+    return sentence(f"{start} {listed(list(dict.fromkeys(parts)))}")
+
+
+def _small(place: Place) -> list[float]:
+    """Amplitudes (rad) of the loops that a panel of all of them shows too small to be read."""
+    known = [_amplitude_of(item) for item in place.trials]
+    return [each for each in known if each <= READABLE * max(known)]
+
+
+def _panels(place: Place, display: str) -> Iterator[Panel]:
+    """All loops, and beside them the small ones again, on axes of their own."""
+    whole = _panel(place, display)
+    yield whole
+    small = _small(place)
+    if small:
+        near = [_amplitude_of(item) in small for item in place.trials]
+        curves = [curve for curve, shown in zip(whole.curves, near, strict=True) if shown]
+        title = f"{place.label}, small amplitudes" if place.label else "Small amplitudes"
+        yield replace(whole, curves=curves, title=title)
 
 
 def _panel(place: Place, display: str) -> Panel:
     curves = [
-        Curve(loop.displacement, loop.friction, label, f"loop-{number}")
-        for number, item in enumerate(place.trials)
+        Curve(loop.displacement, loop.friction, label, label, "loop")
+        for item in place.trials
         for loop in [_loop(item, _windows(item)[-1])]
         for label in [_amplitude(_amplitude_of(item), display)]
     ]

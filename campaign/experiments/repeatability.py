@@ -9,15 +9,19 @@ map as two sets, so that three maps are sets 1 to 6.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.friction_map.figures import point_bars
-from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.conclusions.friction_map import repeatability_conclusions
+from campaign.experiments.friction_map.fits import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
+from campaign.experiments.friction_map.repeated import (
+    MapSet,
+    overlay_figure,
+    scatter_figure,
+)
 from campaign.experiments.friction_map.runs import (
     CAN_USE,
     DIRECTIONS,
@@ -30,6 +34,7 @@ from campaign.experiments.friction_map.runs import (
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import fitting
+from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts
 from campaign.identification.intervals import of_repeats
@@ -38,14 +43,9 @@ from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.identification.velocity_map import doubts
 from campaign.result import (
     Array,
-    Axis,
     Cell,
     Column,
-    Curve,
-    Figure,
     Finding,
-    Mark,
-    Panel,
     Result,
     Table,
     Value,
@@ -54,26 +54,6 @@ from campaign.trial import canonical_json
 
 SCORED = tuple(name for name in PARAMETERS if name != "stribeck_exponent")
 """Parameters of Table 4.4; the exponent is fitted beside them, and scatters most."""
-DISPLAY = {"stribeck_velocity": "rad/s"}
-
-
-@dataclass(frozen=True)
-class MapSet:
-    """One complete map.
-
-    Attributes:
-        name: of its two sets, e.g. "1-2".
-        where: what is particular about it, e.g. `bench.variation.day = 1`.
-        found: by direction and parameter, the exponent free.
-    """
-
-    name: str
-    where: str
-    fits: MapFits
-    found: Mapping[str, Mapping[str, Estimate]]
-
-    def value(self, direction: str, parameter: str) -> float:
-        return self.found[direction][parameter].value
 
 
 def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
@@ -112,14 +92,22 @@ def _analyse(data: TestData) -> Result:
     notes = [*failures_note(data), *settling_notes(item.trial for item in data.completed())]
     sets = list(_sets(data, notes))
     if not sets:
-        return Result(notes=tuple(notes))
+        return Result(notes=tuple(notes), conclusions=repeatability_conclusions((), 0))
     if len(sets) == 1:
         notes.append("One map says nothing about repeatability; repeat it, or sweep the day.")
     for each in sets:
         for direction, fit in each.fits.fits.items():
             notes += [f"Sets {each.name}, {direction}: {doubt}." for doubt in doubts(fit)]
-    figures = (_overlay(sets), _scatter(sets)) if len(sets) > 1 else (_overlay(sets),)
-    return Result((_table(sets),), figures, tuple(_findings(sets)), tuple(notes))
+    shown = trials_of(data.completed())
+    figures = [overlay_figure(sets, shown)]
+    if len(sets) > 1:
+        means = {name: _mean(sets, name) for name in SCORED}
+        deviations = {name: _deviation(sets, name) for name in SCORED}
+        figures.append(scatter_figure(sets, means, deviations, shown))
+    findings = tuple(_findings(sets))
+    speeds = [float(str(item.trial.point["speed"])) for item in data.completed()]
+    conclusions = repeatability_conclusions(findings, len(sets), speeds)
+    return Result((_table(sets),), tuple(figures), findings, tuple(notes), conclusions)
 
 
 def _by_map(sets: Sequence[MapSet], parameter: str) -> Array:
@@ -219,70 +207,6 @@ def _table(sets: Sequence[MapSet]) -> Table:
         "directions are apart, which maps do not change. What the bench's constants may be off by "
         "shifts all maps alike: it is in the interval of the mean. Neither has one where a map has "
         "its value at a bound or does not determine it.",
-    )
-
-
-def _overlay(sets: Sequence[MapSet]) -> Figure:
-    """Figure 4.9: the first two maps on one another."""
-    shown = list(sets[:2])
-    series = ("measured", "alternative")
-    panels = []
-    for direction, sign in DIRECTIONS.items():
-        curves = []
-        for each, word in zip(shown, series, strict=False):
-            curves.append(point_bars(each.fits.fits[direction], f"sets {each.name}", word, sign))
-        x = Axis("Rate", "rad/s", "deg/s")
-        y = Axis("Friction torque, in its direction", "N m", "N m")
-        panels.append(Panel(x, y, curves, f"{direction.capitalize()} direction"))
-    return Figure(
-        key="sets",
-        title="Two friction-velocity maps on one another",
-        caption="The same speeds, measured twice: the shape of the curve stays, the level of "
-        "friction drifts.",
-        alt="Friction torque over rate in both directions, dots of two complete maps in each.",
-        panels=tuple(reversed(panels)),
-        thesis=("4.9",),
-        across=2,
-    )
-
-
-def _scatter(sets: Sequence[MapSet]) -> Figure:
-    number = Axis("Map", limits=(0.5, len(sets) + 0.5))
-    panels = []
-    places = np.arange(1.0, len(sets) + 1)
-    for parameter in SCORED:
-        curves = []
-        for direction in DIRECTIONS:
-            found = [each.found[direction][parameter] for each in sets]
-            low, high = np.array([each.combined for each in found], dtype=float).T
-            values = np.array([each.value for each in found])
-            curves.append(
-                Curve(
-                    places,
-                    values,
-                    f"{direction} direction",
-                    direction,
-                    "points",
-                    low=low,
-                    high=high,
-                )
-            )
-        everything = list(_by_map(sets, parameter).ravel())
-        mean, deviation = float(np.mean(everything)), relative_deviation(everything)
-        told = "its mean is zero" if math.isnan(deviation) else f"{100 * deviation:.1f} %"
-        unit = UNITS[parameter]
-        axis = Axis(SYMBOLS[parameter], unit, DISPLAY.get(parameter, unit))
-        title = f"{SYMBOLS[parameter]}: {told}"
-        panels.append(Panel(number, axis, curves, title, [Mark("mean", y=mean)]))
-    return Figure(
-        key="scatter",
-        title="Scatter of the parameters from map to map",
-        caption="Each dot is one direction of one map; the line is the mean of all, "
-        "and the titles give the standard deviation of all dots, relative to it.",
-        alt="One panel for each parameter with a dot for every map and direction, and a line at "
-        "their mean.",
-        panels=tuple(panels),
-        across=2,
     )
 
 

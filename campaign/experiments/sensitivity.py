@@ -16,12 +16,17 @@ from pydantic import Field
 
 from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.sensitivity import sensitivity_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.results.sensitivity_figures import (
+    sensitivity_figure,
+    thresholds_figure,
+)
 from campaign.experiments.results.sensitivity_results import (
     SYMBOLS,
+    Judged,
     Response,
     judge,
-    sensitivity_figure,
     sensitivity_findings,
     sensitivity_table,
 )
@@ -39,7 +44,7 @@ from campaign.identification.stabilization_error import over_trials
 from campaign.identification.threshold import Threshold
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Finding, Result, Value
+from campaign.result import Figure, Finding, Result, Value
 from campaign.signals import Sine
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, Frequency
@@ -206,7 +211,8 @@ def _analyse(data: TestData) -> Result:
         "acceleration": options.acceleration,
     }
     findings: list[Finding] = []
-    if len(measured) == len(data.trials):
+    whole = len(measured) == len(data.trials)
+    if whole:
         findings += sensitivity_findings(judged, told)
     else:
         notes.append("Thresholds and ranks are not compared: they need every trial.")
@@ -214,10 +220,25 @@ def _analyse(data: TestData) -> Result:
     notes += _skipped_notes(measured, options)
     return Result(
         (sensitivity_table(judged, limit),),
-        (*figures, sensitivity_figure(judged, limit, options.compensation)),
+        (*_figures(judged, limit, told, whole), *figures),
         tuple(findings),
         tuple(notes),
+        sensitivity_conclusions(
+            findings,
+            limit.value,
+            SYMBOLS,
+            bench_of(measured[0].trial).controller.pointing_high_pass,
+        ),
     )
+
+
+def _figures(
+    judged: Sequence[Judged], limit: Threshold, told: Mapping[str, Value], whole: bool
+) -> Iterator[Figure]:
+    """Thresholds, compared with published ones where all trials are there, and all errors."""
+    compensation = str(told["compensation"])
+    yield from thresholds_figure(judged, limit, compensation, told if whole else None)
+    yield sensitivity_figure(judged, limit, compensation)
 
 
 def _skipped_notes(measured: Sequence[TrialData], options: SensitivityOptions) -> Iterator[str]:

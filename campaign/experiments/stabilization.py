@@ -24,6 +24,8 @@ from campaign.channels import (
     missing,
 )
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.parts import Settings
+from campaign.experiments.conclusions.stabilization import stabilization_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.results.stabilization_figures import stabilization_figures
 from campaign.experiments.shared import fitting
@@ -33,6 +35,7 @@ from campaign.experiments.shared.hull_motion import Motion, SeriesMotion, ShipMo
 from campaign.experiments.shared.pointing_error import (
     error_of,
     found,
+    largest_of,
     measured_part,
     of_each,
     rate_of,
@@ -127,10 +130,11 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
 
 
 def _can_use(options: StabilizationOptions) -> tuple[str, ...]:
-    """Channels of its figures; the torque shown without compensation is that of friction."""
-    plain = options.compensation == "none"
-    torque = FRICTION_TORQUE if plain else COMPENSATION_TORQUE
-    return BASE_RATE, RELATIVE_RATE, RELATIVE_ANGLE, GYRO_RATE, torque
+    """Channels of its figures; those of what a compensation adds where there is one."""
+    rates = (BASE_RATE, RELATIVE_RATE, RELATIVE_ANGLE, GYRO_RATE)
+    if options.compensation == "none":
+        return rates
+    return (*rates, COMPENSATION_TORQUE, FRICTION_TORQUE)
 
 
 def _measure(data: TrialData) -> list[Estimate]:
@@ -138,8 +142,7 @@ def _measure(data: TrialData) -> list[Estimate]:
     recording = measured_part(data)
     if len(recording.time) < 2:
         raise ValueError("nothing was recorded in the window that is measured")
-    position = recording[POINTING_ERROR]
-    peak = float(np.max(np.abs(position - np.mean(position))))
+    peak = largest_of(recording[POINTING_ERROR])
     largest = Estimate.without_interval(LARGEST, peak, "rad", OF_A_RECORD, kind="quantile")
     error = error_of(recording, data.trial.task)
     return found([error, largest, *_time_stuck(recording, data.trial)])
@@ -183,12 +186,24 @@ def _analyse(data: TestData) -> Result:
         findings += [Finding.of(cell, told) for cell in told_of if isinstance(cell, Estimate)]
         rows.append({**told, **row})
     firsts = [group[0] for group in groups.values()]
+    high_pass = bench_of(firsts[0].trial).controller.pointing_high_pass if firsts else 0.0
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
+    findings += compared(errors)
+    figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
+    ended = [
+        (_told(item, columns) | preload_of(item), str(item.ending.outcome))
+        for item in data.trials
+        if item.ending.outcome != "completed" and item.trial.role == "measurement"
+    ]
     return Result(
-        (_table(rows, [path for path in paths if path not in columns], _high_pass(firsts)),),
-        tuple(stabilization_figures(firsts, paths, rows)),
-        (*findings, *compared(errors)),
+        (_table(rows, [path for path in paths if path not in columns], _seen_through(high_pass)),),
+        tuple(figures),
+        tuple(findings),
         failures_note(data),
+        stabilization_conclusions(
+            findings, Settings.of(data, StabilizationOptions), ended, high_pass
+        ),
+        telling=next((f.key for f in figures if "error" in f.key), ""),
     )
 
 
@@ -252,9 +267,8 @@ def _table(rows: Sequence[Mapping[str, Cell]], extra: Sequence[str], remark: str
     )
 
 
-def _high_pass(trials: list[TrialData]) -> str:
-    """A sentence when the bench sees its position error through a high-pass."""
-    corner = bench_of(trials[0].trial).controller.pointing_high_pass if trials else 0.0
+def _seen_through(corner: float) -> str:
+    """A sentence when the bench sees its position error through a high-pass (Hz)."""
     return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""
 
 

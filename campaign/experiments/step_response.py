@@ -11,6 +11,8 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.experiments.conclusions.parts import Settings
+from campaign.experiments.conclusions.servo import step_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import (
@@ -20,9 +22,10 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
+from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.identification.intervals import of_repeats
 from campaign.identification.sampled import where_it_scatters
-from campaign.identification.step_response import step_characteristics
+from campaign.identification.step_response import reached, step_characteristics
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (
@@ -166,8 +169,8 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
     words = ["linear loop" if options.linear else "with friction"]
     if options.compensation != "none" or "compensation" in paths:
         words.append(method_label(options.compensation))
-    words += [f"{path} = {place.get(path)}" for path in paths if path not in place or "." in path]
-    label = ", ".join(words)
+    others = {path: place.get(path) for path in paths if path not in ("compensation", "linear")}
+    label = ", ".join([*words, *swept_words(others, data.trial, StepResponseOptions)])
     plain = options.linear and options.compensation == "none"
     return Step(
         place,
@@ -214,7 +217,14 @@ def _analyse(data: TestData) -> Result:
         if not math.isfinite(step.value("settling_time"))
     ]
     tables = (_table(steps, [path for path in paths if path not in ("linear", "compensation")]),)
-    return Result(tables, (_figure(steps),), tuple(findings), tuple(dict.fromkeys(notes)))
+    options, settings = steps[0].options, Settings.of(data, StepResponseOptions)
+    return Result(
+        tables,
+        (_figure(steps),),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        step_conclusions(findings, options.step, options.band, settings),
+    )
 
 
 def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
@@ -260,20 +270,19 @@ def _figure(steps: list[Step]) -> Figure:
     if first.command is not None:
         curves.append(Curve(first.time, first.command, "command", "reference", "thin"))
     curves += [Curve(step.time, step.rate, step.label, step.series) for step in steps]
-    band = first.options.band
+    band = 100 * first.options.band
     marks = [
-        Mark(f"±{100 * band:g} %", y=height * (1 + band)),
-        Mark("", y=height * (1 - band)),
+        Mark(f"±{band:g} %", y=height * (1 - 0.01 * band), until=height * (1 + 0.01 * band)),
+        *_marks(first),
     ]
-    if math.isfinite(times[0]):
-        marks.append(Mark("settled", x=times[0]))
+    marked = f" Marked are numbers of: {first.label}." if len(steps) > 1 and marks[1:] else ""
     return Figure(
         key="step",
         title="Step response of the rate loop",
-        caption="The rate rises to its command and settles on it without an error that stays; the "
-        "zero of the PI controller makes it overshoot on the way.",
+        caption="The rate rises to its command; it has settled once it stays within the shaded "
+        f"band of ±{band:g} % of the step around it.{marked}",
         alt="Rate of the load over time after a step of the rate command, with the band in which "
-        "it counts as settled.",
+        "it counts as settled; rise, overshoot and settling are marked where they are seen.",
         panels=(
             Panel(
                 Axis("Time from the step", "s", "ms", limits=(-0.05 * end, end)),
@@ -284,6 +293,32 @@ def _figure(steps: list[Step]) -> Figure:
         ),
         thesis=("4.7",),
     )
+
+
+def _marks(step: Step) -> Iterator[Mark]:
+    """Rise, overshoot and settling of one step, where they were seen."""
+    rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
+    height = step.options.step
+    if math.isfinite(rise):
+        before = step.rate[step.time < 0]
+        zero = float(np.mean(before)) if before.size else 0.0
+        start = reached(step.time, (step.rate - zero) / height, RISE_FROM)
+        yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
+    if over > 0:
+        peak = int(np.nanargmax(step.rate))
+        label = f"overshoot {100 * over:.3g} %"
+        x, y = float(step.time[peak]), float(step.rate[peak])
+        yield Mark(label, x=x, y=y, point=True, series=step.series)
+    if math.isfinite(settled):
+        yield Mark(f"settled {_time(settled)}", x=settled, series=step.series)
+
+
+RISE_FROM = 0.1
+"""Share of the step from which on the rise time counts."""
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 EXPERIMENT = Experiment(

@@ -7,7 +7,7 @@ spring because sliding friction is smaller, and sticks again (Figure 2.12).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,10 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.behaviour import stick_slip_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
@@ -38,12 +41,13 @@ from campaign.result import (
     Curve,
     Figure,
     Finding,
+    Mark,
     Panel,
     Result,
     Table,
 )
 from campaign.signals import Polyline
-from campaign.trial import Task, TrialRequest
+from campaign.trial import Recording, Task, TrialRequest
 from campaign.units import AngularRate, Frequency, RotationalStiffness, Time
 
 
@@ -159,8 +163,15 @@ def _analyse(data: TestData) -> Result:
         for place, m in measured
         if math.isnan(m["period"].value) and not math.isnan(m["slips"].value)
     )
-    shown = [(place.label, str(place.point.get("model", "")), place.trials[0]) for place in found]
-    return Result((table,), (_figure(shown),), findings, failures_note(data) + notes)
+    notes = (*failures_note(data), *notes)
+    options = StickSlipOptions.model_validate(
+        found[0].trials[0].trial.options, context={"si": True}
+    )
+    settings = Settings.of(data, StickSlipOptions)
+    conclusions = stick_slip_conclusions(
+        rows, found, settings, options.stiffness, options.pull_rate
+    )
+    return Result((table,), (_figure(measured),), findings, notes, conclusions)
 
 
 def _count(slips: float) -> int | float:
@@ -181,14 +192,16 @@ def _shown(place: Place) -> dict[str, Estimate]:
     return found
 
 
-def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
+def _figure(measured: Sequence[tuple[Place, Mapping[str, Estimate]]]) -> Figure:
     time = Axis("Time", "s", "s")
     torque, rate, angle = [], [], []
-    for label, model, item in shown:
-        recording = item.recording()
-        series = model_series(model) or "measured"
+    marks: list[Mark] = []
+    for place, found in measured:
+        recording, label = place.trials[0].recording(), place.label
+        series = model_series(str(place.point.get("model", ""))) or "measured"
         torque.append(Curve(recording.time, recording[DRIVE_TORQUE], label, series))
         rate.append(Curve(recording.time, recording[LOAD_RATE], label, series))
+        marks += _first_slip(recording, found, series)
         if RELATIVE_ANGLE in recording.channels:
             angle.append(Curve(recording.time, recording[RELATIVE_ANGLE], label, series))
     if COMMAND in recording.channels:
@@ -197,17 +210,49 @@ def _figure(shown: list[tuple[str, str, TrialData]]) -> Figure:
     return Figure(
         key="stick-slip",
         title="Stick-slip motion",
-        caption="The spring is wound up while the load sticks; then the load slips, faster than "
-        "it is pulled, and sticks again before the spring is slack.",
-        alt="Torque of the spring as a sawtooth, rate of the load as one pulse per slip, and angle "
-        "of the load as a staircase under the straight line of the spring's end.",
+        caption=f"{_how(measured[0][0].trials[0])} "
+        + " ".join(_what_shows(place, found) for place, found in measured),
+        alt="Torque of the spring, rate of the load, and angle of the load with the straight line "
+        "of the spring's end, over time.",
         panels=(
-            Panel(time, Axis("Spring torque", "N m", "N m"), torque, "Torque of the spring"),
+            Panel(time, Axis("Spring torque", "N m", "N m"), torque, "Torque of the spring", marks),
             Panel(time, Axis("Rate", "rad/s", "rad/s"), rate, "Rate of the load"),
             *(angles if angle else ()),
         ),
         thesis=("2.12",),
+        trials=trials_of(place.trials[0] for place, _ in measured),
     )
+
+
+def _first_slip(recording: Recording, found: Mapping[str, Estimate], series: str) -> Iterator[Mark]:
+    """The moment at which the load first slips, on the torque of the spring."""
+    at, torque = found["first_slip"].value, recording[DRIVE_TORQUE]
+    known = np.isfinite(torque)
+    if math.isfinite(at) and known.any():
+        level = float(np.interp(at, recording.time[known], torque[known]))
+        label = f"slips at {amount(at, 's')}, {amount(level, 'N m')}"
+        yield Mark(label, x=at, y=level, point=True, series=series)
+
+
+def _how(item: TrialData) -> str:
+    """Under which condition the load was pulled."""
+    options = StickSlipOptions.model_validate(item.trial.options, context={"si": True})
+    pull, spring = setting(options.pull_rate, "rad/s"), setting(options.stiffness, "N m/rad")
+    return f"The load is pulled at {pull} through a spring of {spring}."
+
+
+def _what_shows(place: Place, found: Mapping[str, Estimate]) -> str:
+    """How often the load slipped, if it did, and how fast it then was."""
+    who, slips = place.label or "the load", found["slips"].value
+    if math.isnan(slips):
+        return sentence(f"{who}: samples were lost, and nobody knows how often it slipped")
+    if not slips:
+        return sentence(f"{who}: it does not slip")
+    top = amount(found["top_rate"].value, "rad/s")
+    period = found["period"].value
+    times = f"slips {slips:g} times" if slips != 1 else "slips once"
+    every = f", every {amount(period, 's')} after the first" if math.isfinite(period) else ""
+    return sentence(f"{who}: it sticks, {times}{every}, and is then up to {top} fast")
 
 
 EXPERIMENT = Experiment(

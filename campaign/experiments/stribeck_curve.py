@@ -16,7 +16,10 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.experiments.conclusions.behaviour import stribeck_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
@@ -39,6 +42,7 @@ from campaign.result import (
     Curve,
     Figure,
     Finding,
+    Mark,
     Panel,
     Result,
     Table,
@@ -51,6 +55,8 @@ OF_THE_MODEL = "worked out from the model of the bench, and not measured"
 OWN = ("speed",)
 RAMP = 0.1
 """s, from rest to the speed."""
+LEVEL = 1e-3
+"""of a torque, by which it must change to be told as falling or rising."""
 SHOWN = 1.5
 """Share of the fastest speed that has no point but is drawn, either way."""
 
@@ -169,14 +175,15 @@ def _analyse(data: TestData) -> Result:
     if not found:
         return Result(notes=(*failures_note(data), *([NOTHING_MOVED] if told else [])))
     rows: list[dict[str, Cell]] = []
-    findings, panels = [], []
+    findings: list[Finding] = []
+    panels: list[Panel] = []
     for place, points in found:
         rows += [
             {**place.point, "rate": v, "torque": t, "curve": float(p)}
             for v, t, p in zip(points.rates, points.torques, points.promised, strict=True)
         ]
         findings.append(Finding.of(_largest_deviation(points), place.point))
-        panels.append(_panel(place, points))
+        panels += _panels(place, points)
     worst = max(finding.value for finding in findings)
     table = Table(
         key="stribeck-curve",
@@ -195,39 +202,93 @@ def _analyse(data: TestData) -> Result:
     figure = Figure(
         key="stribeck-curve",
         title="Stribeck curve",
-        caption="From rest, friction first falls as the contact slides faster (velocity weakening) "
-        "and then rises with the viscous part (velocity strengthening). The points are measured "
-        "in steady sliding, the lines are the model's own curve and its two parts.",
-        alt="Friction torque over speed on a logarithmic axis: points measured in both directions "
-        "on the line of the model, which falls from static to Coulomb friction and rises again.",
+        caption=f"{' '.join(_what_shows(place, points) for place, points in found)} The points are "
+        "measured in steady sliding, with their 95 % intervals, each direction in its own sign "
+        "and panel; the lines are the model's own curve and its two parts.",
+        alt="Friction torque over speed on a logarithmic axis: points measured in each direction "
+        "beside the curve of the model and its two parts, one panel per direction.",
         panels=tuple(panels),
         thesis=("2.9",),
         across=min(2, len(panels)),
+        one_scale=True,
+        trials=trials_of(item for place, _ in found for item in place.trials),
     )
-    return Result((table,), (figure,), tuple(findings), failures_note(data))
+    conclusions = stribeck_conclusions(
+        rows,
+        [place for place, _ in found],
+        {place.label: each.known for (place, _), each in zip(found, findings, strict=True)},
+        Settings.of(data, StribeckCurveOptions),
+    )
+    return Result((table,), (figure,), tuple(findings), failures_note(data), conclusions)
 
 
-def _panel(place: Place, points: _Points) -> Panel:
+def _least(fine: Array, torque: Array) -> int | None:
+    """Where friction is least between two higher ends, beyond rounding; None for no such place."""
+    at = int(np.argmin(torque))
+    low = torque[at] * (1.0 + LEVEL)
+    return at if torque[0] > low and torque[-1] > low else None
+
+
+def _what_shows(place: Place, points: _Points) -> str:
+    """How friction goes from the slowest to the fastest speed, as the points have it."""
+    speed = np.abs(points.rate)
+    torques = [
+        _signed(torque, np.sign(rate))
+        for rate, torque in zip(points.rate, points.torques, strict=True)
+    ]
+    order = np.argsort(speed, kind="stable")
+    least = min(order, key=lambda k: torques[k].value)
+    first, last = order[0], order[-1]
+    ends = [amount(torques[k].value, "N m") for k in (first, least, last)]
+    speeds = [amount(float(speed[k]), "rad/s", "deg/s") for k in (first, least, last)]
+    words = [f"friction is {ends[0]} at {speeds[0]}"]
+    if _higher(torques[first], torques[least]):
+        words.append(f"falls to {ends[1]} at {speeds[1]} (velocity weakening)")
+    if _higher(torques[last], torques[least]):
+        words.append(f"rises to {ends[2]} at {speeds[2]} (velocity strengthening)")
+    if len(words) == 1:
+        words.append(f"no other that the points show up to {speeds[2]}")
+    return sentence(f"{f'{place.label}: ' if place.label else ''}{listed(words)}")
+
+
+def _higher(one: Estimate, other: Estimate) -> bool:
+    """Whether one torque is above another, their intervals apart."""
+    high = other.combined[1] if other.has_interval else None
+    return surely_above(one, other.value if high is None else high, LEVEL * abs(other.value))
+
+
+def _panels(place: Place, points: _Points) -> Iterator[Panel]:
+    """A panel for each direction that was measured: in one, both would lie on one another."""
     bench = bench_of(place.trials[0].trial)
     speed = np.abs(points.rate)
     fine = np.geomspace(speed.min() / SHOWN, speed.max() * SHOWN, 400)
-    dry, viscous = steady_friction(bench, fine)
-    curves = [
-        Curve(fine, dry + viscous, "s(v) + σ2 v", "fit"),
-        Curve(fine, dry, "Stribeck part s(v)", "alternative", "thin"),
-        Curve(fine, viscous, "viscous part σ2 v", "reference", "thin"),
-        _direction(points, +1.0, "positive"),
-        _direction(points, -1.0, "negative"),
-    ]
-    lower = -np.add(*steady_friction(bench, -fine))
-    if not np.allclose(lower, dry + viscous):
-        curves.insert(1, Curve(fine, lower, "the same, negative direction", "fit-2"))
-    return Panel(
-        Axis("Speed", "rad/s", "deg/s", scale="log"),
-        Axis("Friction torque", "N m", "N m"),
-        curves,
-        place.label,
-    )
+    for name, sign in (("positive", 1.0), ("negative", -1.0)):
+        if not np.any(points.rate * sign > 0):
+            continue
+        dry, viscous = (sign * part for part in steady_friction(bench, sign * fine))
+        curves = [
+            Curve(fine, dry + viscous, "s(v) + σ2 v", "fit"),
+            Curve(fine, dry, "Stribeck part s(v)", "alternative", "thin"),
+            Curve(fine, viscous, "viscous part σ2 v", "reference", "thin"),
+            _direction(points, sign, name),
+        ]
+        title = f"{name.capitalize()} direction"
+        yield Panel(
+            Axis("Speed", "rad/s", "deg/s", scale="log"),
+            Axis("Friction, in its direction", "N m", "N m"),
+            curves,
+            f"{place.label}, {name} direction" if place.label else title,
+            list(_least_mark(fine, dry + viscous)),
+        )
+
+
+def _least_mark(fine: Array, torque: Array) -> Iterator[Mark]:
+    """Where friction (N m) is least over the speeds `fine` (rad/s), both (n,)."""
+    least = _least(fine, torque)
+    if least is not None:
+        at, lowest = float(fine[least]), float(torque[least])
+        label = f"least: {amount(lowest, 'N m')} at {amount(at, 'rad/s', 'deg/s', 2)}"
+        yield Mark(label, x=at, y=lowest, point=True, series="fit")
 
 
 def _direction(points: _Points, sign: float, name: str) -> Curve:

@@ -8,6 +8,8 @@ torque over a settled window, less J times the residual acceleration, is one poi
 from __future__ import annotations
 
 from campaign.channels import COMMAND
+from campaign.experiments.conclusions.friction_map import map_conclusions
+from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.friction_map.choice import STAGE
 from campaign.experiments.friction_map.figures import example_figure, fit_figure, map_figure
 from campaign.experiments.friction_map.fits import fit_map
@@ -29,6 +31,7 @@ from campaign.experiments.friction_map.tables import (
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import fitting
+from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note, grouped
 from campaign.result import Figure, Finding, Result, Table
 
@@ -39,11 +42,14 @@ def _analyse(data: TestData) -> Result:
     parts = []
     for number, group in enumerate(groups, start=1):
         parts.append(_one_map(group, f"-{number}" if len(groups) > 1 else ""))
+    findings = [finding for part in parts for finding in part.findings]
+    speeds = [float(str(item.trial.point["speed"])) for item in data.completed()]
     return Result(
         tuple(table for part in parts for table in part.tables),
-        (*example_figure(data), *(figure for part in parts for figure in part.figures)),
-        tuple(finding for part in parts for finding in part.findings),
+        (*(figure for part in parts for figure in part.figures), *example_figure(data)),
+        tuple(findings),
         (*notes, *(note for part in parts for note in part.notes)),
+        map_conclusions(findings, speeds, Settings.of(data, PilotedMapOptions)),
     )
 
 
@@ -62,11 +68,15 @@ def _one_map(group: tuple[TrialData, ...], suffix: str) -> Result:
         notes.append(f"No fit{f' for {where}' if where else ''}: {error}.")
         return Result(tables=(point_table(points, suffix, where),), notes=tuple(notes))
     tables: list[Table] = [
-        point_table((*fits.points, *left), suffix, where),
         parameter_table(fits, suffix, where),
         model_table(fits, suffix, where),
+        point_table((*fits.points, *left), suffix, where),
     ]
-    figures: list[Figure] = [map_figure(fits, suffix, where), fit_figure(fits, suffix, where)]
+    shown = trials_of(group)
+    figures: list[Figure] = [
+        map_figure(fits, suffix, where, shown),
+        fit_figure(fits, suffix, where, shown),
+    ]
     findings: list[Finding] = list(map_findings(fits, told))
     notes += map_notes(fits, where)
     return Result(tuple(tables), tuple(figures), tuple(findings), tuple(notes))

@@ -29,6 +29,8 @@ NAME = "stabilization_error"
 ALIKE = 1e-5
 """Relative standard error below which nothing scatters: a simulation without noise, whose own error
 is of that size."""
+HARDLY = 10 * ALIKE
+"""Relative standard error up to which a number beside one that does not scatter hardly does."""
 IDENTICAL = 1e-12
 """The same for two values, which may be alike by chance, and for trials of one seed."""
 NO_SCATTER = "it repeats to the fifth digit: nothing scatters on this bench"
@@ -151,10 +153,17 @@ def over_trials(found: Sequence[Estimate]) -> Estimate:
 
 
 def quotient(name: str, one: Estimate, other: Estimate) -> Estimate:
-    """`one` over `other`, by Welch in the logarithm; says so where either is of a single trial."""
+    """`one` over `other`, by Welch in the logarithm; says so where either is of a single trial.
+
+    That nothing scatters is its reason only where that is so of both sides.
+    """
     told = ratio(name, one, other)
-    without = [e.reason for e in (one, other) if e.standard_error is None and e.reason]
-    said = without or [e.reason for e in (one, other) if e.reason]
+    sides = (one, other)
+    scatter = [e.reason for e in sides if (e.standard_error or 0.0) > HARDLY * abs(e.value)]
+    without = [e.reason for e in sides if e.standard_error is None]
+    if NO_SCATTER in without and any(scatter):
+        without = [reason for reason in without if reason != NO_SCATTER] + scatter
+    said = [*filter(None, without)] or [e.reason for e in sides if e.reason]
     return replace(told, reason=said[0]) if said else told
 
 

@@ -46,7 +46,7 @@ def step_characteristics(
     share = (response - zero) / step
     span = float(time[-1]) - start
     final = time >= time[-1] - FINAL_SHARE * span
-    rise = _first(time, share, 0.9) - _first(time, share, 0.1)
+    rise = reached(time, share, 0.9) - reached(time, share, 0.1)
     outside = np.flatnonzero((np.abs(share - 1.0) > band) & after)
     settled = 0.0
     if outside.size:
@@ -60,12 +60,12 @@ def step_characteristics(
     )
 
 
-def _first(time: Array, share: Array, level: float) -> float:
+def reached(time: Array, share: Array, level: float) -> float:
     """When `share` first reaches `level`, on a straight line between samples; NaN if never."""
-    reached = np.flatnonzero(share >= level)
-    if not reached.size or reached[0] == 0:
+    above = np.flatnonzero(share >= level)
+    if not above.size or above[0] == 0:
         return float("nan")
-    k = int(reached[0])
+    k = int(above[0])
     part = (level - share[k - 1]) / (share[k] - share[k - 1])
     return float(time[k - 1] + part * (time[k] - time[k - 1]))
 

@@ -208,6 +208,7 @@ def fit_stribeck(
     deviation: Array | None = None,
     exponent: float | None = None,
     start: Mapping[str, float] | None = None,
+    near: Mapping[str, float] | None = None,
 ) -> StribeckFit:
     """Equation 4.6 fitted to one direction of a map.
 
@@ -216,6 +217,8 @@ def fit_stribeck(
         deviation: of the torques (N m, 1 sigma), shape (n,); absent: all the same.
         exponent: holds delta there (2 for the LuGre model); None fits it too.
         start: parameters near the solution, where they are known; else a grid is searched.
+        near: parameters that may be near it, from which the search is begun as well: those of the
+            free fit, where the exponent is held. The grid ends with the speeds that were run.
 
     Raises ValueError for no more points than parameters.
     """
@@ -223,6 +226,8 @@ def fit_stribeck(
     deviation = np.ones_like(torque) if deviation is None else deviation
     problem = Problem.of(speed, torque, deviation, exponent)
     starts = problem.starts() if start is None else [_vector(problem, start)]
+    if near is not None:
+        starts.append(np.clip(_vector(problem, near), problem.lower, problem.upper))
     found = min(
         (minimum(problem, each, problem.lower, problem.upper) for each in starts),
         key=lambda solution: solution.cost,

@@ -65,14 +65,12 @@ def time_stuck(
         cut = np.round(np.linspace(0, len(stuck), parts + 1)).astype(int)
         shares = np.add.reduceat(stuck.astype(float), cut[:-1]) / np.diff(cut)
         told = of_repeats(NAME, shares, "", "half cycles")
-        low = None if told.low is None else max(told.low, 0.0)
         # Each end of a time stuck is uncertain by the smoothing, rectangularly; it has two.
         blur = rate.span * parts / len(base_rate) / math.sqrt(6.0)
         how = f"relative rate below {threshold:.3g} rad/s by {rate.sensor}"
         method = f"{how}, smoothed over {rate.span * step:.3g} s; {told.method}"
-        return replace(
-            told, low=low, method=method, systematic=(Systematic("smoothing of the rate", blur),)
-        )
+        blurred = (Systematic("smoothing of the rate", blur),)
+        return replace(_share(told), method=method, systematic=blurred)
     return Estimate.without_interval(NAME, math.nan, "", UNRESOLVED)
 
 
@@ -86,7 +84,14 @@ def over_recordings(found: Sequence[Estimate]) -> Estimate | None:
         return found[0] if found else None
     shares = [one.value for one in found]
     told = of_repeats(NAME, shares, "", "trials", systematic=found[0].systematic)
-    return replace(told, low=None if told.low is None else max(told.low, 0.0))
+    return _share(told)
+
+
+def _share(told: Estimate) -> Estimate:
+    """With the ends that scatter leaves where a share can be, as its systematic parts will be."""
+    low = None if told.low is None else max(told.low, 0.0)
+    high = None if told.high is None else min(told.high, 1.0)
+    return replace(told, low=low, high=high, kind="share")
 
 
 def _rates(

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
+from campaign.identification.extrapolated import extrapolated
 from campaign.identification.intervals import USELESS, judged, student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
@@ -52,8 +53,6 @@ ROUNDS = 20
 """of fit and deviation in turn, at most; usually five."""
 SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
-FEWEST_BELOW = 3
-"""speeds below vs, for Ts not to be extrapolated."""
 LACKING = 0.05
 """p-value of the lack of fit below which the model does not describe the repeated points."""
 
@@ -101,8 +100,13 @@ class DirectionFit:
 
     @property
     def misfit(self) -> float:
-        """Deviation of the residuals with delta = 2 over that with delta free."""
+        """Deviation of the residuals with delta = 2 over that with delta free, each weighted."""
         return math.sqrt(self.fits["2"].chi_square / max(self.fits["free"].chi_square, 1e-300))
+
+    def beyond(self, name: str) -> str:
+        """Why a parameter is extrapolated; "" where it is not, or no Stribeck effect shows."""
+        velocity = self.fits["free"].values["stribeck_velocity"]
+        return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else ""
 
 
 def fit_direction(
@@ -136,7 +140,9 @@ def fit_direction(
     means, level = mean(speed), mean(torque)
     scatter = smoothed_deviation(np.sqrt(mean(window**2) / count), np.log(means))
     between, free = _between(means, level, scatter)
-    held = with_misfit(fit_stribeck(means, level, free.deviation, HELD["2"]), means, level)
+    held = with_misfit(
+        fit_stribeck(means, level, free.deviation, HELD["2"], near=free.values), means, level
+    )
     fits: dict[Model, StribeckFit] = {
         "free": free,
         "2": held,
@@ -199,7 +205,7 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
         reason = "these points leave it open"
         return _not_determined(Estimate(name, value, unit, method=method), reason)
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
-    told = with_error(name, value, unit, error, fit.freedom, method)
+    told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
     return _without_effect(told, differs(found, fit.freedom))
 
 
@@ -293,7 +299,7 @@ def _mean(
     freedom = min(positive.freedom, negative.freedom)
     method = f"mean of both directions, with the covariance of their points, t({freedom})"
     error = math.sqrt(max(float(variance), 0.0))
-    told = with_error(name, value, unit, error, freedom, method)
+    told = with_error(name, value, unit, error, freedom, method, reason=one.reason or other.reason)
     effect = all(differs(each, freedom) for each in found)
     return _without_effect(told, effect)
 
@@ -372,12 +378,9 @@ def doubts(fit: DirectionFit) -> Iterator[str]:
             "static_torque and coulomb_torque are the same within their interval: no Stribeck "
             "effect shows, and stribeck_velocity is not determined"
         )
-    below = int(np.sum(fit.speed < found.values["stribeck_velocity"]))
-    if fit.shows_stribeck_effect and below < FEWEST_BELOW:
-        yield (
-            f"{below} speeds are below stribeck_velocity: add slower ones, static_torque is"
-            " extrapolated"
-        )
+    for name, which in (("static_torque", "slower"), ("coulomb_torque", "faster")):
+        if why := fit.beyond(name):
+            yield f"{why}; add {which} ones"
     if fit.lack_of_fit is not None and fit.lack_of_fit < LACKING:
         yield (
             f"repeated points scatter less than they deviate from the curve (p = "

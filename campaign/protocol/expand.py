@@ -18,6 +18,7 @@ from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_
 from campaign.protocol.points import Point, PointError, points_of
 from campaign.protocol.schema import ExperimentKind, Test
 from campaign.protocol.stages import PlannedStage, most_of, planned_stages
+from campaign.protocol.told import told_point
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 Names = tuple[str, ...]
@@ -250,6 +251,10 @@ def _trial(
         kind=test.entry.kind,
         role=request.role,
         point=swept,
+        told={
+            **place.point.told,
+            **told_point(test.experiment.options, test.options, request.point),
+        },
         options=place.point.options_tree,
         repeat=place.repeat,
         seed=place_hash(seed, place.point.values, place.index, place.repeat),

@@ -21,6 +21,7 @@ from campaign.protocol.limit_check import in_display_units, one_count
 from campaign.protocol.loop_check import in_words
 from campaign.protocol.schema import ExperimentKind
 from campaign.protocol.stages import PlannedStage
+from campaign.protocol.told import told_point
 from campaign.trial import Most, Trial, TrialRequest, canonical_json
 
 ROUNDING = 1e-9
@@ -125,6 +126,7 @@ def _trial(
         kind=planned.kind,
         role=request.role,
         point={**stage.point, **request.point},
+        told={**planned.told, **told_point(experiment.options, {}, request.point)},
         options=planned.options,
         seed=place_hash("stage", stage.seed, stage.point, stage.number, index),
         bench=planned.bench,

@@ -43,11 +43,11 @@ def check_limits(plan: Plan) -> None:
 
 
 def in_display_units(margin: Margin) -> tuple[str, str]:
-    """Value and bound as a reader sees them, e.g. ("91.2 deg", "90 deg")."""
+    """Value and bound as a reader sees them, e.g. ("41 N·m", "40 N·m")."""
     unit = DISPLAY.get(margin.unit, margin.unit)
     value, bound = (convert(x, margin.unit, unit) for x in (margin.value, margin.bound))
     shown = "infinite (the rate command jumps)" if math.isinf(value) else f"{value:.4g} {unit}"
-    return shown, f"{bound:.4g} {unit}"
+    return shown.replace("N m", "N·m"), f"{bound:.4g} {unit}".replace("N m", "N·m")
 
 
 def one_count(margin: Margin) -> str:

@@ -245,7 +245,7 @@ class _Loader:
             file = self.shipped / "benches" / f"{written}.toml"
             return self._read(file, written, origin, keys, written, BENCH_SCHEMA)
         message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
-        message += nearest(written, shipped) + ", or the path of a .toml file"
+        message += f", or the path of a .toml file{nearest(written, shipped)}"
         self._report(origin.problem(keys, "value", message))
         return None
 

@@ -16,6 +16,7 @@ from campaign.protocol.matrix import Axis, points
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import validate
 from campaign.protocol.schema import Test, replaced
+from campaign.protocol.told import as_written
 from campaign.trial import Tree, canonical_json
 
 
@@ -31,7 +32,9 @@ class PointError(Exception):
 class Point:
     """One point: swept path to SI value, and what a trial there has; objects beside their trees.
 
-    `chosen`: why the experiment took its value, for each option that the test does not write.
+    Attributes:
+        chosen: why the experiment took its value, for each option that the test does not write.
+        told: swept values that have a unit, as the protocol writes them.
     """
 
     values: Mapping[str, JsonValue]
@@ -40,10 +43,12 @@ class Point:
     bench: Bench
     bench_tree: Tree
     chosen: Mapping[str, str] = field(default_factory=dict)
+    told: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
-        return ", ".join(f"{path} = {value}" for path, value in self.values.items())
+        told = {path: self.told.get(path, value) for path, value in self.values.items()}
+        return ", ".join(f"{path} = {value}" for path, value in told.items())
 
 
 def points_of(test: Test) -> Iterator[Point]:
@@ -56,7 +61,10 @@ def points_of(test: Test) -> Iterator[Point]:
             axis.path: _at(bench_tree if axis.of_bench else options_tree, axis.keys)
             for axis in test.axes
         }
-        yield Point(values, options, options_tree, bench, bench_tree, chosen)
+        pairs = zip(test.axes, indices, strict=True)
+        texts = {axis.path: as_written(axis.value(index)) for axis, index in pairs}
+        told = {path: text for path, text in texts.items() if text}
+        yield Point(values, options, options_tree, bench, bench_tree, chosen, told)
 
 
 @dataclass

@@ -87,7 +87,7 @@ class Truths:
             there = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
             if written not in there:
                 message = f"no shipped bench is called {shown(written)}; {allowed(there)}"
-                message += nearest(written, there) + ", or the path of a .toml file"
+                message += f", or the path of a .toml file{nearest(written, there)}"
                 self._report(origin.problem(keys, "value", message))
                 return None
         if name not in self.sources:

@@ -43,6 +43,8 @@ class Headline:
     """Each published value once.
 
     Attributes:
+        printed: how often a number is printed, and `repeats` how many of these repeat another.
+        excluded: how many values, by status, the document itself lets nobody reproduce.
         counts: by status, the most fitted first; those that occur.
         deviations: sizes in percent, increasing, of those that nobody fitted.
         missed: claims that were missed.
@@ -56,6 +58,9 @@ class Headline:
     not_reached: tuple[Line, ...]
     not_found: tuple[Line, ...]
     not_run: tuple[Line, ...]
+    printed: int = 0
+    repeats: int = 0
+    excluded: tuple[tuple[Status, int], ...] = ()
 
     @property
     def compared(self) -> int:
@@ -73,8 +78,9 @@ class Headline:
 
 def headline(scoreboard: Scoreboard) -> Headline:
     """Count every published value once, with the line that counts for it."""
-    lines = [line for line in once(scoreboard.lines) if line.status not in OF_THE_DOCUMENT]
-    compared = [line for line in lines if line.reproduced is not None]
+    values = once(scoreboard.lines)
+    lines = [line for line in values if line.status not in OF_THE_DOCUMENT]
+    compared = [line for line in lines if is_compared(line)]
     counts = []
     for status in MOST_FITTED_FIRST:
         of_status = [line for line in compared if line.status is status]
@@ -94,7 +100,19 @@ def headline(scoreboard: Scoreboard) -> Headline:
         with_verdict(Verdict.NOT_REACHED),
         with_verdict(Verdict.NOT_FOUND),
         with_verdict(Verdict.NOT_RUN),
+        len(scoreboard.lines),
+        len(scoreboard.lines) - len(values),
+        tuple(
+            (status, count)
+            for status in OF_THE_DOCUMENT
+            if (count := sum(line.status is status for line in values))
+        ),
     )
+
+
+def is_compared(line: Line) -> bool:
+    """Whether a number was found for a value that the document lets somebody reproduce."""
+    return line.reproduced is not None and line.status not in OF_THE_DOCUMENT
 
 
 def once(lines: Iterable[Line]) -> tuple[Line, ...]:

@@ -143,9 +143,23 @@ class PublishedOptions(Options):
     """A file of published values."""
 
     source: str
-    """The document they are from."""
+    """The document they are from: its title."""
+    author: str = ""
+    """Who wrote it."""
+    institution: str = ""
+    """Where."""
+    year: int | None = None
+    """When."""
     table: tuple[TableOptions, ...] = ()
     """Its tables."""
+
+    @property
+    def cited(self) -> str:
+        """`A. Author: Title, Institution, 2010`, as far as it is known."""
+        where = ", ".join(
+            filter(None, (self.source, self.institution, str(self.year) if self.year else ""))
+        )
+        return f"{self.author}: {where}" if self.author else where
 
 
 @dataclass(frozen=True)
@@ -191,6 +205,11 @@ class Cell:
         return f"{self.value:.15g}" if self.decimals is None else f"{self.value:.{self.decimals}f}"
 
 
+def heading_of(table: str) -> str:
+    """`Table 5.8`, `Figure 5.14`, `Text 4.2.3`, by the name of a published table."""
+    return table.capitalize() if " " in table else f"Table {table}"
+
+
 @dataclass(frozen=True)
 class PublishedTable:
     """One published table with its cells in printed order."""
@@ -204,7 +223,7 @@ class PublishedTable:
     @property
     def heading(self) -> str:
         """`Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
-        return self.name.capitalize() if " " in self.name else f"Table {self.name}"
+        return heading_of(self.name)
 
     @property
     def slug(self) -> str:
@@ -243,7 +262,7 @@ def read_published(text: str, name: str) -> Published:
         if table.name in tables:
             raise UsageError(f"{name}: two tables are called {table.name!r}")
         try:
-            tables[table.name] = _table(table, options.source)
+            tables[table.name] = _table(table, options.cited)
         except ValueError as error:
             raise UsageError(f"{name}: table {table.name}: {error}") from None
     return tables

@@ -12,6 +12,7 @@ import pytest
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import default_positions
+from campaign.experiments.results.breakaway_figures import DOTS, _what_shows
 from campaign.experiments.results.breakaway_means import mean
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
@@ -28,6 +29,9 @@ TWO = {
     "torque_rate": "2 N m/s",
     "directions": ["positive"],
 }
+
+
+OFF = np.array([-1.0, 0.0, 1.0])
 
 
 def load_only(tree: dict[str, Any]) -> None:
@@ -183,7 +187,9 @@ def test_both_directions_have_means_of_their_own_and_a_nominal_one() -> None:
     assert [row["direction"] for row in rows] == (
         3 * ["positive"] + 3 * ["negative"] + ["both", "positive", "negative"]
     )
-    assert len(result.figures[-1].panels[0].curves) == 2
+    *directions, whole = result.figures[-1].panels[0].curves
+    assert [curve.series for curve in directions] == ["positive", "negative"]
+    assert whole.y.tolist() == [finding(result, "breakaway_torque", direction="both").value]
 
 
 def test_every_number_has_an_interval_or_says_why() -> None:
@@ -346,3 +352,39 @@ def test_intervals_hold(case: str) -> None:
 @pytest.mark.parametrize("case", ENDS)
 def test_intervals_hold_often(case: str) -> None:
     coverage(1000, 32, *ENDS[case])
+
+
+def test_several_quantities_share_the_chance_of_being_wrong() -> None:
+    """Chi-square of 6.6 with two degrees of freedom: beyond 5.99 for one test, within 7.38."""
+    spread = np.sqrt(0.5 * 6.6)
+    ramps = [with_error("torque", value, "N m", 1.0, np.inf, "made up") for value in spread * OFF]
+    assert "differ by more than their own intervals" in _what_shows(ramps, "torque", 1)
+    assert "show no difference" in _what_shows(ramps, "torque", 2)
+
+
+def test_a_ramp_is_dots_beside_its_fit_and_a_difference_of_its_own() -> None:
+    done = execute(trials("breakaway", bench(load_only), TWO))
+    shown = next(f for f in analyse("breakaway", done).figures if f.key == "ramp")
+    *_, curve, rest = shown.panels
+    dots, fit = curve.curves[:2]
+    assert dots.style == "points"
+    assert len(dots.x) <= DOTS
+    # Evenly as it is seen: no step is much longer than the others.
+    steps = np.hypot(np.diff(dots.x) / np.ptp(dots.x), np.diff(dots.y) / np.ptp(dots.y))
+    assert steps.max() < 3.0 * np.median(steps)
+    away = dots.y - np.interp(dots.x, fit.x, fit.y)
+    on = np.interp(dots.x, rest.curves[0].x, rest.curves[0].y)
+    np.testing.assert_allclose(away, on, atol=0.05)
+
+
+def test_ramps_of_two_directions_stand_side_by_side() -> None:
+    options = TWO | {"directions": ["positive", "negative"]}
+    figures = result_of(load_only, options).figures
+    panel = next(f for f in figures if f.key == "positions").panels[0]
+    one, other, mean = panel.curves
+    places = [place for place, _ in panel.x.places[:-1]]
+    for curve in (one, other):
+        np.testing.assert_array_equal(curve.x, places)
+        assert 0.0 < abs(curve.aside) < 0.1 * np.diff(places).min()
+    assert one.aside == -other.aside
+    assert mean.aside == 0.0

@@ -12,7 +12,7 @@ from scipy.signal import cont2discrete
 from campaign.estimate import Estimate
 from campaign.experiments.frequency_response import EXPERIMENT, _point
 from campaign.physics.limits import margins
-from campaign.result import Result
+from campaign.result import Figure, Result
 from campaign.trial import Recording
 from tests.experiments.laboratory import (
     analyse,
@@ -27,6 +27,12 @@ from tests.identification.coverage import holds
 from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, RATIO, L, R, bench
 
 KIND = "frequency_response"
+
+
+def bode(result: Result) -> Figure:
+    return next(figure for figure in result.figures if figure.key == "closed-loop")
+
+
 NOTHING = Recording(np.empty(0), {})
 SOME = {"frequencies": ["0.5 Hz", "3 Hz", "10 Hz", "40 Hz", "100 Hz"]}
 
@@ -168,7 +174,11 @@ def test_what_compensation_changes_is_told() -> None:
     assert change.value == pytest.approx(with_model - bare)
     (row,) = table(result, "compensation-effect").rows
     assert row["compensation"] == "lugre"
-    assert [figure.thesis for figure in result.figures] == [("5.5",), ("5.6",)]
+    assert [(figure.key, figure.thesis) for figure in result.figures] == [
+        ("servo-characteristics", ()),
+        ("closed-loop", ("5.5",)),
+        ("open-loop", ("5.6",)),
+    ]
 
 
 def test_the_elastic_mode_is_found_in_the_open_loop() -> None:
@@ -231,7 +241,7 @@ def test_the_response_is_a_metric_of_its_trial_and_the_analysis_believes_it() ->
         replace(each, value=0.5 * each.value, low=None, high=None) for each in archived[0].estimates
     ]
     other = analyse(KIND, [replace(archived[0], estimates=tuple(moved)), *archived[1:]])
-    assert other.figures[0].panels[0].curves[0].y[0] < -5
+    assert bode(other).panels[0].curves[0].y[0] < -5
 
 
 def test_only_the_window_is_measured_and_old_trials_have_one() -> None:
@@ -273,5 +283,5 @@ def test_failed_trials_leave_a_gap() -> None:
     done = list(execute(trials(KIND, bench(frictionless), SOME)))
     done[1] = failed(done[1])
     result = analyse(KIND, done)
-    assert len(result.figures[0].panels[0].curves[0].x) == 4
+    assert len(bode(result).panels[0].curves[0].x) == 4
     assert any("1 of 5 trials" in note for note in result.notes)

@@ -41,11 +41,13 @@ def test_a_sound_map_has_none() -> None:
 
 def test_no_more_speeds_than_parameters() -> None:
     for rig in (bench(), bench(without_friction)):
-        (told,) = warned(rig, speeds=EIGHT[:5])
+        (told,) = warned(rig, speeds=[*EIGHT[:4], EIGHT[5]])
         assert told.startswith("5 speeds cannot determine the 5 parameters of the Stribeck curve")
         assert "6 are the fewest" in told
     assert warned(bench(), speeds=EIGHT[:6]) == []
-    assert len(warned(bench(), speeds=[*EIGHT[:5], EIGHT[0]])) == 1, "a repeat is no speed"
+    assert len(warned(bench(), speeds=[*EIGHT[:4], EIGHT[5], EIGHT[0]])) == 1, (
+        "a repeat is no speed"
+    )
 
 
 def test_too_few_speeds_below_the_stribeck_velocity() -> None:
@@ -56,6 +58,16 @@ def test_too_few_speeds_below_the_stribeck_velocity() -> None:
     assert "run 3 or more below it, from 0.172 deg/s on" in told
     assert warned(bench(), speeds=["1.7 deg/s", *few]) == []
     assert warned(bench(without_friction), speeds=few) == []
+
+
+def test_no_speed_far_above_the_stribeck_velocity() -> None:
+    """vs is 1.72 deg/s, and three times that 5.16 deg/s."""
+    slow = [*EIGHT[:5], "5 deg/s"]
+    (told,) = warned(bench(), speeds=slow)
+    assert told.startswith("no speed is above 3 times the Stribeck velocity, 5.16 deg/s")
+    assert "coulomb_torque is extrapolated" in told
+    assert warned(bench(), speeds=[*slow, "5.2 deg/s"]) == []
+    assert warned(bench(without_friction), speeds=slow) == []
 
 
 def test_without_a_stribeck_effect_nothing_is_below_it() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.experiments.friction_map.repeated import scatter_figure
 from campaign.experiments.repeatability import MapSet, relative_deviation
 from campaign.experiments.repeatability import _deviation as deviation_of
 from campaign.experiments.repeatability import _mean as over_maps
@@ -106,6 +107,8 @@ def test_three_days_are_six_sets(three_days) -> None:
     deviation = finding(result, "coulomb_torque", statistic="relative standard deviation")
     assert deviation.value == pytest.approx(0.04 * np.sqrt(2 / 3), rel=0.05)
     assert deviation.unit == ""
+    caption = next(figure.caption for figure in result.figures if figure.key == "scatter")
+    assert "No parameter differs between the directions" in caption
     worst = finding(result, "relative_standard_deviation").value
     assert worst >= deviation.value
     columns = [column.name for column in table(result, "repeatability").columns]
@@ -169,3 +172,60 @@ def test_every_number_has_an_interval_or_a_reason(three_days) -> None:
     # 0.04 with two degrees of freedom: chi-square 7.378 and 0.0506.
     assert told.low == pytest.approx(0.04 * np.sqrt(2 / 7.378), rel=0.1)
     assert told.high == pytest.approx(0.04 * np.sqrt(2 / 0.0506), rel=0.1)
+
+
+TC_DIFFERS = (
+    "Between the directions differs, beyond what maps scatter (95 % for all parameters together), "
+    "Tc."
+)
+
+
+@pytest.mark.parametrize(
+    ("apart", "told"),
+    [
+        ((2.0, 2.1, 1.9), TC_DIFFERS),
+        ((-2.0, -2.1, -1.9), TC_DIFFERS),
+        ((2.0, -1.0, 1.0), "No parameter differs between the directions"),
+    ],
+)
+def test_directions_are_told_apart_by_their_difference_in_each_map(
+    apart: tuple[float, ...], told: str
+) -> None:
+    """The level drifts by 10 N m from map to map, which both directions share."""
+    sets = []
+    for number, difference in enumerate(apart):
+        level = 20.0 + 10.0 * number
+        found = {
+            name: {"coulomb_torque": Estimate("coulomb_torque", value, "N m", reason="made up")}
+            for name, value in (("positive", level), ("negative", level + difference))
+        }
+        sets.append(MapSet(str(number), "", None, found))
+    means = {"coulomb_torque": over_maps(sets, "coulomb_torque")}
+    deviations = {"coulomb_torque": deviation_of(sets, "coulomb_torque")}
+    shown = scatter_figure(sets, means, deviations, ())
+    assert told in shown.caption
+    dots = shown.panels[0].curves[:-1]
+    assert [curve.x[0] for curve in dots] == [1.0, 2.0, 3.0] * 2, "the places of the maps"
+    assert all(dot.aside * other.aside < 0 for dot, other in zip(dots[:3], dots[3:], strict=True))
+
+
+def test_several_parameters_share_the_chance_of_being_wrong() -> None:
+    """Differences of 2.6, 2 and 1.4: t is 5.77, beyond 4.30 for one test, within 6.21 for two."""
+    sets = []
+    for number, difference in enumerate((2.0, 2.6, 1.4)):
+        found = {
+            name: {
+                parameter: Estimate(parameter, value, "N m", reason="made up")
+                for parameter in ("coulomb_torque", "static_torque")
+            }
+            for name, value in (("positive", 20.0), ("negative", 20.0 + difference))
+        }
+        sets.append(MapSet(str(number), "", None, found))
+
+    def caption(*parameters: str) -> str:
+        means = {name: over_maps(sets, name) for name in parameters}
+        deviations = {name: deviation_of(sets, name) for name in parameters}
+        return scatter_figure(sets, means, deviations, ()).caption
+
+    assert TC_DIFFERS in caption("coulomb_torque")
+    assert "No parameter differs" in caption("coulomb_torque", "static_torque")

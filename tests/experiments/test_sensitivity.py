@@ -168,9 +168,12 @@ def test_thresholds_and_ranking_of_made_up_errors() -> None:
     bound = rows["stribeck_velocity"]["threshold"]
     assert (bound.kind, bound.value) == ("at least", 0.75)
     assert rows["stribeck_velocity"]["said"] == "none below 75%"
-    (figure,) = result.figures
+    thresholds, figure = result.figures
     assert figure.thesis == ("5.14",)
     assert len(figure.panels) == 3
+    assert {curve.quantity for curve in thresholds.panels[0].curves} == {"sensitivity_threshold"}
+    compared = [curve.quantity for curve in cut_off.figures[0].panels[0].curves]
+    assert not any(compared), "what is not compared has no published marks"
     relative = {**options, "threshold_ratio": 1.5}
     again = [
         replace(d, trial=d.trial.model_copy(update={"options": {**d.trial.options, **relative}}))

@@ -117,7 +117,11 @@ def test_an_error_along_a_sweep_has_bars_and_a_caption_says_what_is_shown() -> N
     (curve,) = figures["error-over-frequency"].panels[0].curves
     assert np.all(curve.low < curve.y)
     assert np.all(curve.y < curve.high)
-    assert figures["position-error"].caption.endswith("Shown at frequency 2 Hz.")
+    largest = frequencies[int(np.argmax(curve.y))]
+    told = f"Shown at {largest:g} Hz, 18 deg/s², one of 3 conditions."
+    assert figures["position-error"].caption.endswith(told)
+    (number,) = (t.number for t in swept if t.point["frequency"] == largest)
+    assert figures["position-error"].trials == (number,)
 
 
 def test_lost_samples_leave_a_number_out_and_say_so(done) -> None:

@@ -96,8 +96,11 @@ def test_a_ratio_of_single_trials_says_that_it_is_one() -> None:
     less = decrease("error_decrease", one, other)
     ratio = quotient("ratio", one, other)
     assert (less.value, less.low, less.high) == (1 - ratio.value, 1 - ratio.high, 1 - ratio.low)
-    still = over_cycles(friction_error(4), PER_CYCLE)  # without scatter there is no ratio's either
-    assert quotient("error_reduction", one, still).reason == NO_SCATTER
+    still = over_cycles(friction_error(4), PER_CYCLE)
+    for sides in ((one, still), (still, one)):  # of what scatters it is not that nothing does
+        told = quotient("error_reduction", *sides)
+        assert (told.has_interval, told.reason) == (False, OF_ONE_TRIAL)
+    assert quotient("error_reduction", still, still).reason == NO_SCATTER
 
 
 # How often the truth is held. Errors have the shape that friction gives them: a kick at each

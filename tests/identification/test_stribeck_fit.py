@@ -8,7 +8,12 @@ from scipy.optimize import curve_fit
 from scipy.stats import t as t_distribution
 
 from campaign.identification.stribeck import PARAMETERS, Problem, fit_stribeck
-from campaign.identification.velocity_map import direction_estimates, doubts, fit_direction
+from campaign.identification.velocity_map import (
+    direction_estimates,
+    doubts,
+    fit_direction,
+    nominal_estimates,
+)
 
 SPEED = np.deg2rad(np.geomspace(0.05, 65.0, 80))
 TRUE = {
@@ -100,7 +105,26 @@ def test_a_map_without_slow_points_doubts_its_parameters() -> None:
 def test_few_speeds_below_the_stribeck_velocity_are_told() -> None:
     speed = np.geomspace(0.025, 1.2, 30)
     found = fit_direction(speed, equation_4_6(speed), np.zeros(30))
-    assert any("2 speeds are below stribeck_velocity" in d for d in doubts(found))
+    assert any("2 speeds are below vs; add slower ones" in d for d in doubts(found))
+    told = direction_estimates(found, "free")
+    assert told["static_torque"].reason == "Ts is extrapolated: 2 speeds are below vs"
+    assert told["coulomb_torque"].reason == ""
+
+
+@pytest.mark.parametrize(("fastest", "is_extrapolated"), [(2.8, True), (3.2, False)])
+def test_no_speed_far_above_the_stribeck_velocity_is_told(
+    fastest: float, is_extrapolated: bool
+) -> None:
+    """By the fit's own vs, which is the true one where nothing scatters."""
+    speed = np.geomspace(0.1, fastest, 30) * TRUE["stribeck_velocity"]
+    found = fit_direction(speed, equation_4_6(speed), np.zeros(30))
+    told = direction_estimates(found, "free")
+    why = "Tc is extrapolated: no speed is above 3 times vs"
+    assert told["coulomb_torque"].reason == (why if is_extrapolated else "")
+    assert told["static_torque"].reason == ""
+    assert (f"{why}; add faster ones" in doubts(found)) == is_extrapolated
+    both = nominal_estimates(found, found, "free")
+    assert both["coulomb_torque"].reason == told["coulomb_torque"].reason
 
 
 def test_a_friction_that_would_be_negative_has_a_limit_on_one_side() -> None:

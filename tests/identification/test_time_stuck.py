@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,6 +95,11 @@ def test_shares_of_several_trials_are_averaged() -> None:
     told = over_recordings([one, other])
     assert told.value == pytest.approx(0.5 * (one.value + other.value))
     assert told.low == 0.0  # of two: wide, and never below nothing
+    assert (told.combined[0], told.systematic_uncertainty > 0) == (0.0, True)
+    most = over_recordings(
+        [replace(one, value=0.9, high=0.95), replace(other, value=1.0, high=1.0)]
+    )
+    assert (most.high, most.combined[1]) == (1.0, 1.0)
     assert over_recordings([]) is None
     assert over_recordings([one]) == one
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from campaign.published.evidence import Evidence
 from campaign.published.headline import headline, once
 from campaign.published.scoreboard import Scoreboard, score
+from campaign.published.status import Status
 from campaign.published.values import read_published
-from campaign.report.tables import agreement
+from campaign.report.content.lines import scored_tables
+from campaign.report.content.tables import agreement
 from campaign.result import Finding
 
 PUBLISHED = read_published(
@@ -125,9 +129,11 @@ def test_counts_speak_by_status() -> None:
 def test_the_sentences_say_all_of_it() -> None:
     text = agreement(board(fitted=("2",)))
     assert "8 published values compared, each counted once" in text
+    # 4 + 4 + 6 cells; the number of "none" on hardware stands in both tables.
+    assert "Of 14 printed numbers 1 repeat and 5 without a number to compare are left out" in text
     assert "calibrated 0 of 2, predicted 2 of 6" in text
     assert "the median is 25 %, the worst 50 %" in text
-    assert "Claims missed: figure 3/b/threshold." in text
+    assert "Claims missed: Figure 3 (b)." in text
     assert "1 not reached, 4 not run" in text
     assert agreement(Scoreboard()) == "No published number was measured in this run."
 
@@ -135,3 +141,18 @@ def test_the_sentences_say_all_of_it() -> None:
 def test_what_was_fitted_alone_has_no_median() -> None:
     text = agreement(board(fitted=("*",)))
     assert "No deviation among them is of a value that nobody fitted." in text
+
+
+def test_what_the_document_excludes_is_in_no_count_and_is_told() -> None:
+    """Of four errors of table 1 one is inconsistent: three are left, of which one is not run."""
+    made = board()
+    lines = tuple(
+        replace(line, status=Status.INCONSISTENT) if line.cell.path == "1/lugre/error" else line
+        for line in made.lines
+    )
+    text = agreement(replace(made, lines=lines))
+    assert "1 repeat, 1 inconsistent and 5 without a number to compare are left out: 7" in text
+    first, *_ = scored_tables(replace(made, lines=lines), PUBLISHED, {})
+    assert (first.good, first.compared) == (1, 2)
+    first, *_ = scored_tables(made, PUBLISHED, {})
+    assert first.compared == 3

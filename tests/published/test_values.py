@@ -163,6 +163,9 @@ def test_a_laboratory_s_own_table_wins_and_the_others_stay() -> None:
     (only,) = tables["5.8"].cells
     assert (only.value, only.unit, only.conditions["frequency"]) == (488, "urad", 0.24)
     assert tables["5.8"].source == "our own paper"
+    whole = OWN.replace("[[table]]", 'author = "A. Author"\nyear = 2010\n[[table]]', 1)
+    (source, *_) = {each.source for each in read_published(whole, "own.toml").values()}
+    assert source == "A. Author: our own paper, 2010"
     assert tables["5.10"] is thesis()["5.10"]
 
 

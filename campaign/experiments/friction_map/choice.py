@@ -190,8 +190,8 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: MapFit
         for name in PARAMETERS
     }
     told = (
-        f"where it tells most after a pilot: Ts {found['static_torque']:.3g} N m, "
-        f"Tc {found['coulomb_torque']:.3g} N m, "
+        f"where it tells most after a pilot: Ts {found['static_torque']:.3g} N·m, "
+        f"Tc {found['coulomb_torque']:.3g} N·m, "
         f"vs {np.rad2deg(found['stribeck_velocity']):.3g} deg/s, "
         f"δ {found['stribeck_exponent']:.2g}"
     )

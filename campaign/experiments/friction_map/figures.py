@@ -2,97 +2,211 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.experiments.friction_map.fits import MapFits
 from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
-from campaign.experiments.friction_map.tables import fitted_torque
+from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
 from campaign.experiments.interface import TestData
+from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
 from campaign.identification.intervals import student
-from campaign.identification.stribeck import stribeck
+from campaign.identification.stribeck import UNITS, stribeck
 from campaign.identification.velocity_map import DirectionFit, band
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 RATE = Axis("Rate", "rad/s", "deg/s")
 TORQUE = Axis("Friction torque", "N m", "N m")
+SPEED = Axis("Speed", "rad/s", "deg/s", scale="log")
+OWN_TORQUE = Axis("Friction, in its direction", "N m", "N m")
+LEVEL = 1e-3
+"""of the largest friction, that anybody sees."""
+TALLEST, HEADROOM = 1.7, 1.4
+"""times the mean torque: the peak of a start from which on it is cut, and what is left above."""
+FINE = 160
+"""Points of a fitted curve."""
 
 
-def map_figure(fits: MapFits, suffix: str, where: str) -> Figure:
-    """Friction torque over rate, both directions, with the deviation of each point."""
-    halves = []
-    for name, sign in DIRECTIONS.items():
-        own = sorted((p for p in fits.points if p.sign == sign), key=lambda p: p.rate.value)
-        told = [fitted_torque(point, fits) for point in own]
-        halves.append(
-            Curve(
-                np.array([point.rate.value for point in own]),
-                np.array([each.value for each in told]),
-                f"{name} direction",
-                name,
-                "points",
-                low=_ends([each.combined[0] for each in told]),
-                high=_ends([each.combined[1] for each in told]),
-            )
-        )
+def map_figure(fits: MapFits, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+    """Both directions: points and fits with their intervals, over rate and over its logarithm."""
+    whole: list[Curve] = []
+    own: dict[str, list[Curve]] = {}
+    for name in reversed(DIRECTIONS):
+        fit, sign = fits.fits[name], DIRECTIONS[name]
+        whole += [_points(fits, name), _fitted(fit, name, "", sign)]
+        own[name] = [point_bars(fit, f"{name} direction", name), _law(_fitted(fit, name), name)]
+    marks = _least_marks(fits)
+    slow = float(np.median(np.concatenate([fit.speed for fit in fits.fits.values()])))
     return Figure(
         key=f"map{suffix}",
         title=f"Friction-velocity map{f' ({where})' if where else ''}",
-        caption="Friction falls from its static value as sliding becomes faster (Stribeck effect) "
-        "and rises again with viscous friction. Bars: 95 %, window and scatter between points.",
-        alt="Friction torque over rate for both directions, one dot per constant-velocity run.",
-        panels=(Panel(RATE, TORQUE, tuple(reversed(halves))),),
+        caption=f"{_what_shows(fits)} Above: both directions with their signs, on the right only "
+        f"the slow half of the runs, up to {amount(slow, 'rad/s', 'deg/s', 2)}; below: each in "
+        "its own sign over the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
+        "free, with its 95 % band. Bars: 95 %, window and scatter between points.",
+        alt="Friction torque over rate for both directions, one dot per constant-velocity run, and "
+        "the fitted curves; over all rates, over the slow ones, and for each direction over the "
+        "logarithm of speed.",
+        panels=(
+            Panel(RATE, TORQUE, whole, "All rates"),
+            Panel(replace(RATE, limits=(-slow, slow)), TORQUE, whole, "Slow half"),
+            *(
+                Panel(SPEED, OWN_TORQUE, curves, f"{name.capitalize()} direction", marks[name])
+                for name, curves in own.items()
+            ),
+        ),
         thesis=("4.9",),
+        across=2,
+        one_scale=True,
+        trials=trials,
     )
 
 
-def _ends(values: list[float | None]) -> Array:
-    return np.array([np.nan if value is None else value for value in values])
+def _points(fits: MapFits, name: str) -> Curve:
+    """The points of a direction as they were measured, less their ripple, signed."""
+    own = sorted((p for p in fits.points if p.sign == DIRECTIONS[name]), key=lambda p: p.rate.value)
+    rate = np.array([point.rate.value for point in own])
+    torques = [fitted_torque(point, fits) for point in own]
+    return Curve.of(rate, torques, f"{name} direction", name)
 
 
-def point_bars(fit: DirectionFit, label: str, series: str, sign: float = 1.0) -> Curve:
-    """The points of one direction, as they were fitted, with their 95 % intervals.
-
-    sign: -1 shows them at negative rates.
-    """
+def point_bars(fit: DirectionFit, label: str, series: str) -> Curve:
+    """The points of one direction, as they were fitted, with their 95 % intervals."""
     half = student(fit.freedom) * fit.deviation
     low, high = fit.torque - half, fit.torque + half
-    return Curve(sign * fit.speed, fit.torque, label, series, "points", low=low, high=high)
+    return Curve(fit.speed, fit.torque, label, series, "points", low=low, high=high)
 
 
-def fit_figure(fits: MapFits, suffix: str, where: str) -> Figure:
-    """Points and fitted curves of each direction over the logarithm of the rate."""
-    panels = []
-    log_rate = Axis("Rate, either direction", "rad/s", "deg/s", scale="log")
+def _fitted(fit: DirectionFit, series: str, label: str = "", sign: float = 1.0) -> Curve:
+    """The fit with δ free, with its band; sign: -1 shows it at negative rates."""
+    fine = np.geomspace(fit.speed.min(), fit.speed.max(), FINE)
+    torque, wide = stribeck(fine, fit.fits["free"].values), band(fit, "free", fine)
+    y = sign * torque
+    return Curve(sign * fine, y, label, series, low=y - wide, high=y + wide)
+
+
+def _law(curve: Curve, direction: str) -> Curve:
+    """A fitted curve that may be compared with published parameters of its direction."""
+    return replace(curve, conditions={"direction": direction}, law=stribeck, parameters=UNITS)
+
+
+def _falls(fit: DirectionFit) -> bool:
+    """Whether friction falls as sliding becomes faster, beyond what scatter leaves open."""
+    values = fit.fits["free"].values
+    return fit.shows_stribeck_effect and values["static_torque"] > values["coulomb_torque"]
+
+
+def _least(fit: DirectionFit) -> tuple[float, float] | None:
+    """Speed (rad/s) and torque (N m) where the fitted friction is least; None at an end."""
+    fine = np.geomspace(fit.speed.min(), fit.speed.max(), FINE)
+    torque = stribeck(fine, fit.fits["free"].values)
+    at = int(np.argmin(torque))
+    return (float(fine[at]), float(torque[at])) if 0 < at < FINE - 1 else None
+
+
+def _least_marks(fits: MapFits) -> dict[str, list[Mark]]:
+    """Where the friction of each direction is least, if it falls at all."""
+    marks: dict[str, list[Mark]] = {name: [] for name in fits.fits}
     for name, fit in fits.fits.items():
-        fine = np.geomspace(fit.speed.min(), fit.speed.max(), 400)
-        free = stribeck(fine, fit.fits["free"].values)
-        wide = band(fit, "free", fine)
-        fixed = stribeck(fine, fit.fits["2"].values)
-        panels.append(
-            Panel(
-                log_rate,
-                TORQUE,
-                [
-                    point_bars(fit, "measured", "measured"),
-                    Curve(fine, free, "fitted, δ free", "fit", low=free - wide, high=free + wide),
-                    Curve(fine, fixed, "fitted, δ = 2", "alternative"),
-                ],
-                f"{name.capitalize()} direction, "
-                f"δ = {fit.fits['free'].values['stribeck_exponent']:.3g}",
-            )
+        least = _least(fit) if _falls(fit) else None
+        if least is not None:
+            speed, torque = least
+            label = f"{amount(torque, 'N m')} at {amount(speed, 'rad/s', 'deg/s', 2)}"
+            marks[name].append(Mark(label, x=speed, y=torque, point=True, series=name))
+    return marks
+
+
+def _what_shows(fits: MapFits) -> str:
+    """What the fits say of friction at low and at high speed: true of this map."""
+    fall = [name for name, fit in fits.fits.items() if _falls(fit)]
+    rise = [name for name in fits.fits if _rises(fits, name)]
+    effect = "friction falls as sliding becomes faster (Stribeck effect)"
+    viscous = "rises with viscous friction"
+    if not fall:
+        first = "no Stribeck effect shows: friction does not fall as sliding becomes faster"
+        both = f"; it {viscous}{_of(rise, fits)}" if rise else ""
+        return sentence(first + both)
+    if rise == fall:
+        return sentence(f"{effect} and then {viscous}{_of(fall, fits)}")
+    second = f" It {viscous}{_of(rise, fits)}." if rise else ""
+    return sentence(f"{effect}{_of(fall, fits)}") + second
+
+
+def _of(names: list[str], fits: MapFits) -> str:
+    """Which directions a sentence is about, where it is not about all."""
+    return "" if len(names) == len(fits.fits) else f" in the {listed(names)} direction"
+
+
+def _rises(fits: MapFits, name: str) -> bool:
+    """Whether friction rises with speed, beyond what scatter leaves open and anybody sees."""
+    fit = fits.fits[name]
+    seen = LEVEL * float(fit.torque.max()) / float(fit.speed.max())
+    return surely_above(fits.estimates("free")[name]["viscous_friction"], 0.0, seen)
+
+
+def fit_figure(fits: MapFits, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+    """Points and fitted curves of each direction over the logarithm of speed, and residuals."""
+    curves, residuals = [], []
+    for name, fit in fits.fits.items():
+        exponent = fit.fits["free"].values["stribeck_exponent"]
+        free = _fitted(fit, "fit", "fitted, δ free")
+        fixed = replace(free, y=stribeck(free.x, fit.fits["2"].values), low=None, high=None)
+        fixed = replace(fixed, label="fitted, δ = 2", series="alternative")
+        shown = [point_bars(fit, f"{name} direction", name), _law(free, name), fixed]
+        curves.append(
+            Panel(SPEED, OWN_TORQUE, shown, f"{name.capitalize()} direction, δ = {exponent:.3g}")
         )
+        residuals.append(_residual_panel(fit, name))
     return Figure(
         key=f"fit{suffix}",
         title=f"Stribeck curve fitted to the map{f' ({where})' if where else ''}",
-        caption="Equation 4.6 fitted by least squares, with δ free and with δ = 2. The logarithmic "
-        "axis shows the low speeds that decide Ts and vs. Bars and band: 95 %.",
-        alt="Measured friction torque over rate on a logarithmic axis with both fitted curves, one "
-        "panel per direction.",
-        panels=tuple(panels),
+        caption="Equation 4.6 fitted by least squares, with δ free and with δ = 2; below, what the "
+        "points differ from the fit with δ free, on a scale of its own. "
+        f"{_misfit(fits.fits)} The logarithmic axis shows the low speeds that decide Ts and vs. "
+        "Bars and band: 95 %.",
+        alt="Measured friction torque over speed on a logarithmic axis with both fitted curves, "
+        "one panel per direction, and the residuals below.",
+        panels=(*curves, *residuals),
         thesis=("4.11",),
         across=2,
+        one_scale=True,
+        trials=trials,
     )
+
+
+def _residual_panel(fit: DirectionFit, name: str) -> Panel:
+    fine = np.geomspace(fit.speed.min(), fit.speed.max(), FINE)
+    wide = band(fit, "free", fine)
+    points = point_bars(fit, f"{name} direction", name)
+    assert points.low is not None  # noqa: S101 (for the type checker)
+    assert points.high is not None  # noqa: S101
+    at = stribeck(fit.speed, fit.fits["free"].values)
+    low, high = points.low - at, points.high - at
+    zero = Curve(fine, np.zeros(FINE), "fitted, δ free", "fit", low=-wide, high=wide)
+    curves = [
+        Curve(points.x, points.y - at, points.label, name, "points", low=low, high=high),
+        replace(_law(zero, name), law=partial(_difference, less=fit.fits["free"].values)),
+    ]
+    return Panel(SPEED, Axis("Difference from the fit", "N m", "N m"), curves)
+
+
+def _difference(speed: Array, values: Mapping[str, float], less: Mapping[str, float]) -> Array:
+    """Friction torque (N m) of one set of parameters less that of another, shape (n,)."""
+    return stribeck(speed, values) - stribeck(speed, less)
+
+
+def _misfit(fits: Mapping[str, DirectionFit]) -> str:
+    """How much worse δ = 2 fits, by direction, and which model is to be preferred."""
+    words = [
+        f"{fit.misfit:.2g} times ({name} direction; lowest BIC: {MODEL_LABELS[fit.preferred]})"
+        for name, fit in fits.items()
+    ]
+    start = "over their own deviations, the residuals with δ = 2 are"
+    return sentence(f"{start} {listed(words)} those with δ free")
 
 
 def example_figure(data: TestData) -> tuple[Figure, ...]:
@@ -105,35 +219,56 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
     back = windows_of(item.trial)["negative"]
     # One run: the way back has its window one leg later.
     recording = item.recording().window(0.0, back.start - window.start)
-    marks = (Mark("window", x=window.start), Mark("", x=window.stop))
+    marks = (Mark("averaged", x=window.start, until=window.stop),)
     time = Axis("Time", "s", "s")
-    speed = f"{np.rad2deg(float(str(item.trial.point['speed']))):.3g} deg/s"
+    speed = setting(float(str(item.trial.point["speed"])), "rad/s", "deg/s")
     rates = [Curve(recording.time, recording[GYRO_RATE], "measured", "measured")]
     if COMMAND in recording.channels:
         command = recording[COMMAND]
         rates.append(Curve(recording.time, command, "commanded", "reference", "thin"))
+    whole = recording[DRIVE_TORQUE]
+    torques = [Curve(recording.time, whole, "measured", "measured")]
+    cut = recording.window(window.start, window.stop)
+    near = [Curve(cut.time, cut[DRIVE_TORQUE], "measured", "measured")]
+    level = _mean(cut[DRIVE_TORQUE])
+    if level is not None:
+        ends = np.array([window.start, window.stop])
+        near.append(Curve(ends, np.full(2, level), "mean", "fit"))
+    told = "" if level is None else f", {amount(level, 'N m')} here,"
+    above = _cut_above(whole, level)
+    start = "" if above is None else _cut_words(whole)
     return (
         Figure(
             key="one-point",
             title=f"One point of the map: {speed}",
-            caption="Rate and drive torque of one run. The mean torque between the two lines is "
-            "the friction torque at this speed.",
+            caption=f"Rate and drive torque of one run at {speed}, and below the torque of its "
+            f"shaded stretch alone.{start} The mean torque of that "
+            f"stretch{told} less inertia times what is left of acceleration is the friction torque "
+            "at this speed.",
             alt="Rate and drive torque over time for one constant-velocity run, with the averaging "
-            "window marked.",
+            "window shaded.",
             panels=(
-                Panel(
-                    time,
-                    RATE,
-                    rates,
-                    marks=marks,
-                ),
-                Panel(
-                    time,
-                    Axis("Drive torque", "N m", "N m"),
-                    [Curve(recording.time, recording[DRIVE_TORQUE], "measured", "measured")],
-                    marks=marks,
-                ),
+                Panel(time, RATE, rates, marks=marks),
+                Panel(time, Axis("Drive torque", "N m", "N m", limits=above), torques, marks=marks),
+                Panel(time, Axis("Drive torque", "N m", "N m"), near, "Averaged stretch"),
             ),
             thesis=("4.8",),
+            trials=(item.trial.number,),
         ),
     )
+
+
+def _cut_above(torque: Array, level: float | None) -> tuple[float, float] | None:
+    """Limits (N m) that cut off the peak of the start; None where there is none in the way."""
+    if level is None or level <= 0 or not np.nanmax(torque) > TALLEST * level:
+        return None
+    return -np.inf, HEADROOM * level
+
+
+def _cut_words(torque: Array) -> str:
+    return f" The peak of {amount(float(np.nanmax(torque)), 'N m')} at the start is cut off."
+
+
+def _mean(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if known.size else None

@@ -174,9 +174,9 @@ def map_notes(fits: MapFits, where: str) -> Iterator[str]:
         yield f"{start}: {_scatter(fit)}."
         if fit.preferred != "free" or fit.misfit > MISFIT:
             yield (
-                f"{start}: {MODEL_LABELS[fit.preferred]} has the lowest BIC; the residuals of "
-                f"δ = 2 are {fit.misfit:.2g} times those of δ free. Intervals hold for each model "
-                "by itself, not for the choice among them."
+                f"{start}: {MODEL_LABELS[fit.preferred]} has the lowest BIC; over their own "
+                f"deviations, the residuals of δ = 2 are {fit.misfit:.2g} times those of δ free. "
+                "Intervals hold for each model by itself, not for the choice among them."
             )
         yield f"{start}: {_ripple(fits, name)}."
     together = correlation(fits.fits["positive"], fits.fits["negative"])

@@ -16,9 +16,9 @@ from campaign.experiments.friction_map.runs import (
     settling_advice,
 )
 from campaign.experiments.shared.rig import Rig
+from campaign.identification.extrapolated import FAR, FEWEST_BELOW
 from campaign.identification.ripple import FASTEST, LEAST_PERIODS
 from campaign.identification.stribeck import PARAMETERS
-from campaign.identification.velocity_map import FEWEST_BELOW
 from campaign.physics.bench import Bench
 from campaign.physics.true_values import stribeck_parameters
 
@@ -33,6 +33,7 @@ def map_warnings(options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
     if getattr(options, "pilot", False):  # it decides where others run, and how long they settle
         return
     yield from _none_below(runs, bench)
+    yield from _none_far_above(runs, bench)
     yield from _settling(runs, bench)
     yield from _ripple(runs, options, bench)
 
@@ -56,6 +57,17 @@ def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
             f"{below} of {len(runs)} speeds are below the Stribeck velocity of "
             f"{_degrees(velocity)} deg/s: static_torque is extrapolated; run {FEWEST_BELOW} or "
             f"more below it, from {_degrees(0.1 * velocity)} deg/s on"
+        )
+
+
+def _none_far_above(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
+    """Of the larger Stribeck velocity, as for Ts."""
+    known = [stribeck_parameters(bench, sign) for sign in (1.0, -1.0)]
+    far = FAR * max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
+    if far > 0 and not any(run.speed > far for run in runs):
+        yield (
+            f"no speed is above {FAR:g} times the Stribeck velocity, {_degrees(far)} deg/s: "
+            "coulomb_torque is extrapolated; run one or more above that"
         )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
+from campaign.experiments.preparing.draws_together import concluded
 from campaign.published.draws import SEED, together
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.trial import Trial, canonical_json
@@ -24,7 +25,7 @@ def draws_of(trials: Iterable[Trial]) -> tuple[Value, ...]:
 
 
 def merged(results: Mapping[Value, Result]) -> Result:
-    """The results of several draws, by seed: findings of all, tables and figures of one.
+    """The results of several draws, by seed: findings and sentences of all, else those of one.
 
     A table says of every number of which several draws found one how these lie.
     """
@@ -47,6 +48,8 @@ def merged(results: Mapping[Value, Result]) -> Result:
         first.figures,
         found,
         (told, *first.notes, *notes),
+        concluded({own: result.conclusions for own, result in results.items()}),
+        first.telling,
     )
 
 

@@ -39,7 +39,7 @@ def _inertia(ramps: Ramps) -> Iterator[str]:
     found = [abs(each.value) for each in ramps.values("peak_acceleration")]
     if found:
         size = 0.01 * float(np.mean(found)) * bench_of(ramps.trials[0].trial).axis.inertia
-        yield f"An inertia that is 1 % off moves the breakaway torque by {size:.2g} N m."
+        yield f"An inertia that is 1 % off moves the breakaway torque by {size:.2g} N·m."
 
 
 def _encoder(ramps: Ramps) -> Iterator[str]:
@@ -85,7 +85,7 @@ def _rate(ramps: Ramps) -> Iterator[str]:
         rate = float(str(trial.options["torque_rate"]))
         yield (
             "The ramp is too fast for the curve of bristles, or its sensors too coarse: choose a "
-            f"torque_rate of {0.25 * rate:.2g} N m/s, or sweep it to see what it does."
+            f"torque_rate of {0.25 * rate:.2g} N·m/s, or sweep it to see what it does."
         )
 
 

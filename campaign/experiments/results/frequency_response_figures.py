@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaign.experiments.results.servo_marks import bandwidths, margins
 from campaign.identification.continuation import DECIBEL, Continuation
 from campaign.identification.frequency_response import Response, open_loop
 from campaign.identification.servo import ServoCharacteristics
@@ -20,46 +21,67 @@ SHOWN_BEYOND = 1.2
 NOTICEABLE = 0.02
 """Half-width, as a share of the response, from which on a point's interval is drawn: 0.2 dB, 1°."""
 TWO_SIDED = 1.96
+BARE = "none"
+"""The series of a response without compensation."""
 
 Named = tuple[str, str, Response]
 """Label, series and response of one curve."""
 
 
 def closed_loop_figures(
-    sweeps: Sequence[Named], found: Sequence[ServoCharacteristics | None]
+    sweeps: Sequence[Named],
+    found: Sequence[ServoCharacteristics | None],
+    names: Sequence[str] | None = None,
 ) -> Iterator[Figure]:
-    """Figures 5.5 and 5.19 (closed loop), 5.6 and 5.20 (open loop from it)."""
+    """Figures 5.5 and 5.19 (closed loop), 5.6 and 5.20 (open loop from it).
+
+    names: short ones, of the sweeps, for the labels of their bandwidths and margins.
+    """
+    names = [series for _, series, _ in sweeps] if names is None else names
     several = len(sweeps) != len({series for _, series, _ in sweeps})
     named = [(label, label if several else series, r) for label, series, r in sweeps]
     methods = {series for _, series, _ in sweeps}
     observed, modelled = "observer" in methods, bool(methods & {"lugre", "static"})
+    widths = bandwidths(named, found, names)
     yield _bode(
         "closed-loop",
         "Closed-loop response, rate command to gyro rate",
-        "Up to the bandwidth, where the gain has fallen by 3 dB, the load follows its command. "
-        "Compensation is harmless where its curve stays with the uncompensated one.",
+        "Up to the bandwidth, where the gain has fallen by 3 dB"
+        + (" (dots)" if any(mark.point for mark in widths.gain_marks) else "")
+        + ", the load follows its command. Compensation is harmless where its curve stays with the "
+        "uncompensated one.",
         "Gain and phase of the closed loop over frequency, one curve per compensation.",
         Axis("Gain", "dB"),
         [(label, series, r, r.level, _turned(r)) for label, series, r in named],
         thesis=_chosen(("5.5", modelled), ("5.19", observed)),
-        level_marks=(Mark("-3 dB", y=-3.0),),
+        level_marks=(Mark("-3 dB", y=-3.0), *widths.gain_marks),
+        more_gain=widths.gain,
     )
     loops = [(label, series, open_loop(r)) for label, series, r in named]
+    kept = margins(loops, [_turned(r) for _, _, r in loops], found, names)
+    beyond = list(_continued(loops, found))
     yield _bode(
         "open-loop",
         "Open-loop response, rate error to gyro rate",
         "The distance of the phase from -180° where the gain is 0 dB is the phase margin; how far "
-        "the gain is below 0 dB where the phase is -180° is the gain margin. What lies above the "
-        "sweep is extrapolated (thin), by one of the fits between which the margin may lie. Bands "
-        "are 95 % intervals, where they are wide enough to be seen.",
+        "the gain is below 0 dB where the phase is -180° is the gain margin."
+        + (" Both are drawn where they were found." if kept.gain_marks or kept.phase_marks else "")
+        + (
+            " What lies above the sweep is extrapolated (thin), by one of the fits between which "
+            "the margin may lie."
+            if beyond
+            else ""
+        )
+        + " Bands and bars are 95 % intervals, where they are wide enough to be seen.",
         "Gain and phase of the open loop over frequency, one curve per compensation, with the "
-        "0 dB and -180° lines.",
+        "0 dB and -180° lines and the margins.",
         Axis("Gain", "dB"),
         [(label, series, r, r.level, _turned(r)) for label, series, r in loops],
         thesis=_chosen(("5.6", modelled), ("5.20", observed)),
-        level_marks=(Mark("0 dB", y=0.0),),
-        phase_marks=(Mark("-180°", y=-np.pi),),
-        more=list(_continued(loops, found)),
+        level_marks=(Mark("0 dB", y=0.0), *kept.gain_marks),
+        phase_marks=(Mark("-180°", y=-np.pi), *kept.phase_marks),
+        more_gain=[*(level for level, _ in beyond), *kept.gain],
+        more_phase=[*(phase for _, phase in beyond), *kept.phase],
     )
 
 
@@ -76,7 +98,7 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         "side: in the inertia that torque over acceleration amounts to, a peak and a dip on top "
         "of the axis' own.",
         "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
-        Axis("Gain, dB of 1 rad/s per N m"),
+        Axis("Gain, dB of 1 rad/s per N·m"),
         [(label, series, r, r.level, _turned(r)) for label, series, r in named],
         thesis=("4.5",),
         level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
@@ -154,28 +176,77 @@ def _bode(
     thesis: tuple[str, ...],
     level_marks: tuple[Mark, ...] = (),
     phase_marks: tuple[Mark, ...] = (),
-    more: Sequence[tuple[Curve, Curve]] = (),
+    more_gain: Sequence[Curve] = (),
+    more_phase: Sequence[Curve] = (),
 ) -> Figure:
+    less = list(_differences(curves))
+    every = [curve.x for curve in more_gain] + [r.frequency for _, _, r, _, _ in curves]
+    across = _range(np.concatenate(every)) if less else FREQUENCY
+    below = " Below: what compensation changes, less the response without." if less else ""
     return Figure(
         key=key,
         title=title,
-        caption=caption,
-        alt=alt,
+        caption=caption + below,
+        alt=alt + below,
         panels=(
             Panel(
-                FREQUENCY,
+                across,
                 gain,
                 [_with_interval(r, level, label, s, DECIBEL) for label, s, r, level, _ in curves]
-                + [level for level, _ in more],
+                + list(more_gain),
                 marks=level_marks,
             ),
             Panel(
-                FREQUENCY,
+                across,
                 PHASE,
                 [_with_interval(r, phase, label, s, 1.0) for label, s, r, _, phase in curves]
-                + [phase for _, phase in more],
+                + list(more_phase),
                 marks=phase_marks,
             ),
+            *(replace(panel, x=across) for panel in less),
         ),
         thesis=thesis,
+        across=2 if less else 1,
     )
+
+
+def _range(frequency: Array) -> Axis:
+    """An axis over all frequencies (Hz), so that panels below each other have the same."""
+    known = frequency[np.isfinite(frequency)]
+    if not known.size:
+        return FREQUENCY
+    return replace(FREQUENCY, limits=(float(known.min()), float(known.max())))
+
+
+def _differences(
+    curves: Sequence[tuple[str, str, Response, Array, Array]],
+) -> Iterator[Panel]:
+    """Gain and phase of each method less those without compensation, with their 95 % intervals.
+
+    Nothing where there is not one response without, or none to compare at the same frequencies:
+    curves that lie on one another do not show what compensation changes.
+    """
+    bare = [each for each in curves if each[1] == BARE]
+    if len(bare) != 1:
+        return
+    _, _, reference, level, phase = bare[0]
+    others = [
+        each
+        for each in curves
+        if each[1] != BARE and np.array_equal(each[2].frequency, reference.frequency)
+    ]
+    if not others:
+        return
+    gains, phases = [], []
+    for label, series, response, own_level, own_phase in others:
+        half = TWO_SIDED * np.hypot(response.relative_error, reference.relative_error)
+        at, away = response.frequency, own_level - level
+        turned = (own_phase - phase + np.pi) % (2.0 * np.pi) - np.pi
+        gains.append(_within(at, away, half * DECIBEL, label, series))
+        phases.append(_within(at, turned, half, label, series))
+    yield Panel(FREQUENCY, Axis("Change of gain", "dB"), gains, marks=(Mark("", y=0.0),))
+    yield Panel(FREQUENCY, Axis("Change of phase", "rad", "deg"), phases, marks=(Mark("", y=0.0),))
+
+
+def _within(at: Array, values: Array, half: Array, label: str, series: str) -> Curve:
+    return Curve(at, values, label, series, low=values - half, high=values + half)

@@ -38,6 +38,12 @@ QUANTITIES = (
 )
 
 
+def is_extrapolated(sweep: Sweep) -> bool:
+    """Whether its gain margin was read beyond the sweep."""
+    gain = sweep.found.crossing(sweep.found.gain_margin) if sweep.found else None
+    return gain is not None and gain.extrapolated
+
+
 def _values(found: ServoCharacteristics) -> dict[str, Estimate]:
     return {
         "bandwidth": found.bandwidth,
@@ -95,6 +101,7 @@ def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
     )
     read = [(sweep, sweep.found) for sweep in sweeps if sweep.found is not None]
     yield _servo_table(named, [_servo_row(sweep, found) for sweep, found in read])
+    yield from _effect_table(named, extra, sweeps)
     yield Table(
         key="crossovers",
         title="Where the margins were read",
@@ -107,6 +114,11 @@ def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
         rows=tuple({**sweep.place, **_crossover_row(found)} for sweep, found in read),
     )
     yield _all_crossings(named, read)
+
+
+def _effect_table(
+    named: tuple[Column, ...], extra: list[str], sweeps: list[Sweep]
+) -> Iterator[Table]:
     rows = [
         {**{k: sweep.place.get(k) for k in ("compensation", *extra)}, **_changes(bare, sweep)}
         for bare, sweep in _pairs(sweeps)

@@ -12,6 +12,8 @@ from campaign.experiments.shared.pointing_error import ends, values
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 CORNER = Axis("Corner frequency N K0 / (2π J')", "Hz", "Hz", scale="log")
+BEYOND = 2.0
+"""times the highest gain tried, up to which a limit of stability is drawn."""
 SHOWN_GAINS = 4
 """curves in the figure of rejection, the one without observer among them."""
 
@@ -29,10 +31,31 @@ def _points(x: Array, estimates: Sequence[Estimate], label: str, series: str) ->
     return Curve(x, values(estimates), label, series, "points", low=low, high=high)
 
 
-def _marks(gains: Sequence[Gain], own: float) -> list[Mark]:
+def _marks(gains: Sequence[Gain], own: float, limit: float | None) -> list[Mark]:
+    """The bench's own gain, where the loop becomes unstable, and where its eigenvalues say so.
+
+    limit: by the eigenvalues (Hz); None where they say stable.
+    """
     marks = [Mark("the bench's", x=own)]
     unstable = next((gain.corner for gain in gains if gain.unstable), None)
-    return marks if unstable is None else [*marks, Mark("unstable", x=unstable)]
+    highest = max((gain.corner for gain in gains), default=0.0)
+    if unstable is not None:
+        below = [gain.corner for gain in gains if 0 < gain.corner < unstable]
+        if below:
+            marks.append(Mark("becomes unstable", x=max(below), until=unstable))
+        else:
+            marks.append(Mark("unstable", x=unstable))
+    if limit is not None and limit <= BEYOND * highest:
+        marks.append(Mark("unstable by eigenvalues", x=limit))
+    return marks
+
+
+def _stability_words(gains: Sequence[Gain]) -> str:
+    """What is shaded, or that nothing is."""
+    if any(gain.unstable for gain in gains):
+        return " Shaded: between the highest gain that was stable and the lowest that was not."
+    highest = max((gain.corner for gain in gains), default=0.0)
+    return f" The loop is stable at every gain that was tried, up to {highest:.3g} Hz."
 
 
 def _without(gains: Sequence[Gain], name: str) -> list[Mark]:
@@ -40,7 +63,7 @@ def _without(gains: Sequence[Gain], name: str) -> list[Mark]:
     return [] if found is None else [Mark("without observer", y=found.value)]
 
 
-def error_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
+def error_figure(gains: Sequence[Gain], own: float, limit: float | None = None) -> Iterator[Figure]:
     """Stabilization error over the gain."""
     x, y = _pairs(gains, "error")
     if not len(x):
@@ -51,18 +74,28 @@ def error_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
         label = "Equation 5.4, of the friction that acted"
         curves.insert(0, Curve(theory_x, values(theory_y), label, "fit"))
     error = Axis("Stabilization error (1σ)", "rad", "mrad", scale="log")
+    _marks(gains, own, limit) + _without(gains, "error")
     yield Figure(
         key="error",
         title="Stabilization error over the gain of the observer",
-        caption="More gain, less error, until the loop oscillates. The line is what Equation 5.4 "
-        "makes of the friction torque recorded in the same trial.",
+        caption="Error over the gain, with its 95 % interval where it is wide enough to be seen."
+        + (
+            " The line is what Equation 5.4 makes of the friction recorded in the same trial."
+            if len(theory_x)
+            else ""
+        )
+        + _stability_words(gains),
         alt="Stabilization error over the observer's corner frequency, both logarithmic: falling "
         "dots beside a line of theory.",
-        panels=(Panel(CORNER, error, curves, marks=_marks(gains, own) + _without(gains, "error")),),
+        panels=(
+            Panel(
+                CORNER, error, curves, marks=_marks(gains, own, limit) + _without(gains, "error")
+            ),
+        ),
     )
 
 
-def noise_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
+def noise_figure(gains: Sequence[Gain], own: float, limit: float | None = None) -> Iterator[Figure]:
     """True rate of the load that the gyro's noise causes, over the gain."""
     x, y = _pairs(gains, "noise")
     if not len(x):
@@ -75,14 +108,18 @@ def noise_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
         _points(x, y, "measured", "measured"),
     ]
     rate = Axis("Rate of the load from noise (1σ)", "rad/s", "mrad/s", scale="log")
+    _marks(gains, own, limit) + _without(gains, "noise")
     yield Figure(
         key="noise",
         title="Gyro noise that reaches the load, over the gain of the observer",
         caption="The observer differentiates the gyro, so more gain lets more noise through. "
-        "Equation 5.5 knows no delay: where the dots leave its line the loop runs out of phase.",
+        "Equation 5.5 knows no delay: where the dots leave its line the loop runs out of phase."
+        + _stability_words(gains),
         alt="Standard deviation of the load's rate due to gyro noise over the observer's corner "
         "frequency, rising, beside the line of Equation 5.5.",
-        panels=(Panel(CORNER, rate, curves, marks=_marks(gains, own) + _without(gains, "noise")),),
+        panels=(
+            Panel(CORNER, rate, curves, marks=_marks(gains, own, limit) + _without(gains, "noise")),
+        ),
     )
 
 

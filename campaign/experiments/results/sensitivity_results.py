@@ -9,19 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.experiments.shared.common import method_label
-from campaign.experiments.shared.pointing_error import ends
 from campaign.identification.threshold import Threshold, crossing, passing
 from campaign.result import (
     Array,
-    Axis,
     Cell,
     Column,
-    Curve,
-    Figure,
     Finding,
-    Mark,
-    Panel,
     Table,
     Value,
 )
@@ -189,37 +182,4 @@ def sensitivity_table(judged: Sequence[Judged], limit: Threshold) -> Table:
         note="The smaller of decrease and increase counts, interpolated between the changes tried. "
         "Parameters that never pass are ranked by their largest error; the change that stands "
         "there is a bound.",
-    )
-
-
-def sensitivity_figure(judged: Sequence[Judged], limit: Threshold, compensation: str) -> Figure:
-    """Figure 5.14: a panel for each parameter, all of one scale."""
-    top = 1.08 * max(float(np.max(one.response.dots[:, 1])) for one in judged)
-    scale = (0.0, max(top, 1.1 * limit.value))
-    error = Axis("Stabilization error (1σ)", "rad", "mrad", limits=scale)
-    panels = []
-    for one in judged:
-        response = one.response
-        said = f"passes at {one.threshold.value:.0%}" if one.passed else "not passed"
-        marks = [Mark(f"{limit.value * 1e3:.3g} mrad", y=limit.value)]
-        low, high = ends(response.errors)
-        change, dots = response.change, response.dots
-        curves = [Curve(change, response.error, "mean", "measured", "line", low=low, high=high)]
-        if len(dots) > len(change):
-            curves.append(Curve(dots[:, 0], dots[:, 1], "each trial", "measured", "points"))
-        axis = Axis(f"Change of {one.symbol}", "", "percent")
-        title = f"{one.symbol}: {said}, rank {one.rank.value:.0f}"
-        panels.append(Panel(axis, error, curves, title, marks))
-    return Figure(
-        key="sensitivity",
-        title=f"Error over the change of each parameter, {method_label(compensation)}",
-        caption="Each panel changes one parameter of the compensation's model and leaves the "
-        "others and the true friction alone. The steeper the valley, the better the parameter has "
-        "to be known; the horizontal line is the threshold, the band the 95 % interval of the "
-        "mean. All panels have one scale.",
-        alt="Stabilization error over the relative change of each model parameter, one panel per "
-        "parameter, with a dot for every trial and a line at the threshold.",
-        panels=tuple(panels),
-        thesis=("5.14",),
-        across=2,
     )

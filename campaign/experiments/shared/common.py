@@ -20,6 +20,14 @@ METHOD_LABELS = {
     "observer": "disturbance observer",
 }
 
+SHORT_LABELS = {"none": "none", "static": "static", "lugre": "LuGre", "observer": "observer"}
+"""Where little room is: under an axis, beside a dot."""
+
+
+def short_label(name: str) -> str:
+    """A compensation in one word where that is known; a bench's own name stands for itself."""
+    return SHORT_LABELS.get(name, name)
+
 
 def method_label(name: str) -> str:
     """A compensation as it is called on the page; a bench's own name stands for itself."""

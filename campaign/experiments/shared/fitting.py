@@ -137,8 +137,8 @@ def _overcome_friction(rig: Rig) -> None:
     """ValueError where the drive cannot move the load at all."""
     if (rig.static_torque or 0.0) >= MOST * rig.torque:
         raise ValueError(
-            f"the limits of torque and current leave {rig.torque:.3g} N m, and friction holds "
-            f"{rig.static_torque:.3g} N m: nothing would move; raise them"
+            f"the limits of torque and current leave {rig.torque:.3g} N·m, and friction holds "
+            f"{rig.static_torque:.3g} N·m: nothing would move; raise them"
         )
 
 

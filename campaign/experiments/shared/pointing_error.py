@@ -6,6 +6,7 @@ samples are read for figures.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ from campaign.channels import POINTING_ERROR
 from campaign.estimate import Estimate, Window
 from campaign.experiments.interface import TrialData, metrics
 from campaign.identification import stabilization_error
-from campaign.result import Array
+from campaign.result import Array, ends_of
 from campaign.signals import Sine
 from campaign.trial import Recording, Task, Trial
 
@@ -26,6 +27,8 @@ SHOWN_CYCLES = 1.5
 """of the base motion in a time history; more cycles only make the reversals smaller."""
 SHOWN_TIME = 60.0
 """s; of a motion that is not sinusoidal."""
+ROUNDING = 1e-6
+"""of a cycle: what times may be off whole cycles by their rounding."""
 
 
 def windows_of(task: Task) -> tuple[Window, Window]:
@@ -47,6 +50,29 @@ def measured_part(data: TrialData) -> Recording:
     """What was recorded in the window that counts."""
     window = window_of(data.trial, MEASURED)
     return data.recording().window(window.start, window.stop)
+
+
+def whole_cycles_shown(trial: Trial) -> Window:
+    """What is shown, on to the end of its last cycle where that is measured, or back to the one
+    before; as it is for a motion without cycles, or measured for less than one.
+    """
+    shown, measured = window_of(trial, SHOWN), window_of(trial, MEASURED)
+    signal = trial.task.base_acceleration
+    if not isinstance(signal, Sine):
+        return shown
+    in_all = math.floor(signal.frequency * (measured.stop - shown.start) + ROUNDING)
+    cycles = min(math.ceil(signal.frequency * (shown.stop - shown.start) - ROUNDING), in_all)
+    if cycles < 1:
+        return shown
+    return Window(SHOWN, shown.start, min(measured.stop, shown.start + cycles / signal.frequency))
+
+
+def largest_of(samples: Array) -> float:
+    """The farthest (rad) that what is measured, shape (n,), gets from its mean.
+
+    That is whole cycles of a sinusoidal motion: of a part of one the mean is another.
+    """
+    return float(np.max(np.abs(samples - np.mean(samples))))
 
 
 def rate_of(recording: Recording) -> float:
@@ -89,8 +115,6 @@ def values(estimates: Sequence[Estimate]) -> Array:
 
 
 def ends(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
-    """Both ends of each interval, shape (n,), for a curve; NaN where there is none."""
-    pairs = [estimate.combined for estimate in estimates]
-    low = np.array([np.nan if end is None else end for end, _ in pairs])
-    high = np.array([np.nan if end is None else end for _, end in pairs])
+    """Both ends of each interval, shape (n,), for a curve; `ends_of` says which are open."""
+    low, high = np.array([ends_of(estimate) for estimate in estimates]).reshape(-1, 2).T
     return low, high

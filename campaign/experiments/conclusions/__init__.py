@@ -1,0 +1,1 @@
+"""What a test comes to, in sentences made from its estimates; a file for each family."""

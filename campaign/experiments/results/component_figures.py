@@ -1,0 +1,119 @@
+"""The figure of a component friction test: one ramp of each component, and all readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.captions import amount, listed, sentence
+from campaign.result import Axis, Curve, Figure, Mark, Panel, Value
+
+NUMBERS = 10
+"""Most measurements whose number stands at the axis."""
+BEHIND = 1.5
+"""How far the mean stands behind the last measurement."""
+TORQUE = "breakaway_torque"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is shown of one component.
+
+    Attributes:
+        numbers: of the measurements.
+        torques: their readings (N m), as many.
+        mean: of the readings.
+        ramp: the first measurement.
+        count: one count of a sensor behind the gear (N m); 0 where it is at the load or perfect.
+    """
+
+    name: str
+    numbers: tuple[int, ...]
+    torques: tuple[Estimate, ...]
+    mean: Estimate
+    ramp: TrialData
+    count: float
+
+
+def component_figure(
+    shown: Sequence[Shown],
+    place: Mapping[str, Value],
+    sliding_rate: float,
+    trials: tuple[int, ...],
+    suffix: str,
+) -> Figure:
+    """The figure of one place of the sweep; sliding_rate (rad/s) counts as turning."""
+    last = max(number for each in shown for number in each.numbers)
+    return Figure(
+        key=f"component-friction{suffix}",
+        title="Breakaway torque of the components",
+        caption="First one ramp of each component until it turns; then the repeated readings of "
+        "each, with their 95 % intervals, and their mean, each component on its own scale. "
+        f"{_what_shows(shown)}",
+        alt="Rate over torque of one ramp for each component, and breakaway torque of each "
+        "component over the number of the measurement.",
+        panels=(
+            Panel(
+                Axis("Torque at the load", "N m", "N m"),
+                Axis("Rate", "rad/s", "deg/s"),
+                [_ramp(each) for each in shown],
+                "One ramp of each",
+                [Mark("counts as turning", y=sliding_rate)],
+            ),
+            *(
+                Panel(
+                    _numbered(last),
+                    Axis("Breakaway torque", "N m", "N m"),
+                    _dots(each, place, last + BEHIND),
+                    each.name.capitalize(),
+                )
+                for each in shown
+            ),
+        ),
+        across=2,
+        trials=trials,
+    )
+
+
+def _ramp(each: Shown) -> Curve:
+    """Size of rate over size of torque."""
+    recording = each.ramp.recording()
+    torque, rate = np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
+    return Curve(torque, rate, each.name, each.name, "thin")
+
+
+def _dots(each: Shown, place: Mapping[str, Value], behind: float) -> tuple[Curve, Curve]:
+    """The readings by their numbers, and their mean behind them."""
+    own = {**place, "component": each.name}
+    numbers = np.array(each.numbers, dtype=float)
+    readings = Curve.of(numbers, each.torques, each.name, each.name)
+    mean = Curve.of(np.array([behind]), [each.mean], each.name, each.name)
+    return (
+        replace(readings, quantity=TORQUE, along="measurement", conditions=own),
+        replace(mean, quantity=TORQUE, conditions={**own, "statistic": "mean"}),
+    )
+
+
+def _numbered(count: int) -> Axis:
+    """The measurements by number, as many as there is room for, and their mean behind them."""
+    step = -(-count // NUMBERS)
+    names = ((float(number), str(number)) for number in range(1, count + 1, step))
+    return Axis("Measurement", places=(*names, (count + BEHIND, "mean")))
+
+
+def _what_shows(shown: Sequence[Shown]) -> str:
+    """Means of the components, the largest first, and on which steps readings fall."""
+    order = sorted(shown, key=lambda each: -each.mean.value)
+    words = [f"{each.name} {amount(each.mean.value, 'N m')}" for each in order]
+    told = sentence(f"on average {listed(words)}")
+    behind = [each for each in shown if each.count > 0]
+    if not behind:
+        return told
+    step, names = amount(behind[0].count, "N m"), listed([each.name for each in behind])
+    steps = f"One count of the sensor is {step} behind the gear"
+    return f"{told} {steps}: readings of {names} are multiples of it."

@@ -1,0 +1,292 @@
+"""The relative rate of a load under base motion, as a whole and where it passes zero."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.channels import BASE_RATE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE, missing
+from campaign.experiments.shared.common import method_label
+from campaign.experiments.shared.pointing_error import rate_of
+from campaign.identification.relative_rate import RelativeRate, relative_rate
+from campaign.result import Array, Axis, Curve, Mark, Panel
+from campaign.trial import Recording
+
+TIME = Axis("Time", "s", "s")
+RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
+AWAY = Axis("Rate off the dotted line", "rad/s", "deg/s")
+BEFORE = 0.0133
+"""Time before the reversal in a zoom, as a share of the time shown ..."""
+AT_LEAST = 0.04
+"""... and at least (s): how long friction holds a load does not fall with the period ..."""
+MOST = 0.08
+"""... but never so much of the time shown that the next reversal is in the zoom, too: of a sine
+that is shown for 1.5 cycles it is 0.33 away."""
+WIDER = (1.0, 1.7, 3.0, 5.0)
+"""times as wide a zoom, one after the other, until every load is seen to break loose."""
+AFTER = 2.0
+"""Time after the reversal, as a share of that before it."""
+SEEN = 0.05
+"""Rate that must be seen, as a share of the zoom's half height."""
+FILTERED = 0.15
+"""Longest filter, as a share of the zoom's time ..."""
+WHOLE = (0.01, 0.02)
+"""... and of the whole motion: rate that must be seen, as a share of the hull's largest, and
+longest filter, as a share of the time shown."""
+HELD = "held still in space"
+SHORTEST = 10
+"""Samples of a recording that has anything to show."""
+SLOW = 0.15
+"""Share of the zoom's half height below which the load counts as carried along."""
+
+
+@dataclass(frozen=True)
+class Zoom:
+    """What is shown of a reversal: beginning, middle and end (s), and half the height (rad/s)."""
+
+    start: float
+    middle: float
+    stop: float
+    height: float
+
+    def of(self, time: Array) -> NDArray[np.bool_]:
+        return np.asarray((time >= self.start) & (time <= self.stop))
+
+
+@dataclass(frozen=True)
+class Slow:
+    """Beginning and end (s) of a time; `cut` where it goes on beyond what is shown or known."""
+
+    start: float
+    stop: float
+    cut: bool
+
+    @property
+    def words(self) -> str:
+        return f"{'over ' if self.cut else ''}{_time(self.stop - self.start)}"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The relative rate of one method in the zoom.
+
+    Attributes:
+        time: s, shape (n,); also of `held`, the rate of a load held still in space (rad/s).
+        rate: by the sensor that shows it.
+        slow: the time in which it is slow; None where the sensor is too coarse to see that.
+    """
+
+    time: Array
+    held: Array
+    rate: RelativeRate
+    slow: Slow | None
+
+    @property
+    def farthest(self) -> float:
+        """From the rate of a load held still (rad/s); NaN where nothing is known."""
+        away = np.abs(self.rate.values - self.held)
+        return float(np.nanmax(away)) if np.isfinite(away).any() else math.nan
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """Panels of the relative rate, and what is to be said of their picture.
+
+    Attributes:
+        words: sentences for the caption.
+    """
+
+    panels: tuple[Panel, ...]
+    words: str
+
+
+def can_be_shown(cut: Recording) -> bool:
+    """Whether it has the rates that a figure of them needs, and of the hull a motion."""
+    if missing((BASE_RATE, RELATIVE_RATE), cut.channels) or len(cut.time) < SHORTEST:
+        return False
+    return bool(np.nanmax(np.abs(cut[BASE_RATE]), initial=0.0) > 0)
+
+
+def reversal(cuts: Mapping[str, Recording]) -> Reversal:
+    """The whole motion with the first method, then a zoom on one reversal for each method.
+
+    Last, where there are several, what each is off a load held still, beside the others.
+
+    cuts: by method, on a time axis of their own; each `can_be_shown`.
+    """
+    name, first = next(iter(cuts.items()))
+    largest, span = float(np.nanmax(np.abs(first[BASE_RATE]))), float(np.ptp(first.time))
+    whole = _seen(first, WHOLE[0] * largest, WHOLE[1] * span)
+    zoom, shown = _zoomed(cuts, first)
+    panels = [
+        _whole_panel(name, first, whole, zoom),
+        *(_zoom_panel(method, each, zoom) for method, each in shown.items()),
+        *_away_panel(shown, zoom),
+    ]
+    sentences = (
+        *_filter_words(whole, list(shown.values())),
+        _slow_words(list(shown.values()), zoom),
+        _blind_words(first, list(shown.values()), zoom),
+    )
+    return Reversal(tuple(panels), " ".join(filter(None, sentences)))
+
+
+def _zoomed(cuts: Mapping[str, Recording], first: Recording) -> tuple[Zoom, dict[str, Shown]]:
+    """The smallest zoom in which every load is seen to come out of its slow time, if any is."""
+    for wider in WIDER:
+        zoom = _zoom(first, wider)
+        shown = {method: _near(cut, zoom) for method, cut in cuts.items()}
+        if not any(each.slow is not None and each.slow.cut for each in shown.values()):
+            break
+    return zoom, shown
+
+
+def _zoom(recording: Recording, wider: float) -> Zoom:
+    """Around the middle one of the hull's reversals."""
+    time, rate = recording.time, recording[BASE_RATE]
+    changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
+    span = float(np.ptp(time))
+    middle = float(time[changes[len(changes) // 2]]) if len(changes) else 0.5 * span
+    before = min(wider * max(BEFORE * span, AT_LEAST), MOST * span)
+    start, stop = middle - before, middle + AFTER * before
+    inside = (time >= start) & (time <= middle + before)
+    return Zoom(start, middle, stop, float(np.nanmax(np.abs(rate[inside]), initial=0.0)) or 1.0)
+
+
+def _seen(cut: Recording, finest: float, longest: float) -> RelativeRate:
+    """The relative rate by what shows `finest` (rad/s), filtered over at most `longest` (s)."""
+    angle, gyro = (
+        cut[name] if name in cut.channels else None for name in (RELATIVE_ANGLE, GYRO_RATE)
+    )
+    step = 1.0 / rate_of(cut)
+    return relative_rate(cut[RELATIVE_RATE], angle, gyro, cut[BASE_RATE], step, finest, longest)
+
+
+def _near(cut: Recording, zoom: Zoom) -> Shown:
+    rate = _seen(cut, SEEN * zoom.height, FILTERED * (zoom.stop - zoom.start))
+    inside = zoom.of(cut.time)
+    time, values = cut.time[inside], rate.values[inside]
+    seen = rate.finest < SLOW * zoom.height
+    slow = _slow(time, values, zoom) if seen else None
+    return Shown(time, -cut[BASE_RATE][inside], replace(rate, values=values), slow)
+
+
+def _slow(time: Array, rate: Array, zoom: Zoom) -> Slow | None:
+    """The slow time that is nearest to the reversal; None where it is never slow."""
+    slow = np.abs(rate) < SLOW * zoom.height
+    places = np.flatnonzero(slow)
+    if not len(places):
+        return None
+    start = stop = int(places[np.argmin(np.abs(time[places] - zoom.middle))])
+    while start > 0 and slow[start - 1]:
+        start -= 1
+    while stop < len(slow) - 1 and slow[stop + 1]:
+        stop += 1
+    cut = start == 0 or stop == len(slow) - 1
+    cut = cut or not np.isfinite(rate[[start - 1, stop + 1]]).all()
+    return Slow(float(time[start]), float(time[stop]), cut)
+
+
+def _whole_panel(name: str, cut: Recording, rate: RelativeRate, zoom: Zoom) -> Panel:
+    curves = [
+        Curve(cut.time, rate.values, method_label(name), name),
+        Curve(cut.time, -cut[BASE_RATE], HELD, "reference", "thin"),
+    ]
+    mark = Mark("zoom", x=zoom.start, until=zoom.stop)
+    return Panel(TIME, RATE, curves, f"Whole motion: {method_label(name)}", [mark])
+
+
+def _zoom_panel(name: str, shown: Shown, zoom: Zoom) -> Panel:
+    time = replace(TIME, limits=(zoom.start, zoom.stop))
+    rate = replace(RATE, limits=(-zoom.height, zoom.height))
+    curves = [
+        Curve(shown.time, shown.held, HELD, "reference", "thin"),
+        Curve(shown.time, shown.rate.values, method_label(name), name),
+    ]
+    marks = []
+    if shown.slow is not None:
+        label, slow = f"slow for {shown.slow.words}", shown.slow
+        marks.append(Mark(label, x=slow.start, until=slow.stop, series=name))
+    title = method_label(name)
+    if np.isfinite(shown.farthest):
+        title += f": {_degrees(shown.farthest)} deg/s off"
+    return Panel(time, rate, curves, title, marks)
+
+
+def _away_panel(shown: Mapping[str, Shown], zoom: Zoom) -> Iterator[Panel]:
+    """How far off a load held still each method's is: what differs most, so in one panel."""
+    curves = [
+        Curve(each.time, each.rate.values - each.held, method_label(name), name)
+        for name, each in shown.items()
+        if np.isfinite(each.farthest)
+    ]
+    if len(curves) > 1:
+        time = replace(TIME, limits=(zoom.start, zoom.stop))
+        yield Panel(time, AWAY, curves, "All, less a load held still")
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.rad2deg(angle):.2g}"
+
+
+def _filter_words(whole: RelativeRate, shown: Sequence[Shown]) -> Iterator[str]:
+    """How the rates were come by; nothing for those that are as they were recorded."""
+    zooms = list(dict.fromkeys(_how(each.rate) for each in shown))
+    if zooms == [_how(whole)]:
+        yield f"All rates are {zooms[0]}." if zooms[0] else ""
+        return
+    if _how(whole):
+        yield f"The whole motion is {_how(whole)}."
+    for how in filter(None, zooms):
+        yield f"{'The zooms are' if len(zooms) == 1 else 'Zooms are'} {how}."
+
+
+def _how(rate: RelativeRate) -> str:
+    if rate.sensor == "gyro":
+        averaged = f", averaged over {_time(rate.window)}" if rate.window else ""
+        return (
+            f"the difference of the rates of load and hull in space{averaged}, because counts of "
+            "the encoder are too coarse"
+        )
+    if not rate.window:
+        return ""
+    return (
+        f"the slope of a line through {_time(rate.window)} of the encoder's samples, a filter "
+        f"that delays nothing and tells {_degrees(rate.finest)} deg/s apart"
+    )
+
+
+def _slow_words(shown: Sequence[Shown], zoom: Zoom) -> str:
+    """What is shaded, and how long a load held still would take."""
+    if all(each.slow is None for each in shown):
+        return ""
+    held = _slow(shown[0].time, shown[0].held, zoom)
+    beside = f"; a load held still is for {held.words}" if held else ""
+    limit = _degrees(SLOW * zoom.height)
+    return f"Shaded: while the load is slower than {limit} deg/s relative to the hull{beside}."
+
+
+def _blind_words(first: Recording, shown: Sequence[Shown], zoom: Zoom) -> str:
+    """Until when an encoder does not tell a load that sticks from one that is held still."""
+    count = max((each.rate.blind for each in shown), default=0.0)
+    if not count:
+        return ""
+    moved = np.cumsum(first[BASE_RATE]) / rate_of(first)
+    at = int(np.argmin(np.abs(first.time - zoom.middle)))
+    beyond = np.abs(moved - moved[at]) >= count
+    after, before = beyond[at:], beyond[at::-1]
+    if not after.any() or not before.any():
+        return ""
+    time = (int(np.argmax(after)) + int(np.argmax(before))) / rate_of(first)
+    return (
+        f"For {_time(time)} around the reversal the hull moves by less than one count of the "
+        f"encoder ({_degrees(count)} deg): whether the load sticks in that time cannot be seen."
+    )

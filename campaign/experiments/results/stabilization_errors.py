@@ -1,0 +1,216 @@
+"""The error of each method, with its interval: side by side, or along a swept number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.experiments.shared.common import method_label, short_label
+from campaign.experiments.shared.pointing_error import ends
+from campaign.experiments.shared.swept_words import axis_of, name_of, words
+from campaign.options import Options
+from campaign.result import Axis, Cell, Curve, Figure, Panel, Value
+from campaign.trial import Trial
+
+COMPENSATION = "compensation"
+FOUND = frozenset({"error", "peak", "stuck", "repeats", "spread", "next"})
+"""Entries of a row that are no condition."""
+BARE = frozenset({"frequency", "acceleration", "motion"})
+"""Conditions whose unit, or word, says what they are."""
+SEVERAL = 3
+"""Values of a swept number from which on it has an axis; two stand side by side."""
+MOST_PANELS = 6
+WIDE = 20.0
+"""Ratio of the largest to the smallest error from which on their axis is logarithmic."""
+DECADE = 10.0
+"""Ratio of the largest to the smallest swept value from which on their axis is."""
+
+Rows = Sequence[Mapping[str, Cell]]
+
+
+def error_figures(
+    rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]
+) -> Iterator[Figure]:
+    """One figure for each number that is swept, two at most; without such one by method."""
+    known = [row for row in rows if _error(row) is not None]
+    swept = [path for path in paths if len(_numbers(known, path)) >= SEVERAL][:2]
+    for path in swept:
+        yield _along(path, known, paths, trial, options)
+    if not swept and len(known) > 1:
+        yield _by_method(known, paths, trial, options)
+
+
+def _error(row: Mapping[str, Cell]) -> Estimate | None:
+    error = row["error"]
+    return error if isinstance(error, Estimate) and np.isfinite(error.value) else None
+
+
+def _numbers(rows: Rows, path: str) -> set[float]:
+    values = (row.get(path) for row in rows if path != COMPENSATION)
+    return {float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool)}
+
+
+def _conditions(row: Mapping[str, Cell]) -> dict[str, Value]:
+    return {
+        name: value
+        for name, value in row.items()
+        if name not in FOUND and not isinstance(value, Estimate)
+    }
+
+
+def _places(rows: Rows, paths: Sequence[str], *without: str) -> list[tuple[dict[str, Value], Rows]]:
+    """Rows that differ in nothing but `without`, with what they have in common of the sweep."""
+    places: list[tuple[dict[str, Value], list[Mapping[str, Cell]]]] = []
+    for row in rows:
+        told = {p: v for p, v in _conditions(row).items() if p in paths and p not in without}
+        same = next((group for known, group in places if known == told), None)
+        if same is None:
+            places.append((told, [row]))
+        else:
+            same.append(row)
+    return [(told, group) for told, group in places]
+
+
+def _along(
+    path: str, rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]
+) -> Figure:
+    places = _places(rows, paths, COMPENSATION, path)
+    axis, values = axis_of(path, trial, options), _numbers(rows, path)
+    if min(values) > 0 and max(values) >= DECADE * min(values):
+        axis = replace(axis, scale="log")
+    panels = [
+        Panel(axis, _axis(rows), _curves_along(path, group), _title(told, trial, options))
+        for told, group in places[:MOST_PANELS]
+    ]
+    key = "".join(c if c.isalnum() else "-" for c in path.lower())
+    return Figure(
+        key=f"error-over-{key}",
+        title=f"Stabilization error over {name_of(path)}",
+        caption=f"Error (1σ) of each method along the sweep{_where(rows, path, trial, options)}"
+        f"{_with_interval(rows)}.{_left_out(places)}",
+        alt=f"Stabilization error over {name_of(path)}, one curve per compensation method.",
+        panels=tuple(panels),
+        across=min(2, len(panels)),
+    )
+
+
+def _curves_along(path: str, rows: Rows) -> list[Curve]:
+    methods: dict[str, list[tuple[float, Estimate, Mapping[str, Cell]]]] = {}
+    for row in rows:
+        value, error = row.get(path), _error(row)
+        if isinstance(value, int | float) and error is not None:
+            methods.setdefault(str(row[COMPENSATION]), []).append((float(value), error, row))
+    curves = []
+    for name, points in methods.items():
+        points.sort(key=lambda point: point[0])
+        low, high = ends([error for _, error, _ in points])
+        told = _conditions(points[0][2])
+        told.pop(path, None)
+        curves.append(
+            Curve(
+                np.array([x for x, _, _ in points]),
+                np.array([error.value for _, error, _ in points]),
+                method_label(name),
+                name,
+                "line+points",
+                low=low,
+                high=high,
+                quantity="stabilization_error",
+                along=path,
+                conditions=told,
+            )
+        )
+    return curves
+
+
+def _by_method(rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]) -> Figure:
+    methods = list(dict.fromkeys(str(row[COMPENSATION]) for row in rows))
+    axis = method_axis(methods)
+    places = _places(rows, paths, COMPENSATION)
+    panels = [
+        Panel(
+            axis,
+            _axis(rows),
+            [_dot(row, methods) for row in group],
+            _title(told, trial, options),
+        )
+        for told, group in places[:MOST_PANELS]
+    ]
+    return Figure(
+        key="error-by-method",
+        title="Stabilization error by compensation method",
+        caption=f"Error (1σ) of each method{_where(rows, '', trial, options)}"
+        f"{_with_interval(rows)}.{_left_out(places)}",
+        alt="Stabilization error, one dot with its interval for each compensation method.",
+        panels=tuple(panels),
+        across=min(2, len(panels)),
+        one_scale=True,
+    )
+
+
+def method_axis(methods: Sequence[str]) -> Axis:
+    """An axis with a place for each method, from 0."""
+    places = tuple((float(k), short_label(name)) for k, name in enumerate(methods))
+    return Axis("Compensation", limits=(-0.5, len(methods) - 0.5), places=places)
+
+
+def _dot(row: Mapping[str, Cell], methods: Sequence[str]) -> Curve:
+    method, error = str(row[COMPENSATION]), _error(row)
+    assert error is not None  # noqa: S101 (for the type checker; its rows have one)
+    low, high = ends([error])
+    return Curve(
+        np.array([float(methods.index(method))]),
+        np.array([error.value]),
+        "",
+        method,
+        "points",
+        low=low,
+        high=high,
+        quantity="stabilization_error",
+        conditions=_conditions(row),
+    )
+
+
+def _axis(rows: Rows) -> Axis:
+    """One scale for all panels, from zero where no error is far below another."""
+    found = [error.value for row in rows if (error := _error(row)) is not None]
+    positive = [value for value in found if value > 0]
+    wide = len(positive) == len(found) and max(positive) > WIDE * min(positive)
+    label = "Stabilization error (1σ)"
+    if wide:
+        return Axis(label, "rad", "mrad", scale="log")
+    return Axis(label, "rad", "mrad", limits=(0.0, math.nan))
+
+
+def _title(told: Mapping[str, Value], trial: Trial, options: type[Options]) -> str:
+    title = ", ".join(words(told, trial, options, BARE))
+    return title[:1].upper() + title[1:]
+
+
+def _where(rows: Rows, along: str, trial: Trial, options: type[Options]) -> str:
+    """` at 36 deg/s²`: what of the motion is the same in all rows; "" for nothing."""
+    same = {
+        name: rows[0].get(name)
+        for name in ("frequency", "acceleration")
+        if name != along and len({row.get(name) for row in rows}) == 1
+    }
+    shown = {name: value for name, value in same.items() if isinstance(value, int | float)}
+    text = " and ".join(words(shown, trial, options, BARE))
+    return f" at {text}" if text else ""
+
+
+def _with_interval(rows: Rows) -> str:
+    has = [error.has_interval for row in rows if (error := _error(row)) is not None]
+    if all(has):
+        return ", with its 95 % interval"
+    return ", with its 95 % interval where there is one" if any(has) else ""
+
+
+def _left_out(places: Sequence[object]) -> str:
+    if len(places) <= MOST_PANELS:
+        return ""
+    return f" Shown are the first {MOST_PANELS} of {len(places)} conditions; the table has all."

@@ -1,0 +1,63 @@
+"""Swept values as people read them: with a name, in the unit that they are read in.
+
+A path is an option of the test (`frequency`) or a value of its bench (`bench.gear.preload.torque`);
+its quantity stands where it is declared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from campaign.experiments.interface import bench_of
+from campaign.options import Options, describe
+from campaign.physics.known import number_at
+from campaign.result import Axis, Value
+from campaign.text import pretty_unit
+from campaign.trial import Trial
+from campaign.units import Quantity, convert
+
+BENCH = "bench."
+
+
+def quantity_of(path: str, trial: Trial, options: type[Options]) -> Quantity | None:
+    """What a swept number is; None for a number without unit, and for anything else."""
+    if path.startswith(BENCH):
+        found = number_at(bench_of(trial), path.removeprefix(BENCH))
+        return found[1] if found else None
+    return next((info.quantity for info in describe(options) if info.name == path), None)
+
+
+def name_of(path: str) -> str:
+    """A path in words: `preload torque` for `bench.gear.preload.torque`."""
+    return " ".join(path.removeprefix(BENCH).split(".")[-2:]).replace("_", " ")
+
+
+def shown_value(value: object, quantity: Quantity | None) -> str:
+    """A swept value (SI) in words: `0.24 Hz`, `18 deg/s²`, `yes`."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, int | float):
+        return str(value)
+    if quantity is None:
+        return f"{value:.4g}"
+    number = convert(float(value), quantity.si, quantity.display)
+    return f"{number:.4g} {pretty_unit(quantity.display)}"
+
+
+def words(
+    point: Mapping[str, Value],
+    trial: Trial,
+    options: type[Options],
+    bare: frozenset[str] = frozenset(),
+) -> Iterator[str]:
+    """Each value of a point: `0.24 Hz` for the paths in `bare`, `preload torque 50 N·m` else."""
+    for path, value in point.items():
+        text = shown_value(value, quantity_of(path, trial, options))
+        yield text if path in bare else f"{name_of(path)} {text}"
+
+
+def axis_of(path: str, trial: Trial, options: type[Options]) -> Axis:
+    """The axis along a swept number."""
+    quantity, name = quantity_of(path, trial, options), name_of(path)
+    label = name[:1].upper() + name[1:]
+    return Axis(label, quantity.si, quantity.display) if quantity else Axis(label)
