@@ -4,15 +4,20 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 PINNED := --quiet --constraint constraints.txt
+NPM := tests/browser/node_modules
+# No package runs a script of its own when it is installed.
+NPM_CI := npm ci --prefix tests/browser --ignore-scripts --no-audit --no-fund
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak mutants check format clean
+.PHONY: help demo test soak mutants browser-tools lighthouse check format clean
 
 help:
 	@echo "make demo     run the quick-start protocol on the simulated bench and report it"
 	@echo "make test     run the whole test suite"
 	@echo "make soak     wear: hundreds of kills, thousands of damaged files, a million frames (long)"
 	@echo "make mutants  put small bugs into what keeps the bench safe: do the tests notice? (long)"
+	@echo "make browser-tools  what tests of the page in a browser need from npm; they skip without"
+	@echo "make lighthouse REPORT=FOLDER  scores of a report's page, served compressed"
 	@echo "make check    lint, formatting, types, import contracts"
 	@echo "make format   put the code into the project's format"
 	@echo "make clean    remove the environment and everything built (results/ stays)"
@@ -33,6 +38,12 @@ soak: $(VENV)/installed-test
 mutants: $(VENV)/installed-mutants
 	$(BIN)/python tests/mutants/run.py $(MUTANTS_OPTIONS)
 
+browser-tools: $(NPM)/.package-lock.json
+
+lighthouse: $(VENV)/installed-test
+	$(NPM_CI) --silent
+	$(BIN)/python benchmarks/lighthouse.py $(REPORT)
+
 check: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -44,7 +55,7 @@ format: $(VENV)/installed-test
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(NPM) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Build tools are pinned as well, hence no isolated (unpinned) build environment.
@@ -55,6 +66,11 @@ $(VENV)/installed: $(VENV)/made pyproject.toml constraints.txt
 
 $(VENV)/installed-test: $(VENV)/installed
 	$(PIP) install $(PINNED) --no-build-isolation --editable ".[test]"
+	@touch $@
+
+# npm writes this file last; Lighthouse (dev) is large, and no test needs it.
+$(NPM)/.package-lock.json: tests/browser/package.json tests/browser/package-lock.json
+	$(NPM_CI) --omit=dev --silent
 	@touch $@
 
 $(VENV)/installed-mutants: $(VENV)/installed-test

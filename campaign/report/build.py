@@ -2,33 +2,47 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
-from typing import Any
 
-from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
-from campaign.archive.reading.damage_words import listed, lost_trials
+from campaign.archive.reading.damage_words import listed
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
-from campaign.published.scoreboard import Scoreboard, score
-from campaign.report import lines, page, tables
-from campaign.report.analysis import analyse_run, one_line, published_of
-from campaign.report.besides import besides
-from campaign.report.damage_notice import told_on_page
+from campaign.report.content import lines, tables
+from campaign.report.content.citation import citation_of
+from campaign.report.content.document import Document, document_of
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
+from campaign.report.formats.as_json import report_json
+from campaign.report.formats.interface import Format, Written
+from campaign.report.made_before import Formats, all_formats, made_before, remember
 from campaign.report.output import replaced_folder
+from campaign.report.page.damage_notice import Notice, told_on_page
+from campaign.report.page.drawings import Drawable, Key
+from campaign.report.page.folder import Folder
+from campaign.report.page.interactive import interactive
+from campaign.report.page.layout import Layout, drawn_here, lay_out
+from campaign.report.page.policy import policy
+from campaign.report.page.templates import Templates
+from campaign.report.page.trial_links import trial_links
+from campaign.report.page.trial_page import trial_pages
 from campaign.report.palette import variables
-from campaign.report.truth import truth_tables
-from campaign.trial import Outcome
+from campaign.report.processes import workers
 
 FAILED = 200
 """Most failed trials that are listed; the archive has them all."""
-ANEW = "the program that made this page, whatever is archived"
 DAMAGED = 200
 """Most damage that is listed on the page; `tables/damaged.csv` has all."""
+
+
+def _nothing(_: Document) -> None:
+    """Nobody wants to know."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +53,19 @@ class Report:
         path: of `report.html`.
         problems: analyses that failed and numbers that could not be compared, one line each.
         damaged: what of the run is damaged, as far as the report looked at it; all else is there.
+        layout: what the page shows, for other formats.
+        notice: what the page says of the damage; None without any.
+        files: names of all that was written, within the folder.
+        left_out: what an earlier report in the folder had and this one could not make, and why.
     """
 
     path: Path
     problems: tuple[str, ...]
-    damaged: tuple[Damage, ...] = ()
+    damaged: tuple[Damage, ...]
+    layout: Layout = field(repr=False)
+    notice: Notice | None
+    files: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 def build_report(
@@ -54,24 +76,82 @@ def build_report(
     packaged_templates: Path,
     templates: Path | None = None,
     measure_anew: bool = False,
+    processes: int = 1,
+    formats: Sequence[Format] = (),
+    trials: Sequence[int] = (),
+    zoom: bool = False,
+    command: str = "",
+    when_found: Callable[[Document], None] = _nothing,
 ) -> Report:
-    """Write `report.html`, `tables/` and `figures/` of `run` into the folder `output`.
+    """Write `report.html`, `report.json`, `tables/` and `figures/` of `run` into `output`.
 
     The same archive gives the same bytes. A template in `templates` wins over the packaged one of
-    the same name. `measure_anew`: as for `analyse_run`.
+    the same name. `measure_anew`: as for `analyse_run`. `formats`: what is written besides.
+    `trials`: those that get a page of their own, as `chosen_trials` has them. Of `processes` more
+    than one analyse and draw with the experiments that are installed, whatever `experiments` are.
+    `zoom`: the page's lines can be zoomed into by who has scripts; nothing else is different.
+    `command`: what the page says to type for the report; made from the run's name when empty.
+    Formats and trials' pages that an earlier report of the run left in `output` are made anew.
+    `when_found` is told what was found while the drawings of it are made.
 
-    Raises UsageError when `output` is no report of ours or cannot be written, or when a template is
-    wrong; an older report is then left as it was.
+    Raises UsageError when `output` is no report of ours or cannot be written, when a template is
+    wrong, or when one of the formats cannot be made; an older report is then left as it was.
     """
-    html, folder, report = render(
-        run, output, experiments, packaged_templates, templates, measure_anew
-    )
+    before = made_before(output, run)
+    kinds = all_formats(formats, before)
+    trials = sorted({*trials, *before.trials})
+    with also_as_pdf() if any(each.pdf_figures for each in kinds.all) else nullcontext():
+        html, folder, report = render(
+            run,
+            output,
+            experiments,
+            packaged_templates,
+            templates,
+            measure_anew,
+            trials=trials,
+            processes=processes,
+            zoom=zoom,
+            command=command,
+            when_found=when_found,
+        )
+    own_pages = trial_pages(report.layout, trials, Templates(packaged_templates, templates))
+    pages = {"report.html": html, "report.json": report_json(report.layout), **folder.files}
     with replaced_folder(output) as new:
-        for name, text in {"report.html": html, **folder.files}.items():
+        for name, text in chain(pages.items(), own_pages):
             path = new / name
             path.parent.mkdir(exist_ok=True)
             path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
-    return report
+        added = _write_formats(kinds, Written(report.layout, report.notice, new))
+        files = _files(new)
+        remember(new, run, added, trials)
+    return replace(report, files=tuple(sorted(files)), left_out=tuple(kinds.left_out))
+
+
+def _write_formats(kinds: Formats, written: Written) -> dict[str, set[str]]:
+    """The files that each format has added, by its name."""
+    added: dict[str, set[str]] = {}
+    for each in kinds.all:
+        there = _files(written.folder)
+        try:
+            each.write(written)
+        except UsageError as error:
+            if each in kinds.asked:
+                raise
+            kinds.leave_out(each.name, error)
+            for name in _files(written.folder) - there:
+                (written.folder / name).unlink()
+        else:
+            added[each.name] = _files(written.folder) - there
+    return added
+
+
+def _files(folder: Path) -> set[str]:
+    """Names of all but hidden files."""
+    return {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and not path.name.startswith(".")
+    }
 
 
 def render(
@@ -81,111 +161,52 @@ def render(
     packaged_templates: Path,
     templates: Path | None = None,
     measure_anew: bool = False,
-) -> tuple[str, page.Folder, Report]:
-    """The page's text, the other files, and what there is to say of them; nothing is written."""
-    published = published_of(run)
-    tests = analyse_run(run, experiments, measure_anew=measure_anew)
-    scoreboard = score(published, [test.evidence() for test in tests])
-    folder = page.Folder()
-    download = page.scoreboard_download(scoreboard, folder)
-    picture = page.overview(scoreboard, folder)
-    strips = page.strips(scoreboard, folder)
-    truths = truth_tables(run, tests)
-    sections = page.lay_out(tests, scoreboard, published, folder, truths)
-    happened = besides(run, folder)
-    found = [damage for test in tests for damage in test.damaged]
-    damaged = tuple(dict.fromkeys((*run.damaged, *found, *happened.damaged)))
-    problems = (
-        *(f"{s.test.name}: {p}" for s in sections for p in s.problems if p not in s.left_out),
-        *scoreboard.problems,
-        *happened.problems,
-    )
+    *,
+    trials: Sequence[int] = (),
+    processes: int = 1,
+    zoom: bool = False,
+    command: str = "",
+    when_found: Callable[[Document], None] = _nothing,
+) -> tuple[str, Folder, Report]:
+    """The page's text, the other files, and what there is to say of them; nothing is written.
+
+    `trials`: those that will have a page of their own. `command`: what to type for the report.
+    """
+    filled = Templates(packaged_templates, templates)
+    with workers(run, processes) as at_work:
+        found = at_work.found(measure_anew=measure_anew)
+        document = document_of(run, experiments, measure_anew=measure_anew, found=found)
+
+        def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+            # Sheets are kept as PDF where they are drawn.
+            begun = drawn_here(drawings) if keeps_pdf() else at_work.draw(drawings)
+            when_found(document)
+            return begun
+
+        layout = lay_out(document, begin_to_draw, command)
+    damage = listed(document.damaged, DAMAGED)
+    notice = told_on_page(run, document.damaged, layout.folder) if document.damaged else None
+    added = interactive(layout.figures) if zoom else None
     context = {
+        "document": document,
+        "layout": layout,
         "run": run,
         "header": run.header,
+        "citation": citation_of(run),
         "colours": variables(),
-        "agreement": tables.agreement(scoreboard),
-        "picture": picture,
-        "strips": strips,
-        "scoreboard": [lines.shown_line(line) for line in scoreboard.lines],
-        "scoreboard_download": download,
-        "statuses": lines.statuses(scoreboard),
-        "altered": scoreboard.altered,
-        "sections": sections,
-        "besides": happened,
-        "anchors": page.anchors(sections),
-        "failed": _failed(run.trials),
-        "failed_count": sum(t.ending.outcome is not Outcome.COMPLETED for t in run.trials),
-        "contradictions": lines.contradictions(scoreboard),
-        "sources": _sources_of(scoreboard, published),
-        "problems": (*(f"damaged: {line}" for line in listed(damaged, DAMAGED)), *problems),
-        "damage": told_on_page(run, damaged, folder) if damaged else None,
-        "command": _command(run),
-        "seeds": _seeds(run.trials),
-        "measured_by": ANEW if measure_anew else _measured_by(run.trials),
-        "lost": len(lost_trials(run)),
-        "not_executed": max(0, len(run.plan) - len(run.trials) - len(lost_trials(run))),
+        "interactive": added,
+        "policy": policy(*([added.script] if added else [])),
+        "agreement": tables.agreement(document.scoreboard),
+        "scoreboard": [lines.shown_line(line) for line in document.scoreboard.lines],
+        "statuses": lines.statuses(document.scoreboard),
+        "anchors": {section.test.name: section.anchor for section in layout.sections},
+        "failed": document.failed[:FAILED],
+        "contradictions": lines.contradictions(document.scoreboard),
+        "problems": (*(f"damaged: {line}" for line in damage), *layout.problems),
+        "damage": notice,
+        "trial_link": trial_links(trials),
     }
-    html = _fill(context, packaged_templates, templates)
-    return html, folder, Report(output / "report.html", problems, damaged)
-
-
-def _fill(context: Mapping[str, Any], packaged: Path, own: Path | None) -> str:
-    """The page from its templates: autoescaped, and an unknown name is an error."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
-
-    if own is not None and not own.is_dir():
-        raise UsageError(f"{own}: is no folder of templates")
-    folders = [str(folder) for folder in (own, packaged) if folder is not None]
-    environment = Environment(
-        loader=FileSystemLoader(folders),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    try:
-        return environment.get_template("report.html").render(context) + "\n"
-    except TemplateError as error:
-        place = f"{getattr(error, 'name', None) or 'report.html'}:{getattr(error, 'lineno', '?')}"
-        raise UsageError(f"template {place.removesuffix(':?')}: {one_line(error)}") from None
-
-
-def _failed(trials: tuple[ArchivedTrial, ...]) -> tuple[ArchivedTrial, ...]:
-    failed = (trial for trial in trials if trial.ending.outcome is not Outcome.COMPLETED)
-    return tuple(trial for trial, _ in zip(failed, range(FAILED), strict=False))
-
-
-def _sources_of(scoreboard: Scoreboard, published: Mapping[str, Any]) -> tuple[str, ...]:
-    """The documents whose numbers are on the page."""
-    return tuple(dict.fromkeys(published[name].source for name in scoreboard.tables()))
-
-
-def _seeds(trials: tuple[ArchivedTrial, ...]) -> str:
-    seeds = sorted({trial.trial.seed for trial in trials})
-    if len(seeds) <= 4:
-        return ", ".join(str(seed) for seed in seeds)
-    return f"{len(seeds)} seeds from {seeds[0]} to {seeds[-1]}, one per trial in the archive"
-
-
-def _measured_by(trials: tuple[ArchivedTrial, ...]) -> str:
-    """Whose code found what each recording says by itself, when it was executed."""
-    return "; ".join(sorted({trial.measured_by for trial in trials if trial.measured_by}))
-
-
-def _command(run: RunReader) -> str:
-    """What repeats this run, where its protocol lies."""
-    return shlex.join(_command_words(run))
-
-
-def _command_words(run: RunReader) -> Iterator[str]:
-    header = run.header
-    yield from ("campaign", "run", f"{header.protocol_name or 'protocol'}.toml")
-    if header.backend and header.backend != "sim":
-        yield from ("--backend", header.backend)
-    for test in header.only:
-        yield from ("--only", test)
-    if header.truth.option:
-        yield from ("--truth", Path(header.truth.option).name)
-    for path, value in sorted(header.overrides.items()):
-        yield from ("--set", f"{path}={value}")
+    html = filled.fill("report.html", context)
+    page = output / "report.html"
+    report = Report(page, layout.problems, document.damaged, layout, notice)
+    return html, layout.folder, report

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterator
@@ -11,15 +12,22 @@ from pathlib import Path
 from campaign.errors import UsageError
 
 MARKER = ".campaign-report"
-"""A file that says the folder is a report and may be replaced by a newer one."""
+"""A file that says the folder is a report and may be replaced by a newer one.
+
+Its first line is for people; each further one has the SHA-256 of a file that was written, and its
+name. Whatever else is in the folder, or was changed there, is somebody's own.
+"""
+EDITED = ".edited"
+"""What the name of a file ends with that somebody had changed, once there is a new one."""
 
 
 @contextmanager
 def replaced_folder(output: Path) -> Iterator[Path]:
     """An empty folder beside `output` that takes its place when the block ends without an error.
 
-    An older report at `output` stays until then, and stays for good when the block fails. Raises
-    UsageError when `output` is something other than a report, or cannot be written.
+    An older report at `output` stays until then, and stays for good when the block fails. Files
+    that somebody has put into it, or changed, are carried over. Raises UsageError when `output` is
+    something other than a report, or cannot be written.
     """
     _refuse_foreign(output)
     new = output.with_name(f".{output.name}.new-{os.getpid()}")
@@ -28,15 +36,45 @@ def replaced_folder(output: Path) -> Iterator[Path]:
         output.parent.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir()
-        told = "This folder is written by campaign and replaced as a whole.\n"
-        (new / MARKER).write_text(told, encoding="utf-8")
+        (new / MARKER).touch()
         yield new
+        written = _digests(new)
+        _carry_over(output, new)
+        told = "This folder is written by campaign; what you put here yourself stays.\n"
+        lines = (f"{digest}  {name}\n" for name, digest in written.items())
+        (new / MARKER).write_text(told + "".join(lines), encoding="utf-8")
         _swap(new, output, old)
     except OSError as error:
         raise UsageError(f"{output}: the report cannot be written: {error.strerror}") from None
     finally:
         shutil.rmtree(new, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of each file but the marker, by its path in the folder, sorted."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MARKER)
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+    }
+
+
+def _carry_over(output: Path, new: Path) -> None:
+    """Copy what in the older report is not as it was written; of a former version nobody knows."""
+    marker = output / MARKER
+    lines = marker.read_text(encoding="utf-8").splitlines()[1:] if marker.is_file() else []
+    if not lines:
+        return
+    written = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    for name, digest in _digests(output).items():
+        if written.get(name) == digest:
+            continue
+        place = new / name
+        if place.exists() and place.read_bytes() != (output / name).read_bytes():
+            place = place.with_name(place.name + EDITED)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(output / name, place)
 
 
 def _refuse_foreign(output: Path) -> None:

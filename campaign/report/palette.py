@@ -6,7 +6,7 @@ Each colour has a light page's and a dark page's value; both reach the 3:1 contr
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from campaign.published.status import Status
@@ -40,8 +40,9 @@ _BLUE = ("#0067b0", "#5cb3f2")
 _ORANGE = ("#c9540a", "#ff9a56")
 _GREEN = ("#0b7a5c", "#3fd0a2")
 _GREY = ("#4c5158", "#c3c8ce")
+_SLATE = ("#33414f", "#b4c4d4")
 _RED = ("#b3202c", "#ff8087")
-_PURPLE = ("#8a3f9c", "#d69be6")
+_PURPLE = ("#8a3f9c", "#c684dc")
 _OLIVE = ("#7a6a00", "#d9c84a")
 _CYAN = ("#0b7a8c", "#54cfe0")
 _BROWN = ("#8f4a12", "#e0a878")
@@ -49,27 +50,43 @@ _INDIGO = ("#5a3ea8", "#b9a5f0")
 _PINK = ("#b8347c", "#f58fc4")
 
 SERIES = {
-    "none": Look("s-none", *_GREY, (), "o"),
+    "none": Look("s-none", *_GREY, (), "X"),
     "static": Look("s-static", *_ORANGE, (5.0, 1.6), "s"),
-    "lugre": Look("s-lugre", *_BLUE, (), "^"),
+    "lugre": Look("s-lugre", *_BLUE, (9.0, 1.4), "^"),
     "observer": Look("s-observer", *_GREEN, (5.0, 1.4, 1.2, 1.4), "D"),
-    "measured": Look("s-measured", *_GREY, (), "o"),
-    "fit": Look("s-fit", *_RED, (), "v"),
+    "positive": Look("s-positive", *_PURPLE, (7.0, 1.2, 1.2, 1.2), ">"),
+    "negative": Look("s-negative", *_OLIVE, (3.2, 1.2), "<"),
+    "measured": Look("s-measured", *_SLATE, (), "o"),
+    "fit": Look("s-fit", *_RED, (12.0, 1.6), "v"),
+    "alternative": Look("s-alternative", *_CYAN, (2.2, 1.2), "d"),
     "reference": Look("s-reference", MUTED.light, MUTED.dark, (1.2, 1.6), "x"),
 }
 """The series the program itself draws: the same look in every figure of every report."""
 
-OTHERS = (
-    Look("s-other-1", *_BLUE, (), "o"),
-    Look("s-other-2", *_ORANGE, (5.0, 1.6), "s"),
-    Look("s-other-3", *_GREEN, (5.0, 1.4, 1.2, 1.4), "D"),
-    Look("s-other-4", *_PURPLE, (2.4, 1.4), "^"),
-    Look("s-other-5", *_OLIVE, (8.0, 2.0), "v"),
-    Look("s-other-6", *_CYAN, (1.2, 1.6), "P"),
-    Look("s-other-7", *_PINK, (5.0, 1.2, 1.2, 1.2, 1.2, 1.2), "X"),
-    Look("s-other-8", *_RED, (3.5, 1.0), "d"),
+_COLOURS = (_BLUE, _ORANGE, _GREEN, _RED, _GREY, _PINK, _BROWN, _INDIGO)
+"""The first five are told apart by every eye: few charts have more lines."""
+_DASHES = (
+    (),
+    (5.5, 1.8),
+    (4.5, 1.2, 1.2, 1.2),
+    (1.6, 1.2),
+    (8.0, 2.0),
+    (5.0, 1.2, 1.2, 1.2, 1.2, 1.2),
+    (3.0, 1.0),
+    (10.0, 1.2, 2.0, 1.2),
 )
-"""For any other series, in the order a figure first names them."""
+_MARKERS = ("o", "s", "D", "^", "v", "P", "X", "d")
+
+
+def _other(place: int) -> Look:
+    """The look of a series without one of its own: no two of 64 share dash and marker."""
+    round_, within = divmod(place, len(_COLOURS))
+    marker = _MARKERS[(within + round_) % len(_MARKERS)]
+    return Look(f"s-other-{within + 1}", *_COLOURS[within], _DASHES[within], marker)
+
+
+OTHERS = tuple(_other(place) for place in range(len(_COLOURS) * len(_MARKERS)))
+"""For any other series, in the order in which a report first names them."""
 
 STATUS = {
     Status.SIMULATED: Look("st-simulated", *_BLUE, (), "o"),
@@ -88,13 +105,40 @@ STATUS = {
 
 def looks(series: Iterable[str]) -> dict[str, Look]:
     """A look for each series of one figure, in the order they appear in it."""
+    return looks_of_page([series])
+
+
+def looks_of_page(figures: Iterable[Iterable[str]]) -> dict[str, Look]:
+    """A look for each series of all figures of a page, the same in all of them.
+
+    figures: the names of each figure's series, in the order of the page. A series that has no look
+    of its own takes the first one that nothing beside it has, in any figure: two that are never
+    seen together may look alike.
+    """
     chosen: dict[str, Look] = {}
-    others = 0
-    for name in series:
+    beside: dict[str, dict[str, None]] = {}
+    for names in figures:
+        together = dict.fromkeys(names)
+        for name in together:
+            beside.setdefault(name, {}).update(together)
+    chosen |= {name: SERIES[name] for name in beside if name in SERIES}
+    for name, others in beside.items():
         if name not in chosen:
-            chosen[name] = SERIES.get(name) or OTHERS[others % len(OTHERS)]
-            others += name not in SERIES
+            chosen[name] = _unlike([chosen[other] for other in others if other in chosen])
     return chosen
+
+
+def _unlike(taken: Sequence[Look]) -> Look:
+    """A look that cannot be mistaken for any of those beside it, by colour nor in grey.
+
+    Where no colour or dash is left, dash and marker together are unlike; past 64 series looks
+    repeat.
+    """
+    colours, dashes = {look.light for look in taken}, {look.dash for look in taken}
+    pairs = {(look.dash, look.marker) for look in taken}
+    free = [look for look in OTHERS if (look.dash, look.marker) not in pairs]
+    clear = [look for look in free if look.light not in colours and look.dash not in dashes]
+    return next(iter(clear or free), OTHERS[len(taken) % len(OTHERS)])
 
 
 def variables() -> dict[str, tuple[str, str]]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from campaign.experiments import experiments
-from campaign.report.page import conditions_of
+from campaign.report.content.conditions import conditions_of
+from campaign.result import Result
 from campaign.trial import Trial
 from tests.experiments.laboratory import trials
 from tests.physics.benches import bench
@@ -24,6 +25,7 @@ def test_only_options_that_acted_are_conditions() -> None:
         test = SimpleNamespace(
             kind=closed.kind,
             bench=None,
+            result=Result(),
             source="",
             failed=(),
             trials=tuple(SimpleNamespace(trial=trial) for trial in asked),
@@ -33,7 +35,7 @@ def test_only_options_that_acted_are_conditions() -> None:
         return {name for name, _ in conditions_of(test)}  # type: ignore[arg-type]
 
     one, both = labels(closed), labels(closed, opened)
-    assert {"frequencies", "cycles", "settle time", "loop", "amplitude"} <= one
+    assert {"frequency (swept)", "cycles", "settle time", "loop", "amplitude"} <= one
     assert not {"lowest", "highest", "step", "torque", "max acceleration"} & one
     assert both - one == {"torque"}
     assert "amplitude" not in labels(opened)

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 
+from campaign.access.analysis import analyse_run
 from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
 from campaign.experiments.interface import TestData
-from campaign.report.analysis import analyse_run
 from campaign.result import Result
 from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
 

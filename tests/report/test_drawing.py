@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
 
-from campaign.report.decimate import decimate
-from campaign.report.figures import DENSE, draw, inline, pretty_unit
+from campaign.report.content.tables import show, table_csv
+from campaign.report.drawing import figures
+from campaign.report.drawing.curves import DENSE
+from campaign.report.drawing.decimate import decimate
+from campaign.report.drawing.figures import draw, inline, pretty_unit
 from campaign.report.palette import (
     INK,
     MUTED,
@@ -20,11 +25,11 @@ from campaign.report.palette import (
     STATUS,
     contrast,
     looks,
+    looks_of_page,
     variables,
 )
-from campaign.report.tables import show, table_csv
-from campaign.report.text import number, percent
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table
+from campaign.text import number, percent
 
 TIME = Axis("Time", "s", "ms")
 
@@ -84,7 +89,7 @@ def test_contrast_is_that_of_the_wcag() -> None:
     assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)
 
 
-@pytest.mark.parametrize("look", [*SERIES.values(), *OTHERS], ids=lambda look: look.name)
+@pytest.mark.parametrize("look", [*SERIES.values(), *OTHERS[:8]], ids=lambda look: look.name)
 def test_lines_stand_out_on_light_and_dark(look) -> None:
     assert contrast(look.light, PAPER.light) >= 3
     assert contrast(look.dark, PAPER.dark) >= 3
@@ -125,6 +130,18 @@ def test_the_four_methods_differ_to_every_eye(deficiency: str, shade: str) -> No
         assert difference > (12 if dashed else 20), (a, b)
 
 
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+@pytest.mark.parametrize("shade", ["light", "dark"])
+def test_the_first_five_series_without_a_look_of_their_own_differ_to_every_eye(
+    deficiency: str, shade: str
+) -> None:
+    matrix = DEFICIENCIES[deficiency]
+    seen = [lab(getattr(look, shade), matrix) for look in OTHERS[:5]]
+    least = min(np.linalg.norm(one - other) for one, other in combinations(seen, 2))
+    assert least > (30 if deficiency == "normal" else 10)
+    assert len({look.dash for look in OTHERS[:5]}) == 5
+
+
 def test_every_status_has_its_own_shape() -> None:
     markers = [look.marker for look in STATUS.values()]
     assert len(set(markers)) == len(markers)
@@ -133,6 +150,44 @@ def test_every_status_has_its_own_shape() -> None:
 def test_a_series_looks_the_same_whatever_is_beside_it() -> None:
     assert looks(["lugre"])["lugre"] is looks(["x", "y", "lugre"])["lugre"] is SERIES["lugre"]
     assert looks(["b", "a"]) == {"b": OTHERS[0], "a": OTHERS[1]}
+
+
+def test_a_series_keeps_its_look_through_a_page() -> None:
+    figures = [["lugre", "set 1"], ["set 2", "set 1", "positive"], ["loop"], ["set 2", "loop"]]
+    chosen = looks_of_page(figures)
+    assert set(chosen) == {name for names in figures for name in names}
+    assert chosen == looks_of_page([list(names) for names in figures])
+    assert (chosen["lugre"], chosen["positive"]) == (SERIES["lugre"], SERIES["positive"])
+    for names in figures:
+        assert len({chosen[name].light for name in names}) == len(names)
+        assert len({chosen[name].dash for name in names}) == len(names)
+
+
+@pytest.mark.parametrize("count", [2, 8, 60])
+def test_series_of_one_figure_differ_by_dash_or_mark(count: int) -> None:
+    chosen = looks([f"series {k}" for k in range(count)])
+    assert len({(look.dash, look.marker) for look in chosen.values()}) == count
+
+
+def test_what_the_program_draws_differs_by_dash_or_mark() -> None:
+    every = [*SERIES.values()]
+    assert len({(look.dash, look.marker) for look in every}) == len(every)
+    lines = [look.dash for name, look in SERIES.items() if name != "none"]  # or "measured"
+    assert len(set(lines)) == len(lines)
+    assert len({look.marker for look in every}) == len(every)
+    assert len({(look.dash, look.marker) for look in OTHERS}) == len(OTHERS)
+
+
+def test_more_series_than_looks_are_drawn_all_the_same() -> None:
+    assert len(looks([f"series {k}" for k in range(200)])) == 200
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+@pytest.mark.parametrize("shade", ["light", "dark"])
+def test_the_two_directions_differ_to_every_eye(deficiency: str, shade: str) -> None:
+    one, other = (getattr(SERIES[name], shade) for name in ("positive", "negative"))
+    matrix = DEFICIENCIES[deficiency]
+    assert np.linalg.norm(lab(one, matrix) - lab(other, matrix)) > 20
 
 
 def test_a_light_colour_has_one_dark_one() -> None:
@@ -252,8 +307,10 @@ def test_deviations_for_people(value: float | None, shown: str) -> None:
 
 
 def test_units_for_people() -> None:
-    assert [pretty_unit(u) for u in ("N m s/rad", "deg/s^2", "deg", "percent")] == [
+    assert [pretty_unit(u) for u in ("N m s/rad", "urad", "uN m", "deg/s^2", "deg", "percent")] == [
         "N·m·s/rad",
+        "µrad",
+        "µN·m",
         "deg/s²",
         "°",
         "%",
@@ -294,3 +351,81 @@ def test_a_table_on_the_page_is_rounded_and_bounded() -> None:
     assert [cell.text for cell in shown.rows[1]] == ["–", "–", "–", "no", "–"]
     long = Table("k", "t", (Column("n", "N"),), tuple({"n": i} for i in range(5000)))
     assert (len(show(long).rows), show(long).left_out) == (300, 4700)
+
+
+def test_a_legend_has_as_many_columns_as_fit_and_reads_by_rows() -> None:
+    x = np.arange(3.0)
+    names = ["a", "b", "c", "d", "a rather long name of a series that takes half of the width", "e"]
+    svg = draw(figure(*(Curve(x, x + k, name, name) for k, name in enumerate(names))))
+    root = ET.fromstring(svg)
+    at = {
+        e.text: [float(n) for n in re.findall(r"-?[\d.]+", e.get("transform", ""))][-2:]
+        for e in root.iter("{http://www.w3.org/2000/svg}text")
+        if e.text in names
+    }
+    rows = sorted(names, key=lambda name: (round(at[name][1]), at[name][0]))
+    assert rows == names
+
+
+def limits_of(shown: Figure, monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
+    found: list[Any] = []
+    original = figures.to_svg
+    monkeypatch.setattr(figures, "to_svg", lambda sheet: (found.append(sheet), original(sheet))[1])
+    draw(shown)
+    return [tuple(ax.get_ylim()) for ax in found[0].axes]
+
+
+def test_one_scale_is_for_axes_that_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = np.arange(3.0)
+    error, rate = Axis("Error", "rad"), Axis("Rate", "rad/s")
+    panels = tuple(
+        Panel(Axis("Time", "s"), axis, [Curve(x, top * x, "a", "a")])
+        for axis, top in ((error, 1.0), (error, 3.0), (rate, 9.0))
+    )
+    apart = Figure("key", "Title", "Caption.", "Alt.", panels)
+    first, second, third = limits_of(replace(apart, one_scale=True), monkeypatch)
+    assert first == second
+    assert first[0] <= 0 < 6 <= first[1] < third[1]
+    own = limits_of(apart, monkeypatch)
+    assert own[0][1] < own[1][1] == second[1]
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_a_bound_has_an_arrow_with_room(scale: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    x, y = np.array([1.0, 2.0]), np.array([1.0, 4.0])
+    axis = Axis("Change", scale=scale)  # type: ignore[arg-type]
+    low, high = np.array([0.9, np.nan]), np.array([1.1, np.inf])
+    bound = Curve(x, y, "a", "a", "points", low=low, high=high)
+    known = replace(bound, high=np.array([1.1, np.nan]))
+    shown = [
+        Figure("key", "Title", "Caption.", "Alt.", (Panel(Axis("x"), axis, [curve]),))
+        for curve in (bound, known)
+    ]
+    ((_, above),), ((_, without),) = (limits_of(each, monkeypatch) for each in shown)
+    assert above > without > 4.0
+    with_arrow, plain = (draw(each) for each in shown)
+    assert with_arrow.count("<path") > plain.count("<path")
+
+
+@pytest.mark.parametrize(
+    ("span", "step"), [(24.0, 5.0), (50.0, 10.0), (95.0, 15.0), (200.0, 30.0), (300.0, 45.0)]
+)
+def test_degrees_are_counted_in_parts_of_a_turn(
+    span: float, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[Any] = []
+    original = figures.to_svg
+    monkeypatch.setattr(figures, "to_svg", lambda sheet: (found.append(sheet), original(sheet))[1])
+    phase = Axis("Phase", "deg", limits=(0.0, span))
+    x = np.arange(3.0)
+    draw(Figure("k", "T", "C.", "A.", (Panel(Axis("x"), phase, [Curve(x, x)]),)))
+    ticks = found[0].axes[0].get_yticks()
+    assert np.unique(np.round(np.diff(ticks), 9)).tolist() == [step]
+
+
+def test_named_places_stand_where_they_are() -> None:
+    axis = Axis("Map", "rad", "deg", places=((0.0, "first"), (1.0, "second"), (2.0, "mean")))
+    panel = Panel(axis, Axis("Torque"), [Curve(np.arange(3.0), np.arange(3.0), "a", "a", "points")])
+    shown = texts(draw(Figure("k", "T", "C", "A", (panel,))))
+    assert {"first", "second", "mean"} <= set(shown)
+    assert "57.3" not in shown

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
-from campaign.report import figures
-from campaign.report.tables import REASONS, remarks, show, table_csv
-from campaign.report.text import interval
+from campaign.report.content.tables import REASONS, remarks, show, table_csv
+from campaign.report.drawing import curves, figures
 from campaign.result import Axis, Cell, Column, Curve, Figure, Panel, Table
+from campaign.text import interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,12 @@ if TYPE_CHECKING:
         (-3.87, -3.99, -3.75, "−3.87 ± 0.12"),
         (0.0, -0.5, 0.5, "0.00 ± 0.50"),
         (123.0, 111.0, 135.0, "123 ± 12"),
-        (12345.0, 12000.0, 12690.0, "12345 ± 345"),
+        (12345.0, 12000.0, 12690.0, "12340 ± 340"),  # 345 is 340, half to even
+        (400635.0, 276141.0, 525129.0, "400000 ± 120000"),
+        (-400635.0, -500235.0, -301035.0, "−400000 ± 100000"),  # 99600 has two as 100000
+        (400635.0, 276141.0, 649629.0, "400000 (280000 to 650000)"),
+        (0.3, -99.3, 99.9, "0 ± 100"),
+        (-0.3, -99.9, 99.3, "0 ± 100"),  # no minus where nothing is left of the number
         (5.0, 4.9004, 5.0996, "5.00 ± 0.10"),  # 0.0996 has two digits as 0.10
         (3.87, 3.8, 4.1, "3.87 (3.80 to 4.10)"),
         (-3.87, -4.1, -3.8, "−3.87 (−4.10 to −3.80)"),
@@ -43,9 +48,11 @@ if TYPE_CHECKING:
         (7.0, 7.0, 7.0, "7 ± 0"),
         (1.0, 1.0 - 1e-15, 1.0 + 1e-15, "1 ± 0"),  # rounding errors are no interval
         (1.4804747, 1.4804747 - 2e-10, 1.4804747 + 2e-10, "1.4804747 ± 2.0 × 10⁻¹⁰"),
-        (1.5e-7, 1.4e-7, 1.6e-7, "1.50 × 10⁻⁷ ± 1.0 × 10⁻⁸"),
-        (1.5e-7, 1.4e-7, 1.9e-7, "1.50 × 10⁻⁷ (1.40 × 10⁻⁷ to 1.90 × 10⁻⁷)"),
-        (0.0, -2e-7, 2e-7, "0 ± 2.0 × 10⁻⁷"),
+        (1.5e-7, 1.4e-7, 1.6e-7, "(1.50 ± 0.10) × 10⁻⁷"),
+        (4.0063e9, 3.8863e9, 4.1263e9, "(4.01 ± 0.12) × 10⁹"),
+        (1.116842e-5, 1.116790e-5, 1.116894e-5, "(1.116842 ± 0.000052) × 10⁻⁵"),
+        (1.5e-7, 1.4e-7, 1.9e-7, "1.50 (1.40 to 1.90) × 10⁻⁷"),
+        (0.0, -2e-7, 2e-7, "(0.0 ± 2.0) × 10⁻⁷"),
     ],
 )
 def test_a_number_is_shown_with_its_interval(
@@ -62,10 +69,13 @@ def test_what_is_shown_holds_what_was_found() -> None:
         value = float(draw.normal() * half * 10.0 ** draw.uniform(-1, 4))
         low, high = value - half * draw.uniform(0.5, 1), value + half * draw.uniform(0.5, 1)
         told = interval(value, low, high).replace("−", "-")
-        assert "×" not in told or abs(value) > 1e5
-        numbers = [float(part) for part in re.findall(r"-?\d+(?:\.\d+)?", told)]
-        if "×" in told or "to" not in told:
+        digits, _, power = told.partition(" × 10")
+        largest = max(abs(value), 0.5 * (high - low))
+        assert not power or not 1e-4 <= largest < 1e6
+        if "×" in digits or "to" not in digits:
             continue
+        unit = 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
+        numbers = [unit * float(part) for part in re.findall(r"-?\d+(?:\.\d+)?", digits)]
         wide = 0.5 * (high - low)
         assert numbers[1] == pytest.approx(low, abs=0.06 * wide)
         assert numbers[2] == pytest.approx(high, abs=0.06 * wide)
@@ -91,6 +101,7 @@ def table(columns: dict[str, list[Cell]], **how: dict[str, object]) -> Table:
 ALONE = estimate(half=None, reason="a single trial")
 WIDE = estimate(half=3.0, origin=Origin.NOT_DETERMINED, reason="its interval is too wide")
 LOST = Estimate.without_interval("x", math.nan, "N m", "it never slid")
+GIVEN = estimate(half=None, origin=Origin.GIVEN, reason="it was set")
 BOUND = estimate(half=None, kind="at least")
 
 
@@ -106,11 +117,28 @@ BOUND = estimate(half=None, kind="at least")
         (
             {"a": [ALONE, estimate()], "b": [ALONE, ALONE]},
             {},
-            ["A (1 of 2 rows: a single trial); B (a single trial)."],
+            ["B, A in 1 of 2 rows (a single trial)."],
         ),
         ({"a": [ALONE], "b": [ALONE], "c": [estimate()]}, {}, ["A, B (a single trial)."]),
         ({"a": [ALONE], "b": [ALONE]}, {}, ["all numbers (a single trial)."]),
         ({"a": [ALONE], "b": [3]}, {"b": {"exact": True}}, ["A (a single trial)."]),
+        # A row that has a name is called by it, of one column with the column's.
+        (
+            {"n": ["Ts", "Tc"], "a": [ALONE, estimate()], "b": [ALONE, estimate()]},
+            {},
+            ["Ts (a single trial)."],
+        ),
+        (
+            {"n": ["Ts", "Tc"], "a": [ALONE, estimate()], "b": [estimate(), estimate()]},
+            {},
+            ["A of Ts (a single trial)."],
+        ),
+        (
+            {"n": ["Ts", "Ts"], "a": [ALONE, estimate()], "b": [ALONE, estimate()]},
+            {},
+            ["A, B in 1 of 2 rows (a single trial)."],
+        ),
+        ({"a": [GIVEN, estimate()]}, {}, []),  # its cell says so
     ],
 )
 def test_each_reason_for_no_interval_is_said_once(
@@ -122,10 +150,10 @@ def test_each_reason_for_no_interval_is_said_once(
 def test_what_is_not_determined_is_said_apart() -> None:
     found = remarks(table({"a": [WIDE, ALONE], "b": [LOST, estimate()]}))
     assert list(found) == [
-        "Without an interval: A (1 of 2 rows: a single trial).",
+        "Without an interval: A in 1 of 2 rows (a single trial).",
         (
-            "Not determined: A (1 of 2 rows: its interval is too wide); "
-            "B (1 of 2 rows: it never slid)."
+            "Not determined: A in 1 of 2 rows (its interval is too wide); "
+            "B in 1 of 2 rows (it never slid)."
         ),
     ]
 
@@ -136,7 +164,7 @@ def test_systematic_parts_that_nobody_has_sized_are_named() -> None:
     bare = replace(ALONE, systematic=(Systematic("inertia"),))
     found = remarks(table({"a": [loose, loose], "b": [loose, bare]}))
     assert list(found) == [
-        "Without an interval: B (1 of 2 rows: a single trial).",
+        "Without an interval: B in 1 of 2 rows (a single trial).",
         "Of unknown size, and in no interval: inertia.",
     ]
 
@@ -179,11 +207,11 @@ def test_the_file_has_the_ends_behind_its_old_columns() -> None:
 def drawn(curve: Curve, monkeypatch: pytest.MonkeyPatch, scale: str = "linear") -> Axes:
     """The axes of a panel with one curve, in mN m."""
     found: list[Axes] = []
-    original: Callable[..., None] = figures._draw_panel
+    original: Callable[..., object] = figures._draw_panel
 
-    def keep(ax: Axes, *rest: object) -> None:
-        original(ax, *rest)
+    def keep(ax: Axes, *rest: object) -> object:
         found.append(ax)
+        return original(ax, *rest)
 
     monkeypatch.setattr(figures, "_draw_panel", keep)
     y = Axis("Torque", "N m", "mN m", scale=scale)  # type: ignore[arg-type]
@@ -194,8 +222,9 @@ def drawn(curve: Curve, monkeypatch: pytest.MonkeyPatch, scale: str = "linear") 
 
 def bars(ax: Axes) -> list[tuple[float, float]]:
     """Lower and upper end of every bar, by its x."""
-    lines = [line for collection in ax.collections for line in collection.get_segments()]  # type: ignore[attr-defined]
-    return [(float(line[0][1]), float(line[1][1])) for line in sorted(lines, key=lambda s: s[0][0])]
+    (line,) = [line for line in ax.lines if line.get_gid() == curves.BARS]
+    ends = np.asarray(line.get_ydata(), dtype=float).reshape(-1, 3)
+    return [(float(low), float(high)) for low, high, gap in ends]
 
 
 X = np.array([1.0, 2.0, 3.0])
@@ -207,6 +236,15 @@ def test_points_have_bars_where_there_is_an_interval(monkeypatch: pytest.MonkeyP
     found[1] = replace(found[1], value=0.001)
     ax = drawn(Curve.of(X, found, "a", "lugre"), monkeypatch)
     assert np.array(bars(ax)) == pytest.approx(np.array([(1.5, 2.5), (2.5, 5.0)]))
+
+
+def test_a_bound_is_open_on_one_side() -> None:
+    """At least 4, off by 0.5 of its own: from 4 less 1.645 times 0.5."""
+    bound = Estimate("t", 4.0, "N m", kind="at least", systematic=(Systematic("inertia", 0.5),))
+    most = Estimate("t", 4.0, "N m", kind="at most")
+    curve = Curve.of(np.array([1.0, 2.0, 3.0]), [bound, most, estimate(1.0, 0.1)])
+    assert curve.low == pytest.approx([4.0 - 1.645 * 0.5, -np.inf, 0.9], abs=0.01)
+    assert curve.high == pytest.approx([np.inf, 4.0, 1.1], abs=0.01)
 
 
 def test_a_line_has_a_band(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import dataclasses
 import io
@@ -10,9 +9,11 @@ import os
 import re
 import subprocess
 import sys
+import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -21,8 +22,10 @@ from campaign.archive import RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.report.build import Report, build_report
+from campaign.report.one_figure import WRITTEN, write_figure
 from campaign.report.output import MARKER, replaced_folder
-from campaign.result import Axis, Curve, Figure, Panel, Result
+from campaign.report.page.folder import LINKED, Folder
+from campaign.result import Axis, Column, Curve, Figure, Panel, Result, Table
 from campaign.trial import Ending, Outcome
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -30,7 +33,10 @@ FOREIGN_VOID = {"path", "use", "rect", "circle", "image", "stop"}
 
 
 class Page(HTMLParser):
-    """Every element with its attributes and text, and whether the tags are balanced."""
+    """Every element with its attributes and text, and whether the tags are balanced.
+
+    `stops` are the elements that the Tab key stops at: the figure around it, or "", and its tag.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -38,11 +44,18 @@ class Page(HTMLParser):
         self.open: list[str] = []
         self.mistakes: list[str] = []
         self.words: list[str] = []
+        self.stops: list[tuple[str, str]] = []
+        self.figure = ""
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.elements.append((tag, {k: v or "" for k, v in attrs}))
+        if tag == "figure":
+            self.figure = dict(attrs)["id"] or ""
+        stops = tag in ("a", "button", "summary", "input") or ("tabindex", "0") in attrs
+        if stops and ("tabindex", "-1") not in attrs:
+            self.stops.append((self.figure, tag))
         if len(dict(attrs)) != len(attrs):
             self.mistakes.append(f"an attribute twice in <{tag}>")
         if tag not in VOID:
@@ -52,6 +65,8 @@ class Page(HTMLParser):
         self.elements.append((tag, {k: v or "" for k, v in attrs}))
 
     def handle_endtag(self, tag: str) -> None:
+        if tag == "figure":
+            self.figure = ""
         if not self.open or self.open.pop() != tag:
             self.mistakes.append(f"</{tag}> closes something else")
 
@@ -92,8 +107,12 @@ def test_the_folder_has_the_page_its_tables_and_its_figures(report: Report) -> N
     assert set(contents(report.path.parent)) == {
         MARKER,
         "report.html",
+        "report.json",
+        "figures/figure-4.11.csv",
         "figures/figure-4.11.svg",
+        "figures/figure-5.4.csv",
         "figures/figure-5.4.svg",
+        "figures/figure-5.9.csv",
         "figures/figure-5.9.svg",
         "figures/scoreboard.svg",
         "tables/scoreboard.csv",
@@ -124,9 +143,16 @@ def test_every_internal_link_leads_somewhere(page: Page) -> None:
 
 
 def test_the_page_asks_nobody_for_anything(report: Report, page: Page) -> None:
+    """Only a file to download may be a file beside the page."""
+    beside = {path for path in contents(report.path.parent) if path.endswith(".csv")}
     for tag, attrs in page.elements:
         for name in ("src", "href", "xlink:href", "action", "srcset", "poster"):
-            assert attrs.get(name, "#").startswith(("#", "data:")), (tag, attrs)
+            there = attrs.get(name, "#")
+            inside = there.startswith(("#", "data:"))
+            assert inside or ("download" in attrs and there in beside), (tag, attrs)
+    (policy,) = [a["content"] for a in page.all("meta") if "http-equiv" in a]
+    assert policy.startswith("default-src 'none';")
+    assert "http" not in policy
     assert {"script", "iframe", "object", "embed"}.isdisjoint(tag for tag, _ in page.elements)
     style = report.path.read_text(encoding="utf-8").split("</style>")[0]
     assert "@import" not in style
@@ -144,10 +170,75 @@ def test_everything_seen_is_also_said(page: Page) -> None:
 
 def test_each_downloaded_table_is_the_file(report: Report, page: Page) -> None:
     links = [a for a in page.all("a") if "download" in a]
-    assert len(links) == 8
+    files = {path.name: path for path in report.path.parent.rglob("*.csv")}
+    assert {link["download"] for link in links} == files.keys()
+    assert len(links) == len(files) == 11
     for link in links:
-        text = base64.b64decode(link["href"].split(",", 1)[1]).decode()
-        assert text == (report.path.parent / "tables" / link["download"]).read_text()
+        if link["href"].startswith("data:"):
+            text = unquote(link["href"].split(",", 1)[1])
+            assert text == files[link["download"]].read_text()
+        else:
+            assert report.path.parent / link["href"] == files[link["download"]]
+
+
+def test_the_page_carries_small_tables_as_plain_text_and_names_the_place_of_large_ones() -> None:
+    """Base64 would cost a page that is served compressed half as much again."""
+    folder, values = Folder(), np.random.default_rng(1).random(150)
+    small = folder.table("error_%,µ\n" + "".join(f"{each!r},#1\n" for each in values), "small")
+    text = folder.files[small.file]
+    assert unquote(small.href.split(",", 1)[1]) == text
+    compressed = [len(zlib.compress(each.encode())) for each in (small.href, text)]
+    assert compressed[0] < 1.2 * compressed[1]
+    large = folder.table("name,unit\n" + "x,1\n" * LINKED, "large")
+    assert large.href == large.file == "tables/large.csv"
+
+
+def test_a_figure_has_few_stops_of_the_tab_key(page: Page) -> None:
+    """Its large view and its numbers; nothing within the drawing."""
+    within = [figure for figure, _ in page.stops if figure]
+    stops = {figure: within.count(figure) for figure in within}
+    assert stops == {"figure-1": 2, "figure-2": 1, "figure-3": 2, "figure-4": 2}
+
+
+def test_a_figure_opens_large_and_says_where_it_comes_from(page: Page) -> None:
+    sheets = {a["id"] for a in page.all("div") if "popover" in a}
+    buttons = [a["popovertarget"] for a in page.all("button")]
+    assert len(buttons) == len(sheets) == 4
+    assert set(buttons) == sheets
+    text = " ".join(" ".join(page.words).split())
+    run = "2026-11-21T09-36-58-made-up"
+    assert f"Trials 1 to 3. figures/figure-5.9.svg figure-5.9.csv Drawn again by {DRAW}" in text
+    assert f"figures/scoreboard.svg Drawn again by campaign report {run}" in text
+
+
+DRAW = "campaign report 2026-11-21T09-36-58-made-up --only-figure stabilization/position-error"
+
+
+@pytest.mark.parametrize("figures", [1, 12, 47, 120])
+def test_any_figure_is_soon_reached(made_up: ModuleType, tmp_path: Path, figures: int) -> None:
+    """By the second skip link and the list of figures: at most 25 stops from the top."""
+    x = np.arange(3.0)
+    panel = Panel(Axis("x"), Axis("y"), [Curve(x, x)])
+    many = [Figure(f"f{n}", f"Figure of {n}", "c", "a", (panel,)) for n in range(figures)]
+
+    def analyse(data: TestData) -> Result:
+        return Result(figures=tuple(many))
+
+    kind = dataclasses.replace(made_up.EXPERIMENTS["velocity_map"], analyse=analyse)
+    run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
+    found = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind})
+    page = Page(found.path.read_text(encoding="utf-8"))
+    skips = [a["href"] for a in page.all("a") if a.get("class") == "skip"]
+    assert skips == ["#content", "#figures"]
+    order = [(tag, attrs.get("href", "")) for tag, attrs in page.elements]
+    begin = next(n for n, (_, attrs) in enumerate(page.elements) if attrs.get("id") == "figures")
+    behind = order[begin:]
+    groups = [n for n, (tag, _) in enumerate(behind) if tag == "summary"]
+    for number in range(1, figures + 1):
+        link = behind.index(("a", f"#figure-{number}"))
+        before = [place for place in groups if place < link]
+        within = sum(tag == "a" for tag, _ in behind[before[-1] : link + 1])
+        assert len(skips) + len(before) + within <= 25
 
 
 def test_a_published_table_has_its_own_file(report: Report) -> None:
@@ -170,7 +261,7 @@ def test_a_failing_analysis_is_one_line_and_costs_nobody_else(report: Report, pa
 
 def test_failed_trials_are_shown_with_their_reasons(page: Page) -> None:
     text = " ".join(page.words)
-    assert text.count("current 93.1 A is over the limit of 90 A") == 3
+    assert text.count("current 93.1 A is over the limit of 90 A") == 3 + 1  # and on top, once
 
 
 def test_contradictions_are_told_with_their_reasons(page: Page) -> None:
@@ -203,6 +294,15 @@ def test_the_command_repeats_what_was_asked(made_up: ModuleType, tmp_path: Path)
     assert (
         "campaign run made-up.toml --backend serial --only 'a b' --set bench.gear.ratio=100" in text
     )
+
+
+def test_options_of_the_backend_are_told_in_words(made_up: ModuleType, tmp_path: Path) -> None:
+    """Neither Python nor JSON: an option that says nothing is left out, a number is SI."""
+    options = {"check_step": False, "longest_step": None, "timeout": 2.0}
+    run = made_up.made_up_run(tmp_path, backend_options=options)
+    build(made_up, run, tmp_path / "out")
+    text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
+    assert "sim, check step: no, timeout: 2 (SI)" in text
 
 
 def test_the_same_archive_gives_the_same_bytes_anywhere(
@@ -275,7 +375,7 @@ def test_own_templates_win_one_by_one(made_up: ModuleType, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("template", "message"),
     [
-        ("{{ nothing }}", "'nothing' is undefined"),
+        ("{{ nothing }}", "there is no name 'nothing'"),
         ("{% if %}", "provenance.html:1"),
         ("{% include 'none.html' %}", "none.html"),
     ],
@@ -332,8 +432,8 @@ def test_nothing_published_is_a_report_without_a_scoreboard(
 ) -> None:
     run = made_up.made_up_run(tmp_path, normalised={"published": "none"})
     build(made_up, run, tmp_path / "out")
-    rows = (tmp_path / "out/tables/scoreboard.csv").read_text().splitlines()
-    assert len(rows) == 1
+    assert not (tmp_path / "out/tables/scoreboard.csv").exists()
+    assert "Scoreboard" not in (tmp_path / "out/report.html").read_text()
 
 
 @pytest.mark.parametrize(("sampled", "column"), [(False, "simulation"), (True, "experimental")])
@@ -354,6 +454,73 @@ def test_an_unknown_experiment_is_a_problem_not_an_end(made_up: ModuleType, tmp_
     found = build(made_up, made_up.made_up_run(tmp_path), tmp_path / "out", experiments={})
     assert len(found.problems) == 3
     assert "no experiment is called 'stabilization' here" in found.problems[0]
+
+
+def test_long_tables_fold_and_lose_nothing(made_up: ModuleType, tmp_path: Path) -> None:
+    """All rows are in the page, for paper and for who has no such browser; the rest is CSS."""
+    rows = tuple({"n": n} for n in range(400))
+    tables = [
+        Table(f"t{length}", f"Of {length}", (Column("n", "N"),), rows[:length])
+        for length in (18, 19, 400)
+    ]
+    kind = dataclasses.replace(
+        made_up.EXPERIMENTS["velocity_map"], analyse=lambda data: Result(tuple(tables))
+    )
+    run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
+    page = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind}).path
+    text = page.read_text(encoding="utf-8")
+    assert text.count('<tr><th scope="row" class="n">') == 18 + 19 + 300
+    assert "100 more rows are in the file" in text
+    folds = re.findall(r'<details class="fold"><summary>(.*?)</summary>', text)
+    assert folds == ["All 19 rows", "All 300 rows"]
+    style = text.partition("</style>")[0]
+    screen, paper = style.split("@media print")
+    assert ":has(> .fold:not([open])) tbody tr:nth-child(n + 13) { display: none; }" in screen
+    assert "tr:nth-child(n + 13) { display: table-row; }" in paper
+    assert "details::details-content { display: block;" in paper
+
+
+def test_the_scoreboard_shows_one_status_at_a_time(report: Report, page: Page) -> None:
+    choices = [a["id"] for a in page.all("input")]
+    assert choices[0] == "every-status"
+    assert len(choices) > 2
+    style = next(text for text in page.words if "#scoreboard" in text)
+    for choice in choices[1:]:
+        status = choice.removeprefix("only-")
+        assert f"#scoreboard:has(#{choice}:checked)" in style
+        assert any(a.get("class") == status for a in page.all("li"))
+    places = {a["id"] for _, a in page.elements if "id" in a}
+    cells = [a for a in page.all("li") if a.get("class", "").startswith(("st-", "muted"))]
+    assert len(cells) == len(scoreboard(report.path.parent))
+    assert {f"table-{n}" for n in range(1, 6)} <= places
+
+
+def test_one_figure_is_drawn_as_the_report_has_it(
+    made_up: ModuleType, report: Report, tmp_path: Path
+) -> None:
+    run = made_up.made_up_run(tmp_path)
+    wanted = "stabilization/position-error"
+    drawn, damaged = write_figure(run, wanted, tmp_path / "f", experiments=made_up.EXPERIMENTS)
+    assert drawn == tmp_path / "f/figure-5.9.svg"
+    assert not damaged
+    theirs = contents(report.path.parent / "figures")
+    written = contents(tmp_path / "f")
+    assert written.pop(WRITTEN)
+    assert written == {name: theirs[name] for name in ("figure-5.9.csv", "figure-5.9.svg")}
+
+
+def test_a_figure_that_the_run_does_not_have_is_told(made_up: ModuleType, tmp_path: Path) -> None:
+    run = made_up.made_up_run(tmp_path)
+    with pytest.raises(UsageError, match="did you mean 'stabilization/position-error'"):
+        write_figure(
+            run, "stabilization/position-eror", tmp_path / "f", experiments=made_up.EXPERIMENTS
+        )
+    assert not (tmp_path / "f").exists()
+    (tmp_path / "f").write_text("a file")
+    with pytest.raises(UsageError, match="cannot be written"):
+        write_figure(
+            run, "stabilization/position-error", tmp_path / "f", experiments=made_up.EXPERIMENTS
+        )
 
 
 def test_a_figure_that_cannot_be_drawn_costs_only_itself(
@@ -392,7 +559,7 @@ def test_thousands_of_failed_trials_stay_a_page(made_up: ModuleType, tmp_path: P
     many = dataclasses.replace(run, trials=(failed,) * 5000)
     found = build(made_up, many, tmp_path / "out")
     text = found.path.read_text()
-    assert text.count("rate is infinite") == 200
+    assert text.count("rate is infinite") == 200 + 1  # and on top, once
     assert "4800 more are in the archive" in text
 
 
@@ -444,3 +611,37 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
         replaced_folder(tmp_path / "file" / "report"),
     ):
         pytest.fail("must not come here")
+
+
+def test_what_somebody_put_into_a_report_stays(tmp_path: Path) -> None:
+    output = tmp_path / "report"
+    for text in ("old", "new"):
+        with replaced_folder(output) as folder:
+            for name in ("page", "main.tex", "only-" + text):
+                (folder / name).write_text(text)
+        if text == "old":
+            (output / "own").mkdir()
+            (output / "own/notes.txt").write_text("mine")
+            (output / "main.tex").write_text("edited")
+    found = {p.relative_to(output).as_posix(): p.read_text() for p in contents_of(output)}
+    assert found.pop(MARKER)
+    assert found == {
+        "page": "new",
+        "main.tex": "new",
+        "main.tex.edited": "edited",
+        "only-new": "new",
+        "own/notes.txt": "mine",
+    }
+
+
+def contents_of(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def test_the_list_of_figures_tells_whose_each_is(report: Report) -> None:
+    """Several tests have figures of one title."""
+    text = report.path.read_text()
+    listed = text[text.index('<section id="figures">') :].split("</section>")[0]
+    lines = re.findall(r"<li>.*?</li>", listed)
+    assert lines
+    assert len({re.sub(r"<a .*?</a>", "", line) for line in lines}) == len(lines)

@@ -13,11 +13,11 @@ from types import ModuleType
 
 import pytest
 
+from campaign.access.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Line, score
-from campaign.report.analysis import analyse_run, published_of
 from campaign.report.build import build_report
 from campaign.trial import Outcome, SafeState
 

@@ -12,9 +12,9 @@ from campaign.published.draws import SEED
 from campaign.published.evidence import Evidence
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import read_published
-from campaign.report.lines import shown_line
-from campaign.report.strips import draw_strips
-from campaign.report.tables import published_csv
+from campaign.report.content.lines import shown_line
+from campaign.report.content.tables import published_csv
+from campaign.report.drawing.strips import draw_strips
 from campaign.result import Finding
 
 PUBLISHED = read_published(

@@ -1,0 +1,64 @@
+"""How to cite a run: as a sentence, and as an entry of a bibliography."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from campaign.access.analysis import source_of, title_of
+from campaign.archive import RunReader
+from campaign.report.latex_text import latex
+
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+"""As every bibliography style knows them."""
+
+
+@dataclass(frozen=True)
+class Citation:
+    """What to write into one's own paper.
+
+    Attributes:
+        sentence: for a list of references that is written by hand.
+        bibtex: an entry for BibTeX and biblatex, under the run's name.
+    """
+
+    sentence: str
+    bibtex: str
+
+
+def citation_of(run: RunReader) -> Citation:
+    """Title, operator, day, program and, as what identifies the archive, its SHA-256.
+
+    The program is the one that executed the run. A run in progress has no archive yet, and its
+    citation says so: the digest is then of the journal as it stands.
+    """
+    header = run.header
+    title = title_of(header.title or header.protocol_name or header.name, source_of(run))
+    day = datetime.fromisoformat(header.created).date()
+    program = " ".join(("campaign", header.versions.get("campaign", ""))).strip()
+    state = "archive" if run.sealed else "in progress, journal"
+    identifier = f"{state} SHA-256 {run.sha256}"
+    by = f"{header.operator}: " if header.operator else ""
+    fields = {
+        "author": _whole(header.operator),
+        "title": _whole(title),
+        "year": f"{{{day.year:04d}}}",
+        "month": MONTHS[day.month - 1],
+        "howpublished": f"{{{_field(f'Run {header.name}, {program}')}}}",
+        "note": f"{{{_field(identifier)}}}",
+    }
+    lines = [f"  {name} = {value},\n" for name, value in fields.items() if value != "{{}}"]
+    return Citation(
+        f"{by}{title}. Run {header.name} of {day.isoformat()}, {program}, {identifier}.",
+        f"@misc{{{header.name},\n{''.join(lines)}}}\n",
+    )
+
+
+def _whole(text: str) -> str:
+    """A field whose letters stay as large as they are, and that is not taken for several names."""
+    return f"{{{{{_field(text)}}}}}"
+
+
+def _field(text: str) -> str:
+    """Text within a field: BibTeX counts braces, escaped ones too."""
+    return latex(text).replace(r"\{", r"\textbraceleft{}").replace(r"\}", r"\textbraceright{}")

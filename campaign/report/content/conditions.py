@@ -1,0 +1,83 @@
+"""Under which conditions a test ran: kind, bench, options that acted, and its sweep, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from campaign.access.analysis import AnalysedTest
+from campaign.experiments.interface import options_of
+from campaign.report.content.written_units import TestUnits
+from campaign.text import path_words
+from campaign.trial import Role, canonical_json
+
+
+def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterator[tuple[str, str]]:
+    """Kind, bench, sweep, and options that acted, in words and in the units of the protocol."""
+    units = units or TestUnits(test)
+    yield "Experiment", test.kind
+    if test.bench:
+        yield (
+            "Bench",
+            test.bench.name + (f": {test.bench.description}" if test.bench.description else ""),
+        )
+    if test.source:
+        yield "Samples from", test.source
+    count = f"{len(test.trials)} executed"
+    yield "Trials", count + (f", {len(test.failed)} not completed" if test.failed else "")
+    points = _points(test)
+    for path, values in points.items():
+        yield f"{path_words(path)} (swept)", units.words(path, values)
+    told = points.keys() | _without_effect(test)
+    told |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
+    for path, value in test.options.items():
+        if path not in told and value is not None and value != []:
+            yield path_words(path), units.value(path, value)
+
+
+def _points(test: AnalysedTest) -> dict[str, list[Any]]:
+    """What tells the measurements apart: dotted path to its different values (SI), as they come."""
+    trials = [archived.trial for archived in test.trials]
+    points: dict[str, dict[str, Any]] = {}
+    for trial in [each for each in trials if each.role is Role.MEASUREMENT] or trials:
+        for path, value in trial.point.items():
+            points.setdefault(path, {})[canonical_json(value)] = value
+    return {path: list(values.values()) for path, values in points.items()}
+
+
+def _lists(test: AnalysedTest, units: TestUnits, path: str) -> bool:
+    """Whether an option only lists what the sweep of the experiment's own says again."""
+    listed, swept = test.options.get(units.listed_by(path)), _points(test)[path]
+    if not isinstance(listed, list) or len(listed) != len(swept):
+        return False
+    return all(_same(one, other) for one, other in zip(listed, swept, strict=True))
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return bool(one == other)
+
+
+def _without_effect(test: AnalysedTest) -> frozenset[str]:
+    """Options that did nothing in any trial; empty where the experiment does not know them."""
+    trees = [trial.trial.options for trial in test.trials] or [test.options]
+    if test.experiment is None:
+        return frozenset()
+    try:
+        found = [options_of(test.experiment, tree).without_effect() for tree in trees]
+    except ValueError:  # of another version of the experiment
+        return frozenset()
+    return frozenset.intersection(*found)
+
+
+def summary_of(test: AnalysedTest) -> str:
+    """The conditions in a line: what ran, where, and how often."""
+    parts: Sequence[str] = (
+        test.kind.replace("_", " "),
+        f"bench {test.bench.name}" if test.bench else "",
+        f"{len(test.trials)} trials" if len(test.trials) != 1 else "1 trial",
+        test.source,
+    )
+    return ", ".join(part for part in parts if part)

@@ -1,0 +1,151 @@
+"""All that a report says of a run, as data: what every format is made from."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.access.analysis import (
+    AnalysedTest,
+    Found,
+    analyse_run,
+    published_of,
+    source_of,
+    title_of,
+)
+from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import hidden_trials, lost_trials
+from campaign.experiments.interface import Experiment
+from campaign.published.scoreboard import Scoreboard, score
+from campaign.published.values import Published
+from campaign.report.content.incidents import Incidents, incidents
+from campaign.report.content.opening import Opening, opening_of
+from campaign.report.content.settings import tree_settings
+from campaign.report.content.truth import truth_tables
+from campaign.result import Table
+from campaign.trial import Outcome
+
+ANEW = "the program that made this page, whatever is archived"
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a report says; nothing in it knows a page.
+
+    Attributes:
+        tests: in the protocol's order.
+        published: the values that the run's protocol compares with, by table.
+        truths: by test, what is true beside what it found, where that is known.
+        damaged: what of the run is damaged, as far as the report looked at it.
+        measured_by: whose code found what each recording says by itself.
+    """
+
+    run: RunReader
+    tests: tuple[AnalysedTest, ...]
+    published: Published
+    scoreboard: Scoreboard
+    truths: Mapping[str, Table]
+    incidents: Incidents
+    opening: Opening
+    damaged: tuple[Damage, ...]
+    measured_by: str
+
+    @property
+    def title(self) -> str:
+        header = self.run.header
+        title = header.title or header.protocol_name or header.name
+        return title_of(title, source_of(self.run))
+
+    @property
+    def command(self) -> str:
+        """What repeats this run, where its protocol lies."""
+        return shlex.join(_command_words(self.run))
+
+    @property
+    def backend(self) -> str:
+        """What executed the trials, and the options that it had, in words."""
+        header = self.run.header
+        options = (f"{name}: {text}" for name, text in tree_settings(header.backend_options))
+        return ", ".join([header.backend or "not stated", *options])
+
+    @property
+    def seeds(self) -> str:
+        """The seeds of its trials, in a few words."""
+        seeds = sorted({trial.trial.seed for trial in self.run.trials})
+        if len(seeds) <= 4:
+            return ", ".join(str(seed) for seed in seeds)
+        return f"{len(seeds)} seeds from {seeds[0]} to {seeds[-1]}, one per trial in the archive"
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The documents whose numbers are compared with."""
+        found = (self.published[name].source for name in self.scoreboard.tables())
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def failed(self) -> tuple[ArchivedTrial, ...]:
+        """The executed trials that did not complete."""
+        trials = self.run.trials
+        return tuple(each for each in trials if each.ending.outcome is not Outcome.COMPLETED)
+
+    @property
+    def lost(self) -> int:
+        """How many trials cannot be read: they were executed, or nobody knows whether they were."""
+        return len(lost_trials(self.run)) + hidden_trials(self.run)
+
+    @property
+    def not_executed(self) -> int:
+        """How many planned trials were not executed."""
+        return max(0, len(self.run.plan) - len(self.run.trials) - self.lost)
+
+
+def document_of(
+    run: RunReader,
+    experiments: Mapping[str, Experiment],
+    *,
+    measure_anew: bool = False,
+    found: Mapping[str, Found] | None = None,
+) -> Document:
+    """Analyse a run and say what there is to say of it.
+
+    `measure_anew`, `found`: as for `analyse_run`.
+    """
+    published = published_of(run)
+    tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
+    happened = incidents(run)
+    of_tests = (damage for test in tests for damage in test.damaged)
+    damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
+    scoreboard = score(published, [test.evidence() for test in tests])
+    truths = truth_tables(run, tests)
+    return Document(
+        run,
+        tests,
+        published,
+        scoreboard,
+        truths,
+        happened,
+        opening_of(run, tests, scoreboard, truths, damaged),
+        damaged,
+        ANEW if measure_anew else _measured_by(run.trials),
+    )
+
+
+def _measured_by(trials: Iterable[ArchivedTrial]) -> str:
+    """Whose code found what each recording says by itself, when it was executed."""
+    return "; ".join(sorted({trial.measured_by for trial in trials if trial.measured_by}))
+
+
+def _command_words(run: RunReader) -> Iterator[str]:
+    header = run.header
+    yield from ("campaign", "run", f"{header.protocol_name or 'protocol'}.toml")
+    if header.backend and header.backend != "sim":
+        yield from ("--backend", header.backend)
+    for test in header.only:
+        yield from ("--only", test)
+    if header.truth.option:
+        yield from ("--truth", Path(header.truth.option).name)
+    for path, value in sorted(header.overrides.items()):
+        yield from ("--set", f"{path}={value}")

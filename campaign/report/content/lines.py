@@ -1,0 +1,168 @@
+"""Lines of the scoreboard as text: what was printed, what was found, and what that comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from campaign.published.headline import is_compared
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
+from campaign.published.values import Cell, Published
+from campaign.published.verdicts import GOOD
+from campaign.report.palette import MUTED, STATUS
+from campaign.text import interval, minus, number, percent, pretty_unit
+
+SIGNS = {
+    "o": "●",
+    "D": "◆",
+    "s": "■",
+    "P": "✚",
+    "*": "★",
+    "v": "▼",
+    "^": "▲",
+    "<": "◀",
+    "X": "✖",
+    "x": "✕",
+}
+
+
+@dataclass(frozen=True)
+class ShownLine:
+    """A published cell beside what the run found, as text."""
+
+    table: str
+    name: str
+    unit: str
+    published: str
+    reproduced: str
+    deviation: str
+    status: str
+    css: str
+    sign: str
+    verdict: str
+    good: bool
+    notes: tuple[str, ...]
+    test: str
+    place: str
+
+
+def shown_line(line: Line) -> ShownLine:
+    """A line of the scoreboard as text."""
+    cell = line.cell
+    look = None if line.status is None else STATUS[line.status]
+    claim = {"near": "≈ ", "at most": "≤ ", "at least": "≥ "}.get(cell.relation, "")
+    return ShownLine(
+        table=cell.table,
+        name=cell_name(line.cell),
+        unit=pretty_unit(cell.unit),
+        published=claim + minus(cell.printed),
+        reproduced=_found(line),
+        deviation=percent(line.deviation),
+        status="–" if line.status is None else str(line.status),
+        css=(look or MUTED).name,
+        sign=SIGNS[look.marker] if look else "",
+        verdict=str(line.verdict),
+        good=line.verdict in GOOD,
+        notes=tuple(note for note in (cell.reason, *cell.notes) if note),
+        test=line.test,
+        place=place_words(line),
+    )
+
+
+@dataclass(frozen=True)
+class ScoredTable:
+    """A published table at a glance: its numbers, and how many of them were reproduced.
+
+    Attributes:
+        anchor: where on the page its numbers stand in full; "" nowhere.
+        tests: which tests found them.
+        compared, good: how many have a number beside them, and of how many that one holds; without
+            those that the document itself lets nobody reproduce.
+    """
+
+    table: str
+    title: str
+    anchor: str
+    tests: tuple[str, ...]
+    lines: tuple[ShownLine, ...]
+    compared: int
+    good: int
+
+
+def scored_tables(
+    scoreboard: Scoreboard, published: Published, anchors: Mapping[str, str]
+) -> tuple[ScoredTable, ...]:
+    """The published tables of the scoreboard, in its order."""
+    found = []
+    for name in scoreboard.tables():
+        lines = scoreboard.of_table(name)
+        compared = [line for line in lines if is_compared(line)]
+        found.append(
+            ScoredTable(
+                table=name,
+                title=published[name].title,
+                anchor=anchors.get(name, ""),
+                tests=tuple(dict.fromkeys(line.test for line in lines if line.test)),
+                lines=tuple(map(shown_line, lines)),
+                compared=len(compared),
+                good=sum(line.verdict in GOOD for line in compared),
+            )
+        )
+    return tuple(found)
+
+
+def cell_name(cell: Cell) -> str:
+    """A cell within its table in words, as short as it can be said."""
+    row, column = cell.row, cell.column
+    if cell.symbol and cell.quantity in (row, column):
+        row = cell.symbol if row == cell.quantity else row
+        column = cell.symbol if column == cell.quantity else column
+    elif cell.symbol:
+        row = f"{row} {cell.symbol}"
+    # A column that only repeats what the whole table is about says nothing.
+    told = [row] if column in (cell.quantity, "value") else [row, column]
+    return " · ".join(part.replace("_", " ") for part in told)
+
+
+def place_words(line: Line) -> str:
+    """`above 26 % (14 to 42 %) of 39 draws`; empty without draws."""
+    if line.place is None or line.place.low is None or line.place.high is None:
+        return ""
+    share, low, high = (
+        number(100 * end, 2) for end in (line.place.value, line.place.low, line.place.high)
+    )
+    return f"above {share} % ({low} to {high} %) of {len(line.draws)} draws"
+
+
+def _found(line: Line) -> str:
+    """What was found, with its interval, or as the bound that it is."""
+    found, decimals = line.found, line.cell.decimals or 0
+    if found is None:
+        return "–"
+    if found.is_bound:
+        sign = {"at least": "≥", "at most": "≤"}[found.kind]
+        end = found.low if found.high is None else found.high
+        return f"{sign} {number(end, decimals=decimals)}"
+    if found.low is None and found.high is None:
+        return number(found.value, decimals=decimals)
+    return interval(found.value, found.low, found.high)
+
+
+def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
+    """Status, its CSS name, its sign and how many lines have it; those that occur."""
+    counts = {s: sum(line.status is s for line in scoreboard.lines) for s in Status}
+    return tuple(
+        (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], count)
+        for status, count in counts.items()
+        if count
+    )
+
+
+def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], str], ...]:
+    """Per table and reason: the cells where the document contradicts itself."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for line in scoreboard.lines:
+        if line.status is Status.INCONSISTENT:
+            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
+    return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())

@@ -1,0 +1,78 @@
+"""Loops that were close to instability, or beyond: computed from the benches of archived trials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
+
+from campaign.access.analysis import one_line
+from campaign.archive import RunReader
+from campaign.experiments.interface import bench_of
+from campaign.physics.bench import Bench
+from campaign.physics.loops_used import LoopUse, loops_used
+from campaign.result import Column, Table, Value
+from campaign.trial import Task, canonical_json
+
+COMPUTED = "computed from the description of the bench, and not measured"
+NOTE = (
+    "The loop is opened at the rate error, or under a torque command at the compensation torque, "
+    "for small motions: stuck, with every interface in presliding, and in fast sliding. Below 20° "
+    "or 3 dB a small change of the bench makes it unstable. Of each test, compensation and regime "
+    "the trial with the least margin is shown."
+)
+
+
+def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
+    """A row per low or unstable loop of each test, and the problems met; no rows in most runs."""
+    rows: list[dict[str, Value]] = []
+    problems: list[str] = []
+    benches: dict[str, Bench] = {}
+    for test in dict.fromkeys(trial.trial.test for trial in run.trials):
+        try:
+            uses = loops_used(_trials_of(run, test, benches))
+        except ValidationError as error:
+            problems.append(f"the loops of {test}: {one_line(error)}")
+            continue
+        low = (use for use in uses if use.margins.low or not use.margins.stable)
+        rows += [{"test": test, **_row(use)} for use in low]
+    columns = (
+        Column("test", "Test"),
+        Column("trial", "Trial", exact=True),
+        Column("compensation", "Compensation"),
+        Column("regime", "Regime"),
+        Column("state", "Loop"),
+        Column("crossover", "Crossover", "rad/s", "rad/s", reason=COMPUTED),
+        Column("phase", "Phase margin", "rad", "deg", reason=COMPUTED),
+        Column("gain", "Gain margin (dB)", reason=COMPUTED),
+        Column("growth", "Fastest pole (1/s)", reason=COMPUTED),
+    )
+    table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=NOTE)
+    return table, problems
+
+
+def _trials_of(
+    run: RunReader, test: str, benches: dict[str, Bench]
+) -> Iterator[tuple[int, Task, Bench]]:
+    for item in run.trials_of(test):
+        trial = item.trial
+        key = canonical_json(trial.bench)
+        if key not in benches:
+            benches[key] = bench_of(trial)
+        yield trial.number, trial.task, benches[key]
+
+
+def _row(use: LoopUse) -> dict[str, Any]:
+    margins, stable = use.margins, use.margins.stable
+    mode = " (torque command)" if use.mode == "torque" else ""
+    return {
+        "trial": use.trial,
+        "compensation": use.compensation,
+        "regime": use.regime + mode,
+        "state": "low margin" if stable else "unstable",
+        "crossover": margins.crossover,
+        "phase": margins.phase_margin if stable else None,
+        "gain": margins.gain_margin_db if stable else None,
+        "growth": margins.growth,
+    }

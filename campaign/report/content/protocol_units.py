@@ -1,0 +1,93 @@
+"""Which units the text of a run's protocol has, by test and by option."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from campaign.archive import RunHeader
+from campaign.protocol.matrix import RANGE_KEYS, flatten
+from campaign.protocol.overrides import parse_overrides
+from campaign.units import split_quantity
+
+Written = Mapping[str, Mapping[str, str]]
+"""By test: dotted path of an option or of the matrix to the unit that its text has."""
+
+
+def written_units(header: RunHeader) -> Written:
+    """Units as the run's protocol and its `--set` wrote them; those it cannot tell are missing."""
+    found: dict[str, dict[str, str]] = {}
+    for text in header.sources.values():
+        for test in _tests(text):
+            units = found.setdefault(str(test.get("name", "")), {})
+            matrix = test.get("matrix")
+            units |= _units({k: v for k, v in test.items() if k != "matrix"})
+            units |= _swept_units(matrix if isinstance(matrix, dict) else {})
+    settings, _ = parse_overrides([f"{path}={value}" for path, value in header.overrides.items()])
+    for setting in settings:
+        name, *keys = map(str, setting.keys)
+        units, value = found.setdefault(name, {}), setting.value
+        if keys[:1] == ["matrix"]:
+            units |= _swept_units(_nested(keys[1:], value))
+        else:
+            units |= _units(_nested(keys, value))
+    return found
+
+
+def _tests(text: str) -> Iterator[Mapping[str, Any]]:
+    """The tests of a source; a bench, a CSV file and what this program cannot read have none."""
+    try:
+        tests = tomllib.loads(text).get("test")
+    except (ValueError, RecursionError):
+        return
+    yield from (test for test in tests if isinstance(test, dict)) if isinstance(tests, list) else ()
+
+
+def _units(tree: Mapping[str, Any]) -> dict[str, str]:
+    """Dotted path to unit, of all values in a tree that have one; a list has that of its first."""
+    found: dict[str, str] = {}
+    for path, value in leaves_of(tree):
+        for name, unit in _units_of(path, value):
+            found.setdefault(name, unit)
+    return found
+
+
+def _swept_units(matrix: Mapping[str, Any]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for path, _, value in flatten(matrix):
+        if isinstance(value, Mapping):
+            value = [value[key] for key in sorted(RANGE_KEYS & value.keys())]
+        for name, unit in _units_of(path, value):
+            found.setdefault(name, unit)
+    return found
+
+
+def _units_of(path: str, value: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping):
+        yield from ((f"{path}.{name}", unit) for name, unit in _units(value).items())
+    elif isinstance(value, list):
+        for item in value:
+            yield from _units_of(path, item)
+    elif isinstance(value, str):
+        try:
+            unit = split_quantity(value)[1]
+        except ValueError:
+            return
+        if unit:
+            yield path, unit
+
+
+def _nested(keys: Sequence[str], value: Any) -> dict[str, Any]:
+    for key in reversed(keys):
+        value = {key: value}
+    return value if isinstance(value, dict) else {}
+
+
+def leaves_of(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of all that is no table."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from leaves_of(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

@@ -1,0 +1,177 @@
+"""What was set, in words and in the units of the page: benches, options, tasks, motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from campaign.channels import COMMAND, UNITS, AxisKind, info
+from campaign.channels import Quantity as PhysicalQuantity
+from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
+from campaign.text import number, pretty_unit
+from campaign.trial import ChannelInfo, Task, Tree
+from campaign.units import Quantity, convert
+
+LISTED = 12
+"""Most values of a list that are written out."""
+
+Pairs = Iterator[tuple[str, str]]
+
+
+def settings_of(options: BaseModel, without: Sequence[str] = ()) -> Pairs:
+    """Every option that says something, tables within tables included: `motor: resistance`.
+
+    `without`: names of fields that are told elsewhere.
+    """
+    for name, field in type(options).model_fields.items():
+        if name not in without:
+            yield from _told(_words(name), getattr(options, name), _quantity(field))
+
+
+def tree_settings(tree: Tree) -> Pairs:
+    """The same of a table that this program has no class for: numbers are SI, and say so."""
+    for name, value in tree.items():
+        for label, text in _told(_words(name), value, None):
+            yield label, f"{text} (SI)" if text[:1].isdigit() or text[:1] == "−" else text
+
+
+def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
+    """What the bench was told to do; `command`: its channel, which knows the kind of axis."""
+    command = command or info(COMMAND, task.mode)
+    axis = AxisKind.LINEAR if command.unit in ("m", "m/s", "N") else AxisKind.ROTARY
+    rate = UNITS[axis][PhysicalQuantity.RATE]
+    angle, torque = UNITS[axis][PhysicalQuantity.ANGLE], UNITS[axis][PhysicalQuantity.TORQUE]
+    yield "mode", task.mode
+    yield from _motion("command", task.command, (command.unit, command.display_unit))
+    yield from _motion("acceleration of the base", task.base_acceleration, _per_second(rate))
+    yield from _motion("disturbance", task.disturbance, torque)
+    yield "compensation", task.compensation
+    yield "duration", _amount(task.duration, ("s", "s"))
+    start, stop = (number(time, 6) for time in task.window)
+    yield "window", f"{start} to {stop} s"
+    yield "sample rate", _amount(task.sample_rate, ("Hz", "Hz"))
+    if task.start_angle:
+        yield "start angle", _amount(task.start_angle, angle)
+    if task.stop_rate is not None:
+        yield "stops at a rate of", _amount(task.stop_rate, rate)
+    if task.spring_stiffness:
+        per = f"{torque[0]}/{angle[0]}"
+        yield "stiffness of the spring", _amount(task.spring_stiffness, (per, per))
+
+
+def point_settings(point: Mapping[str, Any], options: BaseModel | None, bench: Any) -> Pairs:
+    """Where in its sweep a trial stands; a number whose unit nobody knows is SI, and says so.
+
+    One of several `speeds` has their unit.
+    """
+    for path, value in point.items():
+        inside, _, rest = path.partition(".")
+        lists = (path, f"{path}s", f"{path.removesuffix('y')}ies")
+        found = (_quantity_at(options, name) for name in lists)
+        quantity = (
+            _quantity_at(bench, rest) if inside == "bench" else next(filter(None, found), None)
+        )
+        told = _told(_words(path.replace(".", ": ")), value, quantity)
+        for label, text in told:
+            bare = quantity is None and isinstance(value, float)
+            yield label, f"{text} (SI)" if bare else text
+
+
+def _motion(name: str, signal: Signal, unit: tuple[str, str]) -> Pairs:
+    if not isinstance(signal, Zero):
+        yield name, _signal(signal, unit)
+
+
+def _signal(signal: Signal, unit: tuple[str, str]) -> str:
+    match signal:
+        case Sine():
+            phase = f", phase {_amount(signal.phase, ('rad', 'deg'))}" if signal.phase else ""
+            return (
+                f"sine of {_amount(signal.amplitude, unit)}, {number(signal.frequency)} Hz{phase}"
+            )
+        case Polyline():
+            low, high = (_amount(end, unit) for end in (min(signal.values), max(signal.values)))
+            span = f"{number(signal.times[0], 6)} to {number(signal.times[-1], 6)} s"
+            return f"polyline of {len(signal.times)} points over {span}, between {low} and {high}"
+        case MultiSine():
+            ends = (number(end) for end in (min(signal.frequencies), max(signal.frequencies)))
+            largest = _amount(max(map(abs, signal.amplitudes)), unit)
+            count = len(signal.amplitudes)
+            return f"{count} sines of {' to '.join(ends)} Hz, the largest of {largest}"
+    return "nothing"
+
+
+def _told(label: str, value: Any, quantity: Quantity | None) -> Pairs:
+    if isinstance(value, BaseModel):
+        for name, text in settings_of(value):
+            yield f"{label}: {name}", text
+    elif isinstance(value, Mapping):
+        for name, item in value.items():
+            yield from _told(f"{label}: {_words(str(name))}", item, quantity)
+    elif isinstance(value, list | tuple) and any(isinstance(v, BaseModel | Mapping) for v in value):
+        for place, item in enumerate(value, start=1):
+            yield from _told(f"{label} {place}", item, quantity)
+    elif isinstance(value, list | tuple):
+        if value:
+            yield label, _listed(value, quantity)
+    elif value is not None and value != "":
+        yield label, _with_unit(_plain(value, quantity), quantity)
+
+
+def _listed(values: Sequence[Any], quantity: Quantity | None) -> str:
+    shown = [_plain(value, quantity) for value in values[:LISTED]]
+    more = [f"… ({len(values)})"] if len(values) > LISTED else []
+    return _with_unit(", ".join([*shown, *more]), quantity)
+
+
+def _plain(value: Any, quantity: Quantity | None) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return number(convert(value, quantity.si, quantity.display) if quantity else value, 6)
+    return str(value)
+
+
+def _with_unit(text: str, quantity: Quantity | None) -> str:
+    return f"{text} {pretty_unit(quantity.display)}" if quantity else text
+
+
+def _amount(value: float, unit: tuple[str, str]) -> str:
+    """A number in `unit`, SI and the page's."""
+    return f"{number(convert(value, *unit), 6)} {pretty_unit(unit[1])}"
+
+
+def _per_second(rate: tuple[str, str]) -> tuple[str, str]:
+    """Of an acceleration, as its rate is shown: deg/s² for deg/s."""
+    return f"{rate[0]}^2", f"{rate[1]}^2"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _quantity_at(options: Any, path: str) -> Quantity | None:
+    """Of the field at a dotted path; None where there is none."""
+    name, _, rest = path.partition(".")
+    if isinstance(options, Mapping):
+        return _quantity_at(options.get(name), rest) if rest else None
+    field = type(options).model_fields.get(name) if isinstance(options, BaseModel) else None
+    if field is None:
+        return None
+    return _quantity_at(getattr(options, name), rest) if rest else _quantity(field)
+
+
+def _quantity(field: FieldInfo) -> Quantity | None:
+    return next(_quantities((*field.metadata, field.annotation)), None)
+
+
+def _quantities(hints: Sequence[Any]) -> Iterator[Quantity]:
+    """Physical quantities in a field's metadata, or inside a list or an optional type of it."""
+    for hint in hints:
+        if isinstance(hint, Quantity):
+            yield hint
+        else:
+            yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))

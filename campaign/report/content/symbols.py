@@ -1,0 +1,90 @@
+"""Symbols of the thesis beside what files call them: its Tables 4.2 and 5.1, and the observer's.
+
+One table for who reads an equation and looks for the number, and for the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from campaign.text import pretty_unit
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A symbol as the thesis prints it.
+
+    Attributes:
+        field: dotted path in a bench, `*` for a name of the bench's own; "" for a mere signal.
+        channel: its name in recordings; "" where it is not recorded, or is no signal.
+        unit: SI, or "".
+        printed: the table or section that defines it.
+    """
+
+    symbol: str
+    meaning: str
+    unit: str
+    printed: str
+    field: str = ""
+    channel: str = ""
+
+    @property
+    def in_files(self) -> str:
+        """What a bench or a recording calls it."""
+        return self.field or self.channel or "–"
+
+    @property
+    def unit_words(self) -> str:
+        return pretty_unit(self.unit)
+
+
+def _friction(symbol: str, meaning: str, unit: str, name: str) -> Symbol:
+    return Symbol(symbol, meaning, unit, "Table 4.2", f"friction.*.{name}")
+
+
+def _field(symbol: str, meaning: str, unit: str, path: str) -> Symbol:
+    return Symbol(symbol, meaning, unit, "Table 5.1", path)
+
+
+def _signal(symbol: str, meaning: str, unit: str, channel: str = "") -> Symbol:
+    return Symbol(symbol, meaning, unit, "Table 5.1", channel=channel)
+
+
+SYMBOLS = (
+    _friction("σ₀", "bristle stiffness", "N m/rad", "bristle_stiffness"),
+    _friction("σ₁", "bristle damping", "N m s/rad", "bristle_damping"),
+    Symbol("z", "mean deflection of the bristles, the state of the model", "rad", "Table 4.2"),
+    _friction("σ₂", "viscous friction coefficient", "N m s/rad", "viscous_friction"),
+    _friction("T_c", "Coulomb friction", "N m", "coulomb_torque"),
+    _friction("T_s", "static friction", "N m", "static_torque"),
+    _friction("q̇_s, v_s", "Stribeck velocity", "rad/s", "stribeck_velocity"),
+    _friction("δ", "Stribeck shape factor", "", "stribeck_exponent"),
+    Symbol("ω", "rate of the load in space", "rad/s", "Figure 5.3", channel="gyro_rate"),
+    _signal("ω_i", "rate command", "rad/s", "command"),
+    _signal("ω_b", "motion of the base (hull)", "rad/s", "base_rate"),
+    _signal("I_i", "current command", "A"),
+    Symbol("i_m", "motor current", "A", "Section 5.3", channel="motor_current"),
+    _field("G_cv", "PI velocity controller", "", "controller.rate"),
+    _field("G_cc", "PI current controller", "", "controller.current"),
+    _field("L", "inductance of the motor's armature", "H", "motor.inductance"),
+    _field("R", "resistance of the motor's armature", "ohm", "motor.resistance"),
+    _field("K_t", "torque constant of the motor", "N m/A", "motor.torque_constant"),
+    _field("K_e", "back-EMF constant of the motor", "V s/rad", "motor.back_emf_constant"),
+    _signal("V_m", "voltage across the motor's winding", "V"),
+    _signal("V_b", "back-EMF voltage", "V"),
+    _field("J", "inertia of the load", "kg m^2", "axis.inertia"),
+    _field("N", "gear ratio", "", "gear.ratio"),
+    Symbol("T_f", "friction torque", "N m", "Section 5.3", channel="friction_torque"),
+    Symbol("K₀", "gain of the observer", "N m s/rad", "Section 5.3", "compensation.observer.gain"),
+)
+
+
+def markdown() -> Iterator[str]:
+    """The table in Markdown, as docs/reports.md has it."""
+    yield "| symbol | in files | unit | meaning | defined in |"
+    yield "| --- | --- | --- | --- | --- |"
+    for each in SYMBOLS:
+        name = f"`{each.in_files}`" if each.in_files != "–" else "–"
+        unit = each.unit or "–"
+        yield f"| {each.symbol} | {name} | {unit} | {each.meaning} | {each.printed} |"

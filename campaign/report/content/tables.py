@@ -1,0 +1,359 @@
+"""Tables in a reader's units: few digits on the page, all of them in the CSV file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from urllib.parse import quote
+
+from campaign.estimate import Estimate, Origin
+from campaign.published.headline import Headline, headline
+from campaign.published.scoreboard import Line, Scoreboard, place_columns
+from campaign.published.values import heading_of
+from campaign.report.content.lines import cell_name
+from campaign.result import Cell, Column, Table, Value, bare
+from campaign.text import interval, minus, number, pretty_unit
+from campaign.units import convert
+
+ROWS = 300
+"""Most rows on the page; the CSV file has them all."""
+REASONS = 6
+"""Most reasons for a missing interval that stand below a table."""
+UNIT = "unit"
+"""Name of a column that says the unit of its row."""
+ROUNDING = 1e-12
+"""Share of a column's largest number below which one is a rounding error, shown as 0."""
+
+
+@dataclass(frozen=True)
+class ShownCell:
+    """A cell on the page: its text and whether it is a number (those stand right-aligned)."""
+
+    text: str
+    number: bool
+
+
+@dataclass(frozen=True)
+class ShownTable:
+    """A table as the page shows it; `left_out` rows are in the CSV file only.
+
+    `notes` are sentences: which of its numbers have no interval or are not determined, and why.
+    """
+
+    headers: tuple[str, ...]
+    rows: tuple[tuple[ShownCell, ...], ...]
+    left_out: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def show(table: Table) -> ShownTable:
+    """The first `ROWS` rows, rounded to four significant digits, in display units."""
+    shown = [_shown_column(column, table.rows[:ROWS]) for column in table.columns]
+    rows = tuple(zip(*shown, strict=True))
+    headers = tuple(
+        f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
+        for column in table.columns
+    )
+    return ShownTable(headers, rows, max(0, len(table.rows) - ROWS), tuple(remarks(table)))
+
+
+def table_csv(table: Table) -> str:
+    """All rows, unrounded, in display units that the header names (`error_mrad`).
+
+    Behind them the ends of each interval, systematic parts included: `error_mrad_low`, `_high`.
+    """
+    ends = [
+        c for c in table.columns if any(isinstance(r.get(c.name), Estimate) for r in table.rows)
+    ]
+    headers = [_csv_name(column) for column in table.columns]
+    headers += [f"{_csv_name(column)}_{end}" for column in ends for end in ("low", "high")]
+    rows = (
+        [
+            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in table.columns),
+            *(_exact(_displayed(end, c)) for c in ends for end in _ends(row.get(c.name))),
+        ]
+        for row in table.rows
+    )
+    return _csv(headers, rows)
+
+
+def _ends(cell: Cell) -> tuple[float | None, float | None]:
+    return cell.combined if isinstance(cell, Estimate) else (None, None)
+
+
+def remarks(table: Table) -> Iterator[str]:
+    """Sentences: which numbers have no interval, which are not determined, and what is in none.
+
+    Each reason stands there once, with what it is true of: columns, a row, or how many rows.
+    """
+    for head, reasons in (
+        ("Without an interval", _without_interval),
+        ("Not determined", _not_determined),
+    ):
+        pieces = _by_reason(table, reasons)
+        if len(pieces) > REASONS:
+            more = len(pieces) - REASONS + 1
+            pieces = [*pieces[: REASONS - 1], f"and others, for {more} more reasons"]
+        if pieces:
+            yield f"{head}: {'; '.join(pieces)}."
+    sources = dict.fromkeys(
+        source for column in table.columns for source in _of_unknown_size(table, column)
+    )
+    if sources:
+        yield f"Of unknown size, and in no interval: {', '.join(sources)}."
+
+
+def _by_reason(
+    table: Table, reasons: Callable[[Estimate | float | int, Column], Sequence[str]]
+) -> list[str]:
+    """`columns (reason)` for each reason, in the order of the columns; of some rows, which."""
+    found: dict[str, dict[str, set[int]]] = {}
+    uncertain = [c for c in table.columns if _numbers(table, c) and not c.exact]
+    for column in uncertain:
+        for place, cell in _placed(table, column):
+            for reason in reasons(cell, column):
+                found.setdefault(reason, {}).setdefault(column.label, set()).add(place)
+    every: dict[str, set[int]] = {}
+    for column in uncertain:
+        every.setdefault(column.label, set()).update(n for n, _ in _placed(table, column))
+    return [f"{', '.join(_where(table, of, every))} ({reason})" for reason, of in found.items()]
+
+
+def _where(
+    table: Table, of: Mapping[str, set[int]], every: Mapping[str, set[int]]
+) -> Iterator[str]:
+    """Where a reason is true: whole columns, a row by its name, or a number of rows."""
+    whole = [label for label, rows in of.items() if rows == every[label]]
+    if 1 < len(every) == len(whole):
+        yield "all numbers"
+        return
+    yield from whole
+    parts: dict[frozenset[int], list[str]] = {}
+    for label, rows in of.items():
+        if label not in whole:
+            parts.setdefault(frozenset(rows), []).append(label)
+    for places, labels in parts.items():
+        name = _row_name(table, min(places)) if len(places) == 1 else ""
+        if name:
+            yield name if len(labels) > 1 else f"{labels[0]} of {name}"
+        else:
+            count = max(len(every[label]) for label in labels)
+            yield f"{', '.join(labels)} in {len(places)} of {count} rows"
+
+
+def _row_name(table: Table, place: int) -> str:
+    """What the first cell of a row calls it; "" where that is a number, or other rows have it."""
+    names = [row.get(table.columns[0].name) for row in table.rows]
+    name = names[place]
+    return name if isinstance(name, str) and names.count(name) == 1 else ""
+
+
+def _placed(table: Table, column: Column) -> Iterator[tuple[int, Estimate | float | int]]:
+    """The cells of a column that hold a number, or say why they have none, each with its row."""
+    for place, row in enumerate(table.rows):
+        cell = row.get(column.name)
+        if isinstance(cell, Estimate | float | int) and not isinstance(cell, bool):
+            yield place, cell
+
+
+def _numbers(table: Table, column: Column) -> list[Estimate | float | int]:
+    """The cells of a column that hold a number, or say why they have none."""
+    return [cell for _, cell in _placed(table, column)]
+
+
+def _open(cell: Estimate | float | int) -> bool:
+    return isinstance(cell, Estimate) and cell.origin is Origin.NOT_DETERMINED
+
+
+def _given(cell: Estimate) -> bool:
+    """Whether it was set, as its cell says: it has no interval because it is not uncertain."""
+    return cell.origin is Origin.GIVEN
+
+
+def _without_interval(cell: Estimate | float | int, column: Column) -> Sequence[str]:
+    if isinstance(cell, Estimate) and (cell.has_interval or _open(cell) or _given(cell)):
+        return ()
+    reason = (cell.reason if isinstance(cell, Estimate) else "") or column.reason
+    return (reason,) if reason else ()
+
+
+def _not_determined(cell: Estimate | float | int, column: Column) -> Sequence[str]:
+    if not isinstance(cell, Estimate) or not _open(cell):
+        return ()
+    reason = cell.reason or column.reason
+    return (reason,) if reason else ()
+
+
+def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
+    """The systematic parts that intervals of a column do not have in them."""
+    for cell in _numbers(table, column):
+        if isinstance(cell, Estimate) and cell.has_interval:
+            yield from (p.source for p in cell.systematic if p.standard_uncertainty is None)
+
+
+def published_csv(lines: Sequence[Line]) -> str:
+    """One published table: every cell with what was reproduced, unrounded, and the reason."""
+    headers = ("row", "column", "unit", "published", "reproduced", "deviation_percent", "status")
+    more = ("reason", "test", "low", "high", "verdict", "source")
+    draws = ("place", "place_low", "place_high", "draws")
+    rows = (
+        (
+            line.cell.row,
+            line.cell.column,
+            line.cell.unit,
+            _exact(line.cell.value),
+            _exact(line.reproduced),
+            _exact(line.deviation),
+            "" if line.status is None else str(line.status),
+            line.cell.reason,
+            line.test,
+            _exact(None if line.found is None else line.found.low),
+            _exact(None if line.found is None else line.found.high),
+            str(line.verdict),
+            line.source,
+            *place_columns(line),
+        )
+        for line in lines
+    )
+    return _csv((*headers, *more, *draws), rows)
+
+
+def data_link(text: str) -> str:
+    """A CSV text as a `data:` address, for a download that needs no second file.
+
+    As text, not as base64: served compressed, that is two thirds as long.
+    """
+    return "data:text/csv;charset=utf-8," + quote(text, safe="!$()*+,-./:;=?@_~")
+
+
+def agreement(scoreboard: Scoreboard) -> str:
+    """What the whole scoreboard comes to, in a few sentences; each published value counts once."""
+    found = headline(scoreboard)
+    if not found.compared:
+        return "No published number was measured in this run."
+    return " ".join(_sentences(found))
+
+
+def _cell_in_words(line: Line) -> str:
+    """`Figure 5.14 (stribeck velocity · rank)`."""
+    return f"{heading_of(line.cell.table)} ({cell_name(line.cell)})"
+
+
+def _sentences(found: Headline) -> Iterator[str]:
+    shares = ", ".join(f"{c.status} {c.good} of {c.compared}" for c in found.counts)
+    values = "published value" if found.compared == 1 else "published values"
+    yield f"{found.compared} {values} compared, each counted once, however often it is printed."
+    yield _bridge(found)
+    yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
+    middle, worst = found.median_deviation, found.worst_deviation
+    if middle is None or worst is None:
+        yield "No deviation among them is of a value that nobody fitted."
+    else:
+        yield (
+            f"Of the {len(found.deviations)} with a deviation that nobody fitted the median is"
+            f" {number(middle, 2)} %, the worst {number(worst, 2)} %."
+        )
+    missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
+    if missed:
+        yield f"Claims missed: {missed}."
+    rest = (
+        (len(found.not_reached), "not reached"),
+        (len(found.not_found), "not found"),
+        (len(found.not_run), "not run"),
+    )
+    if any(count for count, _ in rest):
+        counts = ", ".join(f"{count} {what}" for count, what in rest if count)
+        yield f"Besides: {counts}."
+
+
+def _bridge(found: Headline) -> str:
+    """How the numbers that are printed come to those that are compared."""
+    excluded = sum(count for _, count in found.excluded)
+    without = found.printed - found.repeats - excluded - found.compared
+    less = (
+        *([f"{found.repeats} repeat{'s' * (found.repeats > 1)}"] if found.repeats else []),
+        *(f"{count} {status}" for status, count in found.excluded),
+        *([f"{without} without a number to compare"] if without else []),
+    )
+    if not less:
+        return f"That is every one of the {found.printed} printed numbers."
+    listed = " and ".join(filter(None, (", ".join(less[:-1]), less[-1])))
+    return f"Of {found.printed} printed numbers {listed} are left out: {found.compared} are left."
+
+
+def _unit(column: Column) -> str:
+    return column.display or column.unit
+
+
+def _displayed(value: Value, column: Column) -> Value:
+    if isinstance(value, int | float) and not isinstance(value, bool) and column.display:
+        return float(convert(float(value), column.unit, column.display))
+    return value
+
+
+def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[ShownCell]:
+    """Numbers stand to the right, and so does what is missing among them."""
+    cells = [row.get(column.name) for row in rows]
+    values = [_displayed(bare(cell), column) for cell in cells]
+    given = [value for value in values if value is not None]
+    numbers = [float(v) for v in given if isinstance(v, int | float) and not isinstance(v, bool)]
+    right = bool(numbers) and len(numbers) == len(given)
+    largest = max((abs(v) for v in numbers if math.isfinite(v)), default=0.0)
+
+    def text(cell: Cell, value: Value) -> str:
+        if isinstance(cell, Estimate) and value is not None:
+            return _with_interval(cell, column)
+        if column.name == UNIT and isinstance(value, str):
+            return pretty_unit(value)
+        return _text(value, ROUNDING * largest)
+
+    return [ShownCell(text(cell, value), right) for cell, value in zip(cells, values, strict=True)]
+
+
+def _with_interval(cell: Estimate, column: Column) -> str:
+    """A number with its 95 % interval, or marked as a bound or as not determined."""
+    value, low, high = (
+        None if end is None else float(str(_displayed(end, column)))
+        for end in (cell.value, *cell.combined)
+    )
+    sign = {"at least": "≥ ", "at most": "≤ "}.get(cell.kind, "")
+    if sign:
+        value, low, high = (low if high is None else high), None, None
+    mark = "" if cell.origin is Origin.MEASURED else f" ({cell.origin})"
+    return f"{sign}{interval(value, low, high)}{mark}"
+
+
+def _text(value: Value, negligible: float) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return minus(str(value))
+    if isinstance(value, float):
+        return "0" if abs(value) < negligible else number(value)
+    return "–" if value is None else str(value)
+
+
+def _csv_name(column: Column) -> str:
+    unit = _unit(column).replace("%", "percent").replace("^", "").replace("/", " per ")
+    words = re.findall(r"\w+", f"{column.name} {unit}")
+    return "_".join(words)
+
+
+def _exact(value: Value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headers)
+    writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,305 @@
+"""All that an archive says of one trial, in a reader's words and units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from campaign.access.analysis import AnalysedTest
+from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.layout.journal import Decision, OperatorStep
+from campaign.archive.layout.story import Lines
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import trial_number
+from campaign.archive.reading.sound_samples import sound_part
+from campaign.channels import COMMAND
+from campaign.errors import ArchiveError, CampaignError
+from campaign.estimate import Estimate, Window
+from campaign.experiments.interface import Experiment, bench_of, options_of
+from campaign.report.content.settings import (
+    point_settings,
+    settings_of,
+    task_settings,
+    tree_settings,
+)
+from campaign.result import Column, Table, Value
+from campaign.text import interval, number, pretty_unit
+from campaign.trial import Recording, Role, Tree, Trial
+from campaign.units import convert
+
+SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s"}
+"""Unit of a metric to the one it is shown in; small angles are shown in mrad, others in degrees."""
+SHARES = ("time_stuck",)
+"""Metrics that are a share of the time."""
+ONE_STEP = 1.5
+"""Sampling steps, rounding included."""
+SMALL = 0.01
+"""rad."""
+POINT = "Place in the sweep"
+WITHOUT = ("name", "description", "known")
+"""Of a bench: what is told elsewhere, or is about it and not of it."""
+
+Pairs = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class TrialAccount:
+    """What a trial's page says; nothing in it knows a page.
+
+    Attributes:
+        number: of the trial.
+        title: of its test.
+        heading: the same, and what is particular about this trial of it.
+        label: that, as plan and commands have it.
+        facts: how it ended, when, with what.
+        digests: what its place in the archive and its identity are.
+        settings: by group (`Task`, `Options`, `Bench` ...), each in words.
+        tables: metrics, events, attempts, decisions; those that say something.
+        windows: parts that its analysis uses, as far as they were recorded.
+        not_reached: sentences on those that were not recorded, or not to their end.
+        recording: without what is damaged; None without any samples.
+        why_empty: why there are no samples; empty when there are.
+        damaged: what of it is damaged.
+    """
+
+    number: int
+    title: str
+    heading: str
+    label: str
+    facts: Pairs
+    digests: Pairs
+    settings: Mapping[str, Pairs]
+    tables: tuple[Table, ...]
+    windows: tuple[Window, ...]
+    recording: Recording | None
+    why_empty: str
+    damaged: tuple[Damage, ...]
+    not_reached: tuple[str, ...] = ()
+
+
+def account_of(
+    run: RunReader, archived: ArchivedTrial, story: Lines, test: AnalysedTest | None
+) -> TrialAccount:
+    """What there is to say of an executed trial; `story` is the run's journal."""
+    trial = archived.trial
+    recording, damaged = sound_part(run.path, archived)
+    known = [damage for damage in run.damaged if trial_number(damage) == trial.number]
+    if recording is not None and not recording.channels and not damaged:
+        recording = None
+    settings = _settings(archived, test.experiment if test else None)
+    title = test.title if test else trial.test
+    point = ", ".join(f"{name} {value}" for name, value in settings.get(POINT, ()))
+    wanted = archived.windows or trial.windows or (Window("window", *trial.task.window),)
+    windows, not_reached = _recorded(wanted, recording)
+    role = "" if trial.role is Role.MEASUREMENT else f" ({trial.role})"
+    return TrialAccount(
+        trial.number,
+        title,
+        f"{title}{role}{f': {point}' if point else ''}",
+        trial.label,
+        tuple((name, value) for name, value in _facts(archived, recording) if value),
+        (*_place(archived.entry), ("Fingerprint of bench, task and seed", trial.fingerprint)),
+        settings,
+        tuple(table for table in _tables(archived, recording, story) if table.rows),
+        windows,
+        recording,
+        "" if recording is not None else _why_empty(archived, damaged),
+        tuple(dict.fromkeys((*known, *damaged))),
+        not_reached,
+    )
+
+
+def _recorded(
+    wanted: Iterable[Window], recording: Recording | None
+) -> tuple[tuple[Window, ...], tuple[str, ...]]:
+    """The recorded parts of windows, and sentences on what of them was not; none without samples.
+
+    A window ends before a sample that is due at its end, so that one step more than the last
+    sample counts as recorded.
+    """
+    if recording is None or not len(recording.time):
+        return (), ()
+    first, last = float(recording.time[0]), float(recording.time[-1])
+    step = (last - first) / max(len(recording.time) - 1, 1)
+    windows, missing = [], []
+    for each in wanted:
+        span = f"{each.name}, {number(each.start)} to {number(each.stop)} s"
+        if each.start > last:
+            missing.append(f"Not reached: {span}; the recording ends at {number(last)} s.")
+            continue
+        if each.stop <= first:
+            missing.append(f"Not recorded: {span}; the recording begins at {number(first)} s.")
+            continue
+        stop = each.stop
+        if stop > last + ONE_STEP * step:
+            stop = last
+            missing.append(f"Not recorded to its end: {span}; the recording ends before.")
+        start = each.start if first <= each.start + ONE_STEP * step else first
+        windows.append(replace(each, start=start, stop=stop))
+    return tuple(windows), tuple(missing)
+
+
+def lost_account(run: RunReader, lost: int) -> TrialAccount:
+    """What is left to say of an executed trial that cannot be read: what the plan says of it."""
+    damaged = tuple(damage for damage in run.damaged if trial_number(damage) == lost)
+    planned = next((each for each in run.plan if each.number == lost), None)
+    label = planned.label if planned else f"trial {lost}"
+    facts = (("Test", f"{planned.test} ({planned.kind})"),) if planned else ()
+    digests = (("Fingerprint of bench, task and seed", planned.fingerprint),) if planned else ()
+    why = "The trial cannot be read."
+    return TrialAccount(lost, label, label, label, facts, digests, {}, (), (), None, why, damaged)
+
+
+def _place(entry: str) -> Pairs:
+    return (("Group in the archive", entry),) if entry else ()
+
+
+def _why_empty(archived: ArchivedTrial, damaged: tuple[Damage, ...]) -> str:
+    if archived.not_kept:
+        return f"Its samples were not kept: {archived.not_kept}."
+    return "Its samples cannot be read." if damaged else "It recorded no samples."
+
+
+def _facts(archived: ArchivedTrial, recording: Recording | None) -> Iterator[tuple[str, str]]:
+    trial, ending = archived.trial, archived.ending
+    yield "Test", trial.test
+    yield "Experiment", trial.kind
+    yield "Purpose", str(trial.role)
+    yield "Repetition", str(trial.repeat) if trial.repeat > 1 else ""
+    yield "Outcome", f"{ending.outcome}{f': {ending.reason}' if ending.reason else ''}"
+    yield "Fault", str(ending.fault or "")
+    yield "Safe state afterwards", str(ending.safe_state)
+    yield "Started", archived.started
+    yield "Ended", archived.ended
+    if recording is not None and len(recording.time):
+        yield "Recorded", f"{len(recording.time)} samples, {number(recording.time[-1], 6)} s"
+    yield "Seed", str(trial.seed)
+    yield "Note of the plan", trial.note
+    yield "Done by hand before", "; ".join(trial.setup)
+    yield "Measured by", archived.measured_by
+
+
+def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[str, Pairs]:
+    trial = archived.trial
+    options = _options(trial, experiment)
+    try:
+        bench = bench_of(trial)
+        told = tuple(settings_of(bench, WITHOUT))
+    except (ValueError, CampaignError):  # of another version, or a plug-in that is not here
+        bench, told = None, tuple(tree_settings(trial.bench))
+    command = _command(archived)
+    groups = {
+        POINT: tuple(point_settings(trial.point, options, bench)),
+        "Task": tuple(task_settings(trial.task, command)),
+        "Options of the test": tuple(
+            tree_settings(trial.options)
+            if options is None
+            else settings_of(options, tuple(options.without_effect()))
+        ),
+        "Bench": (("name", bench.name), *told) if bench else told,
+        "Work of the backend": tuple(_flat(archived.ending.telemetry)),
+    }
+    return {name: pairs for name, pairs in groups.items() if pairs}
+
+
+def _options(trial: Trial, experiment: Experiment | None) -> Any:
+    try:
+        return None if experiment is None else options_of(experiment, trial.options)
+    except (ValueError, CampaignError):  # of another version of the experiment
+        return None
+
+
+def _command(archived: ArchivedTrial) -> Any:
+    try:
+        return next((each for each in archived.channels() if each.name == COMMAND), None)
+    except ArchiveError:
+        return None
+
+
+def _flat(tree: Tree | Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Nested tables by dotted name; units are in the names."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}: ")
+        elif isinstance(value, bool):
+            yield f"{prefix}{name}".replace("_", " "), "yes" if value else "no"
+        elif isinstance(value, int | float):
+            yield f"{prefix}{name}".replace("_", " "), number(value, 6)
+        elif isinstance(value, str) and value:
+            yield f"{prefix}{name}".replace("_", " "), value
+
+
+def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) -> Iterator[Table]:
+    """What was measured, what happened, and what the journal says of the trial."""
+    yield Table(
+        "metrics",
+        "What the recording says by itself",
+        (
+            Column("name", "Quantity"),
+            Column("value", "Value, 95 % interval"),
+            Column("unit", "Unit"),
+            Column("reason", "Remark on the interval"),
+        ),
+        tuple(map(_metric, archived.estimates)),
+    )
+    events = recording.events if recording is not None else ()
+    yield Table(
+        "events",
+        "What happened meanwhile",
+        (Column("time", "Time", "s", "s", exact=True), Column("text", "Event")),
+        tuple({"time": event.time, "text": event.text} for event in events),
+    )
+    yield Table(
+        "attempts",
+        "Attempts",
+        (
+            Column("attempt", "Attempt", exact=True),
+            Column("at", "Ended"),
+            Column("outcome", "Outcome"),
+            Column("reason", "Reason"),
+            Column("safe", "Safe state"),
+        ),
+        tuple(_attempts(archived.trial.number, story)),
+        note="The last attempt is the trial; the earlier ones are kept and not analysed.",
+    )
+    yield Table(
+        "decisions",
+        "What was decided and done by hand",
+        (Column("at", "When"), Column("what", "What"), Column("why", "Reason or answer")),
+        tuple(_decisions(archived.trial.number, story)),
+    )
+
+
+def _metric(found: Estimate) -> Mapping[str, Value]:
+    unit = "percent" if found.name in SHARES else SHOWN.get(found.unit, found.unit)
+    if unit == "rad":
+        unit = "mrad" if abs(found.value) < SMALL else "deg"
+    ends = (found.value, *found.combined)
+    value, low, high = (None if e is None else convert(e, found.unit, unit) for e in ends)
+    return {
+        "name": found.name.replace("_", " "),
+        "value": interval(value, low, high),
+        "unit": pretty_unit(unit),
+        "reason": found.reason,
+    }
+
+
+def _attempts(trial: int, story: Lines) -> Iterator[Mapping[str, Value]]:
+    attempts = [each for each in story.attempts if each.trial == trial]
+    for each in attempts if len(attempts) > 1 else ():
+        yield {
+            "attempt": each.attempt,
+            "at": each.at,
+            "outcome": str(each.outcome),
+            "reason": each.reason,
+            "safe": str(each.safe_state),
+        }
+
+
+def _decisions(trial: int, story: Lines) -> Iterator[Mapping[str, Value]]:
+    for entry in story.entries:
+        if isinstance(entry, Decision) and entry.trial == trial:
+            yield {"at": entry.at, "what": entry.decision, "why": entry.reason}
+        elif isinstance(entry, OperatorStep) and entry.trial == trial:
+            yield {"at": entry.at, "what": entry.step, "why": entry.answer}

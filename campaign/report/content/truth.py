@@ -1,0 +1,271 @@
+"""True, found, interval: each test's findings beside the bench that its samples came from.
+
+Only where that bench is known: of a run on `sim`. The report opens the truth when every analysis
+is done; no analysis is given it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from campaign.access.analysis import AnalysedTest
+from campaign.archive import RunReader
+from campaign.estimate import Estimate
+from campaign.experiments.interface import bench_of
+from campaign.identification.intervals import student
+from campaign.physics.bench import Bench
+from campaign.physics.true_values import QUANTITIES, true_value
+from campaign.physics.truth import simulated
+from campaign.physics.variation import as_it_is, of_its_day
+from campaign.report.content.written_units import TestUnits, units_of
+from campaign.result import Cell, Column, Finding, Table, Value
+from campaign.text import number, path_words, quantity_words
+from campaign.trial import Tree, Trial, canonical_json
+
+Row = Mapping[str, Cell]
+Array = NDArray[np.float64]
+SIMULATED = "sim"
+FEWEST = 3
+"""Estimates of a quantity from which on their scatter says whether they are all off alike."""
+SURE = 0.995
+"""Level of that test: of 200 quantities that are not off, one is told to be."""
+NEGLIGIBLE = 0.5
+"""Percent of a true value below which nobody minds that all estimates are off alike."""
+MEANS = ("nominal", "both")
+"""Directions of a number that is the mean of those of the positive and the negative one."""
+EXPONENT, FREE = "exponent", "free"
+"""Condition of a parameter that was fitted with the Stribeck exponent free, or held at a value."""
+COUNTED = "counted"
+"""In a row, beside its cells: False for what other numbers of the table say already."""
+
+
+def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Table]:
+    """By test, what it found of the parameters of the bench that was simulated."""
+    if run.header.backend != SIMULATED:
+        return {}
+    tests = tuple(tests)
+    units = units_of(tests, run.header)
+    plants = run.header.truth.plants
+    found = ((test.name, _table(test, plants, units[test.name])) for test in tests)
+    return {name: table for name, table in found if table is not None}
+
+
+@dataclass
+class _Benches:
+    """The bench that each trial was simulated on, made once for each that is different."""
+
+    plants: Mapping[str, Tree]
+    known: dict[tuple[str, str], Bench | None] = field(default_factory=dict)
+    by_number: dict[int, Bench | None] = field(default_factory=dict)
+
+    def of(self, trial: Trial) -> Bench | None:
+        """On its day; None where the archive does not say any more, or nobody here knows it."""
+        if trial.number not in self.by_number:
+            key = (trial.truth, canonical_json(trial.bench))
+            if key not in self.known:
+                made = self._made(trial)
+                self.known[key] = None if made is None else of_its_day(made)
+            self.by_number[trial.number] = self.known[key]
+        return self.by_number[trial.number]
+
+    def own(self, trial: Trial) -> Bench | None:
+        """As it was in this very trial, whose friction scatters."""
+        made = self._made(trial)
+        return None if made is None else as_it_is(made, trial.seed)
+
+    def _made(self, trial: Trial) -> Bench | None:
+        try:
+            stated = bench_of(trial)
+            return simulated(self.plants[trial.truth], stated) if trial.truth else stated
+        except (LookupError, ValidationError, ValueError):
+            return None
+
+
+def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> Table | None:
+    benches = _Benches(plants)
+    trials = [archived.trial for archived in test.trials]
+    known = [
+        finding
+        for finding in test.result.findings
+        if finding.quantity in QUANTITIES and not finding.recomputed
+    ]
+    again = [_says_again(finding, known) for finding in known]
+    found = [_row(finding, trials, benches, units) for finding in known]
+    pairs = [(row, why) for row, why in zip(found, again, strict=True) if row is not None]
+    rows = [{**row, COUNTED: not why} for row, why in pairs]
+    if not rows:
+        return None
+    left_out = dict.fromkeys(why for row, why in pairs if why and row["inside"] != "")
+    note = held(rows) or "None of these numbers has an interval"
+    note += f"; {' and '.join(left_out)} are not counted." if left_out else "."
+    note += "".join(f" {_capital(each)}." for each in biases(rows))
+    if any(trial.truth for trial in trials):
+        note += " Plan and analysis were given the stated bench, not this one."
+    return Table(
+        key="truth",
+        title="True and found",
+        columns=(
+            Column("quantity", "Quantity"),
+            Column("conditions", "Conditions"),
+            Column("unit", "Unit"),
+            Column("true", "True", exact=True),
+            Column("found", "Found"),
+            Column("inside", "In the interval"),
+        ),
+        rows=tuple(rows),
+        note=note,
+    )
+
+
+def held(rows: Sequence[Row]) -> str:
+    """How many of the intervals hold the true value; "" without any interval.
+
+    A mean says nothing that the numbers beside it, which it is of, do not say; nor do two fits of
+    the same points say more than one.
+    """
+    inside = [row["inside"] for row in rows if row[COUNTED] and row["inside"] != ""]
+    if not inside:
+        return ""
+    values = "value" if len(inside) == 1 else "values"
+    return f"{inside.count('yes')} of {len(inside)} intervals hold the true {values}"
+
+
+def biases(rows: Sequence[Row]) -> Iterator[str]:
+    """Of each quantity whose estimates are all off alike, how far, and what may be behind it.
+
+    By Student's t of the relative deviations of the single numbers. Wide intervals that hold the
+    true value hide such a bias, as does any count of them.
+    """
+    for quantity in dict.fromkeys(str(row["quantity"]) for row in rows):
+        own = [row for row in rows if row[COUNTED] and row["quantity"] == quantity]
+        off = np.array([each for row in own if (each := _deviation(row)) is not None])
+        if len(off) < FEWEST or abs(np.mean(off)) < NEGLIGIBLE:
+            continue
+        error = float(np.std(off, ddof=1)) / math.sqrt(len(off))
+        if abs(np.mean(off)) > student(len(off) - 1, SURE) * error:
+            yield _bias(quantity, off, _largest_part(row["found"] for row in own))
+
+
+def _bias(quantity: str, off: Array, source: str) -> str:
+    """`stiffness at rest: all 4 lie below what is true, by 7 to 10 %, more than ...`.
+
+    Where they lie on both sides: the mean, and from where to where they range.
+    """
+    mean, low, high = float(np.mean(off)), float(np.min(off)), float(np.max(off))
+    side = "below" if mean < 0 else "above"
+    if low > 0 or high < 0:
+        ends = " to ".join(number(end, 2) for end in sorted((abs(low), abs(high))))
+        where = f"all {len(off)} lie {side} what is true, by {ends} %, more than their scatter"
+    else:
+        where = (
+            f"on average {number(abs(mean), 2)} % {side} what is true ({_signed(low)} to"
+            f" {_signed(high)} %), more than the scatter of the {len(off)}"
+        )
+    told = f"{quantity}: {where} explains"
+    return f"{told} (largest systematic part: {source})" if source else told
+
+
+def _signed(value: float) -> str:
+    return f"+{number(value, 2)}" if value > 0 else number(value, 2)
+
+
+def _largest_part(cells: Iterable[Cell]) -> str:
+    """The source of the largest systematic part of some estimates; "" without any."""
+    parts = (part for cell in cells if isinstance(cell, Estimate) for part in cell.systematic)
+    known = [(part.standard_uncertainty or 0.0, part.source) for part in parts]
+    size, source = max(known, default=(0.0, ""))
+    return source if size else ""
+
+
+def _deviation(row: Row) -> float | None:
+    """Found less true, in percent of true."""
+    found, true = row["found"], row["true"]
+    if not isinstance(found, Estimate) or not isinstance(true, float) or not true:
+        return None
+    return None if math.isnan(found.value) else 100.0 * (found.value - true) / abs(true)
+
+
+def _is_mean(finding: Finding) -> bool:
+    """Whether it is the mean of several numbers, by its conditions."""
+    conditions = finding.conditions
+    return conditions.get("statistic") == "mean" or conditions.get("direction") in MEANS
+
+
+def _says_again(finding: Finding, others: Sequence[Finding]) -> str:
+    """As what a finding says again what others of its quantity say; "" where it says its own."""
+    beside = [each for each in others if each.quantity == finding.quantity]
+    if _is_mean(finding) and not all(map(_is_mean, beside)):
+        return "means of others"
+    free = {**finding.conditions, EXPONENT: FREE}
+    if finding.conditions != free and any(each.conditions == free for each in beside):
+        return "fits of the same points with the exponent held"
+    return ""
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _row(
+    finding: Finding, trials: Sequence[Trial], benches: _Benches, units: TestUnits
+) -> Mapping[str, Cell] | None:
+    """Quantity, true value and estimate; None where the bench has no such number, or several."""
+    true = set(_true_values(finding, trials, benches))
+    if len(true) != 1 or None in true:
+        return None
+    value = true.pop()
+    estimate = finding.known
+    return {
+        "quantity": quantity_words(finding.quantity),
+        "conditions": _conditions(finding.conditions, units),
+        "unit": finding.unit,
+        "true": value,
+        "found": estimate,
+        "inside": _inside(estimate, value),
+    }
+
+
+def _true_values(
+    finding: Finding, trials: Sequence[Trial], benches: _Benches
+) -> Iterator[float | None]:
+    """Of each bench that a trial of the finding was executed on, on its day.
+
+    Of a finding about one trial it is that trial's own value: friction scatters between trials.
+    """
+    own = [trial for trial in trials if _is_of(trial, finding)]
+    found = [benches.own(own[0])] if len(own) == 1 else [benches.of(trial) for trial in own]
+    for bench in {id(bench): bench for bench in found}.values():
+        yield None if bench is None else true_value(bench, finding.quantity, finding.conditions)
+
+
+def _is_of(trial: Trial, finding: Finding) -> bool:
+    """Whether nothing of the trial's place contradicts the finding's conditions."""
+    return all(
+        finding.conditions[path] == value
+        for path, value in trial.point.items()
+        if path in finding.conditions
+    )
+
+
+def _conditions(conditions: Mapping[str, Value], units: TestUnits) -> str:
+    shown = (
+        f"{path_words(name)} {units.value(name, value)}"
+        for name, value in conditions.items()
+        if value is not None
+    )
+    return ", ".join(shown)
+
+
+def _inside(estimate: Estimate, true: float | None) -> str:
+    """Whether the combined interval holds the true value; empty where there is none."""
+    if not estimate.has_interval or true is None:
+        return ""
+    low, high = estimate.combined
+    below, above = low is not None and true < low, high is not None and true > high
+    return "no" if below or above else "yes"

@@ -1,0 +1,196 @@
+"""Values of options and of swept paths in the units that the protocol wrote them in.
+
+Everything inside is SI, and most quantities have one display unit. But who writes `"3 urad"` means
+microradians, and reads 0.000171887 degrees as somebody else's number. The protocol's text is in the
+archive: what it, or `--set`, wrote is the unit of the page; what it left to a default has the
+quantity's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from campaign.access.analysis import AnalysedTest
+from campaign.archive import RunHeader
+from campaign.physics.bench import Bench
+from campaign.protocol.shapes import Shape, shape_at
+from campaign.report.content.protocol_units import leaves_of, written_units
+from campaign.result import Table
+from campaign.text import number, path_words, pretty_unit
+from campaign.units import Quantity, convert
+
+LISTED = 12
+"""Most values of a list that are written out."""
+DIGITS = 6
+"""of a value that was written, at most."""
+KINDS = ("kind", "model", "method")
+"""Entries that say what a table is, and so come first and need no name."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number in the SI unit `si` is shown in `unit`; one of these is `factor` SI units."""
+
+    si: str
+    unit: str
+    factor: float
+
+    def number(self, value: float) -> float:
+        return value / self.factor
+
+
+@dataclass(frozen=True)
+class TestUnits:
+    """How values of one test's options, bench and sweep are shown.
+
+    Attributes:
+        written: dotted path to unit, of this test.
+    """
+
+    __test__ = False
+
+    test: AnalysedTest
+    written: Mapping[str, str] = field(default_factory=dict)
+
+    def of(self, path: str) -> Shown | None:
+        """The unit of what stands at a path, of an option or of what trials are told apart by."""
+        if path not in self._known:
+            self._known[path] = self._find(path)
+        return self._known[path]
+
+    def listed_by(self, path: str) -> str:
+        """The option that lists the values of a sweep of the experiment's own: `speeds`; or ""."""
+        fields = self.test.experiment.options.model_fields if self.test.experiment else {}
+        several = [f"{path}s", f"{path[:-1]}ies" if path.endswith("y") else f"{path}es"]
+        return next((name for name in several if path not in fields and name in fields), "")
+
+    def words(self, path: str, values: Sequence[Any]) -> str:
+        """Values at a path as people write them, the unit once: `0.1, 0.2, 0.4 Hz`."""
+        unit = self.of(path)
+        if any(isinstance(value, Mapping) for value in values):
+            return "; ".join(self._tables(path, values))
+        numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+        ends = [min(numbers), max(numbers)] if len(numbers) == len(values) > LISTED else values
+        shown = [_plain(value, unit) for value in ends]
+        text = ", ".join(shown)
+        if len(values) > LISTED:
+            text = f"{len(values)} values from {shown[0]} to {shown[-1]}"
+        return f"{text} {pretty_unit(unit.unit)}".rstrip() if unit and numbers else text
+
+    def value(self, path: str, value: Any) -> str:
+        """One value, which may be a list or a table of further options."""
+        if isinstance(value, list | tuple):
+            return self.words(path, value)
+        return self.words(path, [value])
+
+    def table(self, table: Table) -> Table:
+        """The same table, with words for paths and the protocol's units for what was set."""
+        columns = []
+        for column in table.columns:
+            set_ = column.exact or column.name in self._swept
+            unit = self.of(column.name) if set_ else None
+            if column.label == column.name:
+                words = path_words(column.name)
+                column = replace(column, label=words[:1].upper() + words[1:])
+            if unit is not None and column.unit in ("", unit.si):
+                column = replace(column, unit=unit.si, display=unit.unit)
+            columns.append(column)
+        return replace(table, columns=tuple(columns))
+
+    @cached_property
+    def _known(self) -> dict[str, Shown | None]:
+        return {}
+
+    @cached_property
+    def _swept(self) -> frozenset[str]:
+        return frozenset(path for each in self.test.trials for path in each.trial.point)
+
+    def _find(self, path: str) -> Shown | None:
+        for name in filter(None, (path, self.listed_by(path))):
+            quantity = self._quantity(name)
+            if quantity is not None:
+                return _shown(quantity, self.written.get(path) or self.written.get(name))
+        return self._of_column(path)
+
+    def _quantity(self, path: str) -> Quantity | None:
+        root: Any = None if self.test.experiment is None else self.test.experiment.options
+        tree: Any = self.test.options
+        keys = path.split(".")
+        if keys[0] == "bench":
+            root, keys = Bench, keys[1:]
+            tree = self.test.bench.model_dump(mode="json") if self.test.bench else {}
+        return None if root is None or not keys else _within(shape_at(root, tree, tuple(keys)))
+
+    def _of_column(self, path: str) -> Shown | None:
+        """As the analysis tabulates it, where an experiment alone knows what its points are."""
+        for table in self.test.result.tables:
+            for column in table.columns:
+                if column.name == path and column.unit:
+                    unit = column.display or column.unit
+                    return Shown(column.unit, unit, convert(1.0, unit, column.unit))
+        return None
+
+    def _tables(self, path: str, values: Sequence[Any]) -> Iterator[str]:
+        """Tables by what they are, and by what they say that is not the same in all of them."""
+        leaves = [dict(leaves_of(v)) if isinstance(v, Mapping) else {"": v} for v in values]
+        for own in leaves:
+            alike = [other for other in leaves if _kind(other) == _kind(own)]
+            told = [
+                f"{path_words(name)} {self.value(f'{path}.{name}', value)}".strip()
+                for name, value in own.items()
+                if name not in KINDS
+                and value not in (None, [], ())
+                and (len(values) == 1 or any(other.get(name) != value for other in alike))
+            ]
+            yield ", ".join(filter(None, (_kind(own), *told))) or "as given"
+
+
+def units_of(tests: Iterable[AnalysedTest], header: RunHeader) -> dict[str, TestUnits]:
+    """By test, how its values are shown."""
+    written = written_units(header)
+    return {test.name: TestUnits(test, written.get(test.name, {})) for test in tests}
+
+
+def short_number(value: float) -> str:
+    """A number that was written: as many of `DIGITS` digits as it has."""
+    rounded = float(f"{value:.{DIGITS}g}")
+    if not rounded or 1e-5 <= abs(rounded) < 10.0 ** (DIGITS + 3):
+        return number(rounded, DIGITS)
+    fewest = next((n for n in range(1, DIGITS) if float(f"{value:.{n}g}") == rounded), DIGITS)
+    return number(rounded, fewest)
+
+
+def _shown(quantity: Quantity, unit: str | None) -> Shown:
+    """In the unit that was written, where that is one of the quantity; else in its own."""
+    for each in filter(None, (unit, quantity.display)):
+        try:
+            return Shown(quantity.si, each, quantity.parse(f"1 {each}"))
+        except ValueError:
+            continue
+    return Shown(quantity.si, quantity.si, 1.0)
+
+
+def _within(shape: Shape | None) -> Quantity | None:
+    """The quantity of a value, or of the values of a list."""
+    depth = 0
+    while shape is not None and shape.quantity is None and depth < 3:
+        shape, depth = shape.child(0), depth + 1
+    return shape.quantity if shape is not None else None
+
+
+def _plain(value: Any, unit: Shown | None) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        text = ", ".join(_plain(item, unit) for item in value[:LISTED])
+        return f"{text} … ({len(value)})" if len(value) > LISTED else text
+    if isinstance(value, int | float):
+        return short_number(unit.number(value) if unit else value)
+    return "none" if value is None or value == "" else str(value)
+
+
+def _kind(leaves: Mapping[str, Any]) -> str:
+    return next((str(leaves[name]) for name in KINDS if name in leaves), "")

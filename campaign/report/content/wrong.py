@@ -1,0 +1,160 @@
+"""What went wrong with a run, in plain sentences; nothing of a run that went as planned."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+
+from campaign.access.analysis import AnalysedTest
+from campaign.archive import ArchivedTrial, RunReader, RunStatus
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import hidden_trials, lost_trials
+from campaign.experiments.conclusions.stabilization import method
+from campaign.trial import Outcome, SafeState
+
+WORDS = {
+    Outcome.LIMIT: "ended at a limit",
+    Outcome.DIVERGED: "diverged",
+    Outcome.FAULT: "failed by a fault",
+}
+ENDED = {
+    RunStatus.INTERRUPTED: "The run was interrupted",
+    RunStatus.FAULT: "The run ended early, by a fault",
+    RunStatus.INCOMPLETE: "There is no word of the run's end: it goes on, or it was killed",
+}
+SOUGHT = (Outcome.LIMIT, Outcome.DIVERGED)
+"""How a loop that becomes unstable ends its trial."""
+LONGEST = 200
+"""characters of a reason."""
+METHOD = "compensation"
+"""What a matrix calls the choice of a method."""
+_NUMBER = re.compile(r"[-+\d.]+")
+
+
+def wrong_with(
+    run: RunReader, tests: Sequence[AnalysedTest], damaged: Sequence[Damage]
+) -> Iterator[str]:
+    """Sentences: the run's end, safety, trials, methods, damage, analyses."""
+    yield from _end(run)
+    yield from _safety(run)
+    yield from _not_executed(run)
+    yield from _failed(run, tests)
+    yield from _never_ran(run, tests)
+    yield from _damage(run, damaged)
+    without = [test.title for test in tests if test.problem and test.trials]
+    if without:
+        names = ", ".join(without)
+        yield f"No result of {len(without)} of {_trials(len(tests), 'test')}: {names}."
+
+
+def _end(run: RunReader) -> Iterator[str]:
+    if run.status in ENDED:
+        yield ENDED[run.status] + (f": {_short(run.reason)}." if run.reason else ".")
+
+
+def _safety(run: RunReader) -> Iterator[str]:
+    """That nobody saw the bench at rest; of a run without an end nobody can have."""
+    unsafe = [t for t in run.trials if t.ending.safe_state is SafeState.NOT_CONFIRMED]
+    if run.safe_state is SafeState.NOT_CONFIRMED:
+        yield "Safe state NOT confirmed: the bench was not seen at rest, its drive off, at the end."
+    if unsafe:
+        yield f"After {_trials(len(unsafe))} the bench was not seen at rest with its drive off."
+
+
+def _not_executed(run: RunReader) -> Iterator[str]:
+    lost = len(lost_trials(run))
+    hidden = hidden_trials(run)
+    missing = len(run.plan) - len(run.trials) - lost - hidden
+    if hidden:
+        they = "it was" if hidden == 1 else "they were"
+        yield (
+            f"{hidden} of {_trials(len(run.plan))} cannot be read, and the archive does not say "
+            f"any more whether {they} executed."
+        )
+    if missing > 0:
+        were = "was" if missing == 1 else "were"
+        yield f"{missing} of {_trials(len(run.plan))} {were} not executed."
+    if lost:
+        yield f"{_trials(lost)} {'was' if lost == 1 else 'were'} executed and cannot be read."
+
+
+def _failed(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
+    """How many executed trials did not complete, and why most of them; sought instability apart."""
+    seekers = {t.name: t.title for t in tests if t.experiment and t.experiment.seeks_instability}
+    failed = [t for t in run.trials if t.ending.outcome is not Outcome.COMPLETED]
+    is_sought = [t.trial.test in seekers and t.ending.outcome in SOUGHT for t in failed]
+    sought = [trial for trial, yes in zip(failed, is_sought, strict=True) if yes]
+    others = [trial for trial, yes in zip(failed, is_sought, strict=True) if not yes]
+    if others:
+        yield (
+            f"{len(others)} of {_trials(len(run.trials), 'executed trial')} did not complete"
+            f" ({_by_outcome(others)}); {_commonest(others)}."
+        )
+    for name, title in seekers.items():
+        own = sum(each.trial.test == name for each in sought)
+        if own:
+            yield (
+                f"{_trials(own)} of {title} ended early, at a limit or undefined: it goes to where "
+                "a loop becomes unstable, and such an end is a result."
+            )
+
+
+def _never_ran(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
+    """Methods of a test that were planned, and of which no trial completed; others' were."""
+    planned = {str(each.get("name", "")): each.get("matrix") for each in run.header.tests}
+    for test in tests:
+        matrix = planned.get(test.name)
+        methods = matrix.get(METHOD) if isinstance(matrix, Mapping) else None
+        failed = {each.trial.number for each in test.failed}
+        ran = {t.trial.point.get(METHOD) for t in test.trials if t.trial.number not in failed}
+        if not ran or not isinstance(methods, list | tuple):
+            continue
+        for name in dict.fromkeys(methods):
+            if name not in ran:
+                words = "without compensation" if name == "none" else f"with {method(name)}"
+                yield (
+                    f"No trial {words} completed in {test.title}: it was planned, and is in none "
+                    "of its numbers."
+                )
+
+
+def _by_outcome(failed: Sequence[ArchivedTrial]) -> str:
+    counts = Counter(each.ending.outcome for each in failed)
+    return ", ".join(f"{count} {_ended(way, count)}" for way, count in counts.most_common())
+
+
+def _ended(way: Outcome, count: int) -> str:
+    if way is Outcome.INTERRUPTED:
+        return "was interrupted" if count == 1 else "were interrupted"
+    return WORDS.get(way, str(way))
+
+
+def _commonest(failed: Sequence[ArchivedTrial]) -> str:
+    """The reason of most of them, whatever its numbers, in the words of the first."""
+    kinds: dict[str, list[str]] = {}
+    for each in failed:
+        reason = each.ending.reason or "no reason is archived"
+        kinds.setdefault(_NUMBER.sub("#", reason), []).append(reason)
+    alike = max(kinds.values(), key=len)
+    if len(kinds) > 1:
+        return f"the commonest reason ({len(alike)}), such as: {_short(alike[0])}"
+    return f"{'the reason' if len(alike) == 1 else 'such as'}: {_short(alike[0])}"
+
+
+def _damage(run: RunReader, damaged: Sequence[Damage]) -> Iterator[str]:
+    if damaged:
+        places = "1 place" if len(damaged) == 1 else f"{len(damaged)} places"
+        yield (
+            f"The archive is damaged in {places}: what cannot be read is in none of these numbers."
+        )
+
+
+def _trials(count: int, what: str = "trial") -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _short(text: str) -> str:
+    """In one line, without its full stop."""
+    line = " ".join(text.split()).rstrip(".")
+    return line if len(line) <= LONGEST else f"{line[:LONGEST]} …"

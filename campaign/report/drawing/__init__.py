@@ -1,0 +1,1 @@
+"""What a report draws: data in, SVG out, the same bytes for the same data."""

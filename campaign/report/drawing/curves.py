@@ -1,0 +1,275 @@
+"""Curves of a panel: lines, dots, bands and bars, and the published values beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.report.drawing.decimate import decimate
+from campaign.report.drawing.published_marks import PublishedMarks
+from campaign.report.palette import INK, Look
+from campaign.result import Axis, Curve, Panel
+from campaign.units import factor
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+DENSE = 2_000
+"""From here on a scatter is drawn as an image: thousands of signs would outweigh the page."""
+LONGEST_BAR = 1.0
+"""Span of a panel's numbers beyond which the bars of their intervals are cut."""
+OUT_OF_SIGHT = 1e-6
+"""of a number: where a bar ends that a logarithmic axis has no end for."""
+BARS = "bars"
+"""What the paths of intervals are called."""
+FLAT = 1e-4
+"""Share of its level that a curve must vary by to be drawn as varying."""
+
+ARROW = 17.0
+"""Points that the arrow of a bound is long ..."""
+HEADROOM = 0.14
+"""... and the share of a panel's height that is left for it."""
+PALE = 0.55
+"""Opacity of published values that contradict themselves, or that nobody could reproduce."""
+ARROWS = (0.15, 0.4, 0.65, 0.9)
+"""Places of a loop, as shares of its length, where an arrow shows which way it runs."""
+
+HOLLOW: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "o",
+    "markerfacecolor": "none",
+    "markersize": 7.0,
+    "markeredgewidth": 1.2,
+}
+DOTTED: dict[str, Any] = {"linewidth": 2.0, "dashes": (0.8, 1.4)}
+
+
+def draw_published(
+    ax: Axes, marks: Sequence[PublishedMarks], look: Look, panel: Panel, aside: float = 0.0
+) -> list[Array]:
+    """Hollow marks in the colour of their series, or a dotted curve; their y in display units.
+
+    A dotted curve has the colour of ink: it may lie on the fit that it is compared with.
+    `aside` is that of the curve they belong to (`Curve.aside`).
+    """
+    drawn = []
+    for each in marks:
+        x = _showable(each.x, panel.x, scale_of(panel.x)) + aside * scale_of(panel.x)
+        y = _showable(each.y, panel.y, scale_of(panel.y))
+        how: dict[str, Any] = {"color": look.light, "zorder": 3}
+        if each.joined:  # never pale: it would not be seen on a fit that agrees with it
+            ax.plot(x, y, **{**DOTTED, **how, "color": INK.light})
+        else:
+            how |= {"alpha": PALE} if each.doubtful else {}
+            ax.plot(x, y, **{**HOLLOW, **how, "marker": hollow_marker(look)})
+            up = {"at least": 1.0, "at most": -1.0}.get(each.bound, 0.0)
+            _draw_bound(ax, x, y, np.full(len(y), up), how | {"arrowstyle": "<-"})
+        drawn.append(y)
+    return drawn
+
+
+def series_name(curve: Curve) -> str:
+    """What a curve stands for, which has one look on a page."""
+    return curve.series or curve.label
+
+
+def hollow_marker(look: Look) -> str:
+    """The sign of a series' published values: its own, where that has an inside."""
+    return "o" if look.marker in "x+" else look.marker
+
+
+def draw_bounds(ax: Axes, curve: Curve, look: Look, x: Array, y: Array) -> Array:
+    """Arrows from those points of a curve that are bounds, at display coordinates (n,).
+
+    Returns: the y of those whose arrow goes up.
+    """
+    up = np.zeros(len(y))
+    for end, infinite, way in ((curve.high, np.isposinf, 1.0), (curve.low, np.isneginf, -1.0)):
+        if end is not None:
+            up[infinite(np.asarray(end, dtype=float).ravel()[: len(y)])] = way
+    _draw_bound(ax, x, y, up, {"color": look.light, "zorder": 2.2, "arrowstyle": "<|-"})
+    return y[up > 0.0]
+
+
+def _draw_bound(ax: Axes, x: Array, y: Array, up: Array, how: Mapping[str, Any]) -> None:
+    """An arrow of `ARROW` points from each place whose `up` is 1 or -1, with its head away."""
+    arrow = {key: value for key, value in how.items() if key != "zorder"}
+    arrow |= {"shrinkA": 0, "shrinkB": 0, "linewidth": 1.2, "mutation_scale": 9}
+    for k in np.flatnonzero((up != 0.0) & np.isfinite(x) & np.isfinite(y)):
+        end = (0.0, up[k] * ARROW)
+        at = {"xytext": end, "textcoords": "offset points", "zorder": how["zorder"]}
+        ax.annotate("", (x[k], y[k]), **at, arrowprops=arrow)
+
+
+def leave_room(ax: Axes, bounds: Array) -> None:
+    """Room above the highest of `bounds` (display units, (n,)) for its arrow."""
+    known = bounds[np.isfinite(bounds)]
+    if not known.size:
+        return
+    low, high = ax.get_ylim()
+    if ax.get_yscale() == "log":
+        ax.set_ylim(top=max(high, float(known.max()) * (high / low) ** HEADROOM))
+    else:
+        ax.set_ylim(top=max(high, float(known.max()) + HEADROOM * (high - low)))
+
+
+def prepared(
+    curve: Curve, panel: Panel, scale_x: float, scale_y: float
+) -> tuple[Array, Array, Array | None]:
+    """Coordinates in display units; what a logarithmic axis cannot show becomes a gap."""
+    x = _showable(curve.x, panel.x, scale_x)
+    y = _showable(curve.y, panel.y, scale_y)
+    low = None if curve.y_low is None else _showable(curve.y_low, panel.y, scale_y)
+    count = min(len(x), len(y)) if low is None else min(len(x), len(y), len(low))
+    x, y = x[:count], np.where(np.isfinite(x[:count]), y[:count], np.nan)
+    return x, y, None if low is None else low[:count]
+
+
+def drawn_points(curve: Curve, panel: Panel, points: int) -> tuple[Array, Array, Array | None]:
+    """x, y and lower edge of a curve as it is drawn: display units, shape (n,), lines decimated."""
+    x, y, y_low = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
+    if curve.style in ("points", "band"):
+        return x, y, y_low
+    return *decimate(x, y, points), None
+
+
+def drawn_interval(curve: Curve, panel: Panel) -> tuple[Array, Array, Array] | None:
+    """x, low and high of a curve's 95 % interval in display units, (n,); None without one."""
+    x, y, _ = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
+    ends = interval_of(curve, panel, y)
+    return None if ends is None else (x, *ends)
+
+
+def _showable(values: Array, axis: Axis, scale: float) -> Array:
+    shown = np.asarray(values, dtype=float).ravel() * scale
+    shown = np.where(np.isfinite(shown), shown, np.nan)
+    return np.where(shown > 0, shown, np.nan) if axis.scale == "log" else shown
+
+
+def draw_interval(
+    ax: Axes, curve: Curve, ends: tuple[Array, Array], look: Look, x: Array, y: Array, points: int
+) -> None:
+    """The 95 % interval of a curve: bars on points, a band behind a line."""
+    low, high = ends
+    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(low) & np.isfinite(high)
+    if not known.any():
+        return
+    if curve.style not in ("points", "line+points"):
+        some = np.unique(np.linspace(0, len(x) - 1, min(len(x), points)).astype(int))
+        x, low, high = x[some], low[some], high[some]
+        ax.fill_between(x, low, high, color=look.light, alpha=0.18, linewidth=0)
+        return
+    # One path with gaps, which is a tenth of what a page carries for as many bars by themselves.
+    rows = [np.repeat(x[known], 3), np.full(3 * int(known.sum()), np.nan)]
+    rows[1][0::3], rows[1][1::3] = np.minimum(low, y)[known], np.maximum(high, y)[known]
+    ax.plot(*rows, color=look.light, linewidth=1.0, zorder=1.9, gid=BARS)
+
+
+def interval_of(curve: Curve, panel: Panel, y: Array) -> tuple[Array, Array] | None:
+    """Low and high in display units, each shape (n,); None for a curve that has none.
+
+    A logarithmic axis has no place for a lower end that is not positive: its bar goes out of sight.
+    """
+    if curve.low is None or curve.high is None:
+        return None
+    scale = scale_of(panel.y)
+    low, high = (_showable(end, panel.y, scale)[: len(y)] for end in (curve.low, curve.high))
+    if panel.y.scale == "log":
+        given = np.isfinite(np.asarray(curve.low, dtype=float).ravel()[: len(y)])
+        low = np.where(np.isnan(low) & given, OUT_OF_SIGHT * y, low)
+    return low, high
+
+
+def limit_intervals(ax: Axes, values: Array, ends: Sequence[tuple[Array, Array]]) -> None:
+    """Bars that are far longer than what the points tell are cut, so that those can be told apart.
+
+    `values` are all that is drawn besides the intervals `ends`.
+    """
+    finite = values[np.isfinite(values)]
+    reach = np.concatenate([np.empty(0), *(np.concatenate(pair) for pair in ends)])
+    reach = reach[np.isfinite(reach)]
+    if not finite.size or not reach.size:
+        return
+    bottom, top = float(finite.min()), float(finite.max())
+    if ax.get_yscale() == "log":
+        seen = reach[reach > 10.0 * OUT_OF_SIGHT * bottom]
+        if len(seen) < len(reach):
+            ax.set_ylim(bottom=0.5 * min(bottom, float(seen.min(initial=bottom))))
+        return
+    spare = LONGEST_BAR * max(top - bottom, 0.5 * max(abs(top), abs(bottom)))
+    if reach.min() < bottom - spare or reach.max() > top + spare:
+        low, high = max(bottom - spare, reach.min()), min(top + spare, reach.max())
+        margin = 0.05 * (high - low)
+        ax.set_ylim(min(low, bottom) - margin, max(high, top) + margin)
+
+
+def draw_curve(
+    ax: Axes, curve: Curve, look: Look, x: Array, y: Array, y_low: Array | None, points: int
+) -> None:
+    """A curve in its style, at display coordinates of shape (n,); a long line is decimated."""
+    label = curve.label or None
+    if curve.style == "band":
+        low = np.zeros_like(y) if y_low is None else y_low
+        ax.fill_between(x, low, y, color=look.light, alpha=0.18, linewidth=0, label=label)
+        return
+    if curve.style == "points":
+        size = 5.0 if len(x) <= 60 else 4.0 if len(x) <= 200 else 3.0 if len(x) <= 400 else 1.8
+        ax.plot(
+            x,
+            y,
+            linestyle="none",
+            marker=look.marker,
+            markersize=size,
+            color=look.light,
+            markeredgewidth=0.8 if look.marker in "x+" else 0,
+            label=label,
+            rasterized=len(x) > DENSE,
+        )
+        return
+    x, y = decimate(x, y, points)
+    if curve.style == "loop":
+        _draw_arrows(ax, x, y, look.light)
+    line: dict[str, Any] = {"color": look.light, "label": label, "linewidth": 1.4}
+    if look.dash:  # above the solid lines, which then show through the gaps
+        line |= {"dashes": look.dash, "zorder": 2.1}
+    if curve.style == "thin":
+        line |= {"linewidth": 0.9, "alpha": 0.9}
+    if curve.style == "line+points":
+        line |= {"marker": look.marker, "markersize": 4, "markeredgewidth": 0}
+    ax.plot(x, y, **line)
+
+
+def _draw_arrows(ax: Axes, x: Array, y: Array, colour: str) -> None:
+    """Heads of arrows on a line, where it is at `ARROWS` of its length as it is seen."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if len(x) < 3 or not np.ptp(x) or not np.ptp(y):
+        return
+    way = np.concatenate(
+        [[0.0], np.cumsum(np.hypot(np.diff(x / np.ptp(x)), np.diff(y / np.ptp(y))))]
+    )
+    for share in ARROWS:
+        at = np.array([share, share + 0.01]) * way[-1]
+        (x0, x1), (y0, y1) = np.interp(at, way, x), np.interp(at, way, y)
+        how = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "linewidth": 0}
+        ax.annotate("", (x1, y1), xytext=(x0, y0), arrowprops={**how, "mutation_scale": 12})
+
+
+def spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
+    """A constant is drawn as one: an axis does not zoom in on its last digits."""
+    finite = np.concatenate([np.empty(0), *(y[np.isfinite(y)] for y in values)])
+    if not finite.size:
+        return
+    middle, span = float(np.median(finite)), float(np.ptp(finite))
+    if span < FLAT * abs(middle):
+        ax.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
+
+
+def scale_of(axis: Axis) -> float:
+    """Display units in one of the axis' own."""
+    return factor(axis.unit, axis.display) if axis.display and axis.display != axis.unit else 1.0

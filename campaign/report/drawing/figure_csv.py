@@ -1,0 +1,87 @@
+"""The numbers behind a figure as CSV: what its curves show, in the units of its axes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.report.drawing.decimate import POINTS, decimate
+from campaign.report.drawing.figures import FIGURE_POINTS
+from campaign.result import Axis, Curve, Figure, Panel
+from campaign.units import convert
+
+COLUMNS = ("panel", "curve", "x", "y", "low", "high", "x_unit", "y_unit")
+DIGITS = 9
+"""of a number: more than any drawing shows, and less than twice the bytes of all of them."""
+
+Array = NDArray[np.float64]
+
+
+def figure_csv(figure: Figure) -> str:
+    """A row for each point of each curve: `COLUMNS`.
+
+    `panel` and `curve` are their titles, or their numbers where they have none of their own. `low`
+    and `high` are the interval of `y`; of a band, which has no `y`, its edges. A line is thinned
+    out as its drawing is, to its own points, extremes included.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    points = points_of_each(figure)
+    titles = _names([panel.title for panel in figure.panels])
+    for panel, title in zip(figure.panels, titles, strict=True):
+        units = _unit(panel.x), _unit(panel.y)
+        names = _names([curve.label or curve.series for curve in panel.curves])
+        for curve, name in zip(panel.curves, names, strict=True):
+            writer.writerows((title, name, *row, *units) for row in _rows(curve, panel, points))
+    return text.getvalue()
+
+
+def points_of_each(figure: Figure) -> int:
+    """Most points of each line of a figure; many lines share what a drawing can carry."""
+    total = sum(len(panel.curves) for panel in figure.panels)
+    return max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
+
+
+def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[tuple[str, ...]]:
+    x, y = _displayed(curve.x, panel.x), _displayed(curve.y, panel.y)
+    count = min(len(x), len(y))
+    x, y, low, high = x[:count], y[:count], curve.low, curve.high
+    if curve.style == "band":
+        edge = np.zeros(count) if curve.y_low is None else curve.y_low
+        low, high, y = edge, curve.y, np.full(count, np.nan)
+    if low is not None and high is not None:
+        ends = [_displayed(end, panel.y) for end in (low, high)]
+        columns: tuple[Array, ...] = (x, y, *ends)
+    else:
+        thinned = "points" not in curve.style
+        x, y = decimate(x, y, points) if thinned else (x, y)
+        empty = np.full(len(x), np.nan)
+        columns = (x, y, empty, empty)
+    return (tuple(map(_text, row)) for row in zip(*columns, strict=False))
+
+
+def _names(titles: list[str]) -> list[str]:
+    """Each title, or its place where there is none, or the same one twice."""
+    return [
+        title if title and titles.count(title) == 1 else f"{title} {place}".strip()
+        for place, title in enumerate(titles, start=1)
+    ]
+
+
+def _displayed(values: Array, axis: Axis) -> Array:
+    shown = np.asarray(values, dtype=float).ravel()
+    return np.asarray(convert(shown, axis.unit, axis.display or axis.unit), dtype=float)
+
+
+def _unit(axis: Axis) -> str:
+    return axis.display or axis.unit
+
+
+def _text(value: float) -> str:
+    return f"{value:.{DIGITS}g}" if math.isfinite(value) else ""

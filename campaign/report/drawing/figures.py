@@ -1,0 +1,344 @@
+"""Drawing `result.Figure` as SVG: the same input gives the same bytes, on any machine.
+
+Text stays text and takes the page's font. Colours are written so that the page can exchange them
+for its dark ones; a file on its own is for white paper.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.report.drawing.curves import (
+    draw_bounds,
+    draw_curve,
+    draw_interval,
+    draw_published,
+    interval_of,
+    leave_room,
+    limit_intervals,
+    prepared,
+    scale_of,
+    series_name,
+    spare_rounding_errors,
+)
+from campaign.report.drawing.decimate import POINTS
+from campaign.report.drawing.legends import add_legend, published_signs
+from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
+from campaign.report.drawing.pdf import keep_as_pdf
+from campaign.report.drawing.published_marks import Marks, PublishedMarks
+from campaign.report.drawing.ticks import set_ticks
+from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
+from campaign.result import Axis, Figure, Panel
+from campaign.text import pretty_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+Array = NDArray[np.float64]
+
+WIDTH = 6.9
+"""Inches: the text width of a page in two columns of a journal, or of the report."""
+FIGURE_POINTS = 40_000
+"""Most points of a figure's lines together; many curves share them."""
+TITLE_PAD = 7.0
+"""Points between the axes and their title."""
+ROOM = 0.14
+"""Share of its height that a panel is higher on either side, for the labels of points in it."""
+
+STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "campaign",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "text.parse_math": False,  # a label is a name, whatever signs are in it
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": TITLE_PAD,
+    "axes.labelsize": 8.5,
+    "axes.labelcolor": INK.light,
+    "axes.edgecolor": MUTED.light,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-5, 6),
+    "axes.xmargin": 0.02,
+    "grid.color": HAIRLINE.light,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED.light,
+    "ytick.color": MUTED.light,
+    "xtick.labelcolor": INK.light,
+    "ytick.labelcolor": INK.light,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "text.color": INK.light,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "lines.linewidth": 1.4,
+    "lines.scale_dashes": True,
+    "figure.constrained_layout.use": True,
+    "figure.constrained_layout.h_pad": 0.06,
+    "savefig.transparent": True,
+    "savefig.dpi": 200,
+}
+METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
+
+
+def draw(
+    figure: Figure,
+    published: Marks | None = None,
+    chosen: Mapping[str, Look] | None = None,
+) -> str:
+    """A figure as a complete SVG document for white paper.
+
+    published: values of a document that stand beside its curves.
+    chosen: the looks of all series of the page; of this figure alone where they are not given.
+    """
+    published, chosen = published or {}, chosen or looks(series_of(figure))
+    with canvas(*_size(figure)) as sheet:
+        across = _across(figure)
+        down = -(-len(figure.panels) // across)
+        axes = sheet.subplots(down, across, squeeze=False).ravel()
+        total = sum(len(panel.curves) for panel in figure.panels)
+        points = max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
+        sets = []
+        for place, (panel, ax) in enumerate(zip(figure.panels, axes, strict=False)):
+            beside = {k: marks for (at, k), marks in published.items() if at == place}
+            sets.append(_draw_panel(ax, panel, chosen, points, beside))
+        if figure.one_scale:
+            _share_scales(sets)
+        marked = [_finish(each, chosen) for each in sets]
+        for ax in axes[len(figure.panels) :]:
+            ax.set_axis_off()
+        own = not _titles_say_it(figure)
+        add_legend(sheet, list(axes) if own else [], published_signs(figure, published, chosen))
+        place_labels(sheet, marked)
+        return to_svg(sheet)
+
+
+def series_of(figure: Figure) -> list[str]:
+    """The series of all its curves and marks, in their order."""
+    curves = [series_name(curve) for panel in figure.panels for curve in panel.curves]
+    marks = [mark.series for panel in figure.panels for mark in panel.marks if mark.series]
+    return [*curves, *marks]
+
+
+@contextmanager
+def canvas(width: float, height: float) -> Iterator[Canvas]:
+    """An empty matplotlib figure (inches) under the report's own style, whatever the user's is."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
+    from matplotlib.figure import Figure as Canvas
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        sheet = Canvas(figsize=(width, height), dpi=72)  # as an SVG document is drawn
+        # One renderer measures all texts of the sheet; else each question begins a document anew.
+        size = 72 * width, 72 * height
+        measuring = RendererSVG(*size, io.StringIO(), image_dpi=72)  # type: ignore[no-untyped-call]
+        FigureCanvasSVG(sheet).get_renderer = lambda: measuring  # type: ignore[attr-defined]
+        yield sheet
+
+
+def to_svg(sheet: Canvas) -> str:
+    """The SVG document of a canvas, with nothing in it that changes from run to run.
+
+    Coordinates are rounded to a hundredth of a point: nobody sees more, and a page carries them.
+    """
+    import matplotlib as mpl
+
+    engine = sheet.get_layout_engine()
+    if engine is not None:
+        # Saving would draw everything once in vain before it is drawn, to have the layout computed:
+        # even with "none", which leaves a placeholder; only the default can be no engine at all.
+        engine.execute(sheet)
+        with mpl.rc_context({"figure.constrained_layout.use": False}):
+            sheet.set_layout_engine(None)
+    out = io.StringIO()
+    sheet.savefig(out, format="svg", metadata=METADATA)
+    keep_as_pdf(sheet)
+    text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
+    text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
+    return _SIGNS.sub(_styled_once, text)
+
+
+_DIGITS = re.compile(r"(\d\.\d\d)\d+")
+_SIGNS = re.compile(r'<g clip-path="([^"]*)">\s*((?:<use [^>]*/>\s*)+)</g>')
+_LOOK = re.compile(r' style="([^"]*)"')
+
+
+def _styled_once(group: re.Match[str]) -> str:
+    """The signs of one series with the style that all of them have told once."""
+    styles = set(_LOOK.findall(group[2]))
+    if len(styles) != 1:
+        return group[0]
+    signs = _LOOK.sub("", group[2])
+    return f'<g clip-path="{group[1]}" style="{styles.pop()}">\n{signs}</g>'
+
+
+def inline(svg: str, prefix: str, title: str, alt: str) -> str:
+    """The SVG for the middle of a page: own ids, the page's colours, and words for who cannot see.
+
+    `prefix` must be unique on the page and safe in an id.
+    """
+    from markupsafe import escape
+
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{prefix}-', body)
+    body = body.replace('href="#', f'href="#{prefix}-').replace("url(#", f"url(#{prefix}-")
+    body = _with_variables(body)
+    head = (
+        f'<svg role="img" aria-labelledby="{prefix}-title {prefix}-alt" class="plot"'
+        f" {_view_box(body)} >"
+        f'<title id="{prefix}-title">{escape(title)}</title>'
+        f'<desc id="{prefix}-alt">{escape(alt)}</desc>'
+    )
+    return head + body[body.index(">") + 1 :]
+
+
+def _titles_say_it(figure: Figure) -> bool:
+    """Whether every panel's title already names all its curves."""
+    return all(
+        {curve.label for curve in panel.curves} <= {"", panel.title} for panel in figure.panels
+    )
+
+
+def _across(figure: Figure) -> int:
+    return max(1, min(figure.across, len(figure.panels), 3))
+
+
+def _size(figure: Figure) -> tuple[float, float]:
+    across = _across(figure)
+    down = -(-len(figure.panels) // across) if figure.panels else 1
+    each = {1: 3.3 if down == 1 else 2.4, 2: 2.7, 3: 2.2}[across]
+    return WIDTH, 0.35 + each * max(down, 1)
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A panel with its curves, before its ticks and labels.
+
+    Attributes:
+        x, y: all that is shown along each axis, in display units; of what is drawn aside, its
+            true x.
+    """
+
+    ax: Axes
+    panel: Panel
+    x: Sequence[Array]
+    y: Sequence[Array]
+
+
+def _draw_panel(
+    ax: Axes,
+    panel: Panel,
+    chosen: Mapping[str, Look],
+    points: int,
+    published: Mapping[int, Sequence[PublishedMarks]],
+) -> _Drawn:
+    scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
+    shown = [prepared(curve, panel, scale_x, scale_y) for curve in panel.curves]
+    intervals = [
+        interval_of(curve, panel, y) for curve, (_, y, _) in zip(panel.curves, shown, strict=True)
+    ]
+    beside: list[Array] = []
+    bounds: list[Array] = []
+    for number, curve in enumerate(panel.curves):
+        look, (x, y, y_low), ends = chosen[series_name(curve)], shown[number], intervals[number]
+        x = x + curve.aside * scale_x
+        if ends is not None:
+            draw_interval(ax, curve, ends, look, x, y, points)
+        draw_curve(ax, curve, look, x, y, y_low, points)
+        bounds.append(draw_bounds(ax, curve, look, x, y))
+        marks = published.get(number, ())
+        values = draw_published(ax, marks, look, panel, curve.aside)
+        beside += values
+        told = zip(marks, values, strict=True)
+        bounds += [own for each, own in told if each.bound == "at least"]
+    for set_scale, axis in ((ax.set_xscale, panel.x), (ax.set_yscale, panel.y)):
+        if axis.scale == "log" and any(np.isfinite(y).any() for _, y, _ in shown):
+            set_scale("log")
+    ends_shown = [ends for ends in intervals if ends is not None]
+    drawn = [*(y for _, y, _ in shown), *beside]
+    limit_intervals(ax, np.concatenate([np.empty(0), *drawn]), ends_shown)
+    if panel.y.scale == "linear":
+        spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
+    _label_axes(ax, panel, scale_x, scale_y)
+    if any(mark.point for mark in panel.marks) and panel.y.limits is None:
+        ax.margins(y=ROOM)
+    leave_room(ax, np.concatenate([np.empty(0), *bounds]))
+    return _Drawn(ax, panel, [x for x, _, _ in shown], drawn)
+
+
+def _share_scales(sets: Sequence[_Drawn]) -> None:
+    """Give panels whose y axes are alike the limits that hold what all of them show."""
+    alike: dict[tuple[str, ...], list[Axes]] = {}
+    for each in sets:
+        y = each.panel.y
+        alike.setdefault((y.label, y.unit, y.display, y.scale), []).append(each.ax)
+    for axes in alike.values():
+        ends = [ax.get_ylim() for ax in axes]
+        for ax in axes:
+            ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+
+
+def _finish(drawn: _Drawn, chosen: Mapping[str, Look]) -> Marked:
+    """Ticks, marks, and what is said of an empty panel, once its limits are known."""
+    ax, panel = drawn.ax, drawn.panel
+    scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
+    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x)
+    set_ticks(ax.yaxis, panel.y, drawn.y, scale_y)
+    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
+    draw_marks(marked)
+    if not any(np.isfinite(y).any() for y in drawn.y[: len(panel.curves)]):
+        ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", color=MUTED.light)
+    return marked
+
+
+def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
+    ax.set_xlabel(axis_label(panel.x))
+    ax.set_ylabel(axis_label(panel.y))
+    if panel.title:
+        ax.set_title(panel.title)
+    limits = ((ax.set_xlim, panel.x, scale_x), (ax.set_ylim, panel.y, scale_y))
+    for set_limits, axis, scale in limits:
+        if axis.limits is not None:
+            ends = (end * scale if np.isfinite(end) else None for end in axis.limits)
+            set_limits(*ends)
+
+
+def axis_label(axis: Axis) -> str:
+    """`label (unit)` in the unit of the page; places with names of their own have none."""
+    unit = "" if axis.places else axis.display or axis.unit
+    return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label
+
+
+def _with_variables(svg: str) -> str:
+    """Every palette colour as a CSS variable with itself as the fallback."""
+    by_colour: dict[str, str] = {}
+    for name, (light, _) in variables().items():
+        by_colour.setdefault(light, name)
+    pattern = "|".join(re.escape(colour) for colour in sorted(by_colour))
+    return re.sub(
+        rf"(?<=[ :])({pattern})(?=[;\"])", lambda m: f"var(--{by_colour[m[1]]}, {m[1]})", svg
+    )
+
+
+def _view_box(svg: str) -> str:
+    found = re.search(r'viewBox="[-0-9. ]+"', svg[: svg.index(">")])
+    return found[0] if found else ""

@@ -1,0 +1,307 @@
+"""Marks of a panel, and where their labels stand: never over data.
+
+Labels of lines and stretches stand outside of the axes, where no curve is; the label of a point
+stands beside it where there is room, else outside as well.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from campaign.report.palette import MUTED, Look
+from campaign.result import Mark
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+    from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
+
+SIZE = 8.0
+"""Points: the smallest text of a figure."""
+ROW = 10.5
+"""Points from one row of labels to the next."""
+GAP = 2.0
+"""Points between the axes and a label."""
+WRAP = 16
+"""Characters of a line of a label in the margin, which takes its width from the axes."""
+SPARE = 1.15
+"""Share by which a page's own font may be wider than the one that is measured here."""
+DISTANCES = (5.0, 10.0, 18.0, 28.0, 42.0, 60.0)
+"""Points from a dot to the nearest corner or side of its label."""
+LEADER = 16.0
+"""Points from which on a thin line leads from the dot to its label."""
+WAYS = tuple(math.radians(angle) for angle in (45, 0, 135, 180, -45, -135, 90, -90))
+
+
+@dataclass
+class Marked:
+    """The marks of one panel while they are drawn.
+
+    Attributes:
+        above, beside, inside: labels over the axes, in their right margin, and next to dots.
+        points: dots whose labels have no place yet: x, y (display units), label, colour.
+    """
+
+    ax: Axes
+    marks: Sequence[Mark]
+    scale_x: float
+    scale_y: float
+    chosen: Mapping[str, Look]
+    title_pad: float
+    above: list[Annotation] = field(default_factory=list)
+    beside: list[Annotation] = field(default_factory=list)
+    inside: list[Annotation] = field(default_factory=list)
+    points: list[tuple[float, float, str, str]] = field(default_factory=list)
+
+    def colour(self, mark: Mark) -> str:
+        return self.chosen[mark.series].light if mark.series in self.chosen else MUTED.light
+
+
+def draw_marks(marked: Marked) -> None:
+    """Lines, stretches and dots; labels are told `place_labels`."""
+    ax = marked.ax
+    for mark in marked.marks:
+        x = None if mark.x is None else mark.x * marked.scale_x
+        y = None if mark.y is None else mark.y * marked.scale_y
+        if not all(math.isfinite(each) for each in (x, y) if each is not None):
+            continue
+        colour = marked.colour(mark)
+        if mark.point and x is not None and y is not None:
+            ax.plot([x], [y], "o", color=colour, markersize=4.5, zorder=3.5)
+            marked.points.append((x, y, mark.label, colour))
+        elif mark.until is not None and math.isfinite(mark.until):
+            _stretch(marked, mark, x, y, colour)
+        else:
+            line: dict[str, Any] = {"color": colour, "linewidth": 0.8, "dashes": (3, 2)}
+            if x is not None:
+                ax.axvline(x, zorder=1.5, **line)
+                _above(marked, x, mark.label, colour)
+            if y is not None:
+                ax.axhline(y, zorder=1.5, **line)
+                if x is None:
+                    _beside(marked, y, mark.label, colour)
+
+
+def _stretch(marked: Marked, mark: Mark, x: float | None, y: float | None, colour: str) -> None:
+    assert mark.until is not None  # noqa: S101 (for the type checker; the caller looked)
+    shade: dict[str, Any] = {"color": colour, "alpha": 0.13, "linewidth": 0, "zorder": 0.5}
+    if x is not None:
+        until = mark.until * marked.scale_x
+        marked.ax.axvspan(x, until, **shade)
+        _above(marked, _middle(x, until, marked.ax.get_xscale()), mark.label, colour)
+    elif y is not None:
+        until = mark.until * marked.scale_y
+        marked.ax.axhspan(y, until, **shade)
+        _beside(marked, _middle(y, until, marked.ax.get_yscale()), mark.label, colour)
+
+
+def _middle(one: float, other: float, scale: str) -> float:
+    if scale == "log" and one > 0 and other > 0:
+        return math.sqrt(one * other)
+    return 0.5 * (one + other)
+
+
+def _in_view(ends: tuple[float, float], value: float) -> bool:
+    return min(ends) <= value <= max(ends)
+
+
+def _above(marked: Marked, x: float, label: str, colour: str) -> None:
+    ax = marked.ax
+    if label and _in_view(ax.get_xlim(), x):
+        at = ax.get_xaxis_transform()
+        marked.above.append(_text(ax, label, (x, 1.0), at, (0, GAP), "center", "bottom", colour))
+
+
+def _beside(marked: Marked, y: float, label: str, colour: str) -> None:
+    ax = marked.ax
+    if label and _in_view(ax.get_ylim(), y):
+        at, text = ax.get_yaxis_transform(), textwrap.fill(label, WRAP)
+        marked.beside.append(_text(ax, text, (1.0, y), at, (GAP + 1, 0), "left", "center", colour))
+
+
+def _text(
+    ax: Axes,
+    label: str,
+    at: tuple[float, float],
+    coordinates: Any,
+    offset: tuple[float, float],
+    horizontal: str,
+    vertical: str,
+    colour: str,
+) -> Annotation:
+    return ax.annotate(
+        label,
+        at,
+        xycoords=coordinates,
+        xytext=offset,
+        textcoords="offset points",
+        ha=horizontal,
+        va=vertical,
+        fontsize=SIZE,
+        color=colour,
+        annotation_clip=False,
+        zorder=4,
+    )
+
+
+def place_labels(sheet: Canvas, panels: Sequence[Marked]) -> None:
+    """Give every label its place, and make room for those outside of their axes."""
+    if not any(each.above or each.beside or each.points for each in panels):
+        return
+    _lay_out(sheet)
+    for each in panels:
+        _stack_above(sheet, each)
+    _lay_out(sheet)
+    outside = [_place_points(sheet, each) for each in panels]
+    if any(outside):
+        _lay_out(sheet)  # axes have given way to labels in the margin
+        for each in panels:
+            _place_points(sheet, each)
+    for each in panels:
+        _spread_beside(sheet, each)
+    sheet.set_layout_engine("none")  # what was placed stays where it is
+
+
+def _lay_out(sheet: Canvas) -> None:
+    engine = sheet.get_layout_engine()
+    if engine is not None:
+        engine.execute(sheet)
+
+
+def _extent(text: Annotation) -> Bbox:
+    """Where a label is (pixels), somewhat wider than it is here."""
+    box = text.get_window_extent()
+    return box.expanded(SPARE, 1.0)
+
+
+def _stack_above(sheet: Canvas, marked: Marked) -> None:
+    """Labels over the axes: within their width, in as many rows as keep them apart."""
+    ends: list[float] = []
+    axes = marked.ax.get_window_extent()
+    per_point = sheet.dpi / 72
+    for text in sorted(marked.above, key=lambda each: each.xy[0]):
+        box = _extent(text)
+        shift = max(axes.x0 - box.x0, 0.0) + min(axes.x1 - box.x1, 0.0)
+        left, right = box.x0 + shift, box.x1 + shift
+        row = next((k for k, end in enumerate(ends) if end + 3 * per_point < left), len(ends))
+        ends[row : row + 1] = [right]
+        text.set_position((shift / per_point, GAP + row * ROW))
+    if ends and marked.ax.get_title(loc="left"):
+        pad = marked.title_pad + len(ends) * ROW
+        marked.ax.set_title(marked.ax.get_title(loc="left"), pad=pad)
+
+
+def _spread_beside(sheet: Canvas, marked: Marked) -> None:
+    """Labels right of the axes: each at its level, moved up where it would meet the one below."""
+    per_point = sheet.dpi / 72
+    lowest = -math.inf
+    at = marked.ax.get_yaxis_transform()
+    for text in sorted(marked.beside, key=lambda each: float(at.transform(each.xy)[1])):
+        middle = float(at.transform(text.xy)[1])
+        height = _extent(text).height
+        bottom = max(middle - 0.5 * height, lowest)
+        text.set_position((GAP + 1, (bottom + 0.5 * height - middle) / per_point))
+        lowest = bottom + height + per_point
+
+
+def _place_points(sheet: Canvas, marked: Marked) -> bool:
+    """Labels of dots, each in the nearest free place; whether one had to go into the margin."""
+    ax, outside = marked.ax, []
+    for text in marked.inside:
+        text.remove()
+    marked.inside = []
+    taken: list[Bbox] = []
+    for point in marked.points:
+        x, y, label, colour = point
+        if not (label and _in_view(ax.get_xlim(), x) and _in_view(ax.get_ylim(), y)):
+            continue
+        box = _beside_dot(sheet, marked, (x, y), label, colour, taken)
+        if box is None:
+            _beside(marked, y, label, colour)
+            outside.append(point)
+        else:
+            taken.append(box)
+    marked.points = [point for point in marked.points if point not in outside]
+    return bool(outside)
+
+
+def _beside_dot(
+    sheet: Canvas,
+    marked: Marked,
+    dot: tuple[float, float],
+    label: str,
+    colour: str,
+    taken: list[Bbox],
+) -> Bbox | None:
+    """Put the label of a dot into the nearest free place, and say which; None without any.
+
+    taken: where labels and the lines to them are already; a new line is added.
+    """
+    ax = marked.ax
+    frame = ax.get_window_extent()
+    text = _text(ax, label, dot, "data", (0, 0), "center", "center", colour)
+    size = _extent(text)
+    per_point = sheet.dpi / 72
+    half_width, half_height = 0.5 * size.width / per_point, 0.5 * size.height / per_point
+    for distance in DISTANCES:
+        for way in WAYS:
+            east, north = math.cos(way), math.sin(way)
+            offset = (
+                east * distance + half_width * float(np.sign(round(east, 6))),
+                north * distance + half_height * float(np.sign(round(north, 6))),
+            )
+            text.set_position(offset)
+            box = _extent(text)
+            within = frame.x0 <= box.x0 and box.x1 <= frame.x1
+            within = within and frame.y0 <= box.y0 and box.y1 <= frame.y1
+            if within and not covers_data(ax, box) and not any(box.overlaps(b) for b in taken):
+                marked.inside.append(text)
+                if distance >= LEADER:
+                    end = (0.9 * east * distance, 0.9 * north * distance)
+                    marked.inside.append(_lead(ax, dot, end, colour))
+                    at = ax.transData.transform(dot)
+                    taken.append(_between(at, at + per_point * np.array(end)))
+                return box
+    text.remove()
+    return None
+
+
+def _lead(ax: Axes, dot: tuple[float, float], end: tuple[float, float], colour: str) -> Annotation:
+    """A thin line from a dot to its label, which begins at `end` (points from the dot)."""
+    return ax.annotate(
+        "",
+        dot,
+        xytext=end,
+        textcoords="offset points",
+        arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6},
+    )
+
+
+def _between(one: Any, other: Any) -> Bbox:
+    from matplotlib.transforms import Bbox
+
+    return Bbox([np.minimum(one, other) - 1.0, np.maximum(one, other) + 1.0])
+
+
+def covers_data(ax: Axes, box: Bbox) -> bool:
+    """Whether anything that is drawn of curves, their bars included, lies within `box` (pixels)."""
+    for line in ax.lines:
+        path = line.get_path().transformed(line.get_transform())
+        if line.get_linestyle() != "None" and path.intersects_bbox(box, filled=False):
+            return True
+        spare = line.get_markersize()  # more than half of it, at any resolution
+        if line.get_marker() not in ("None", None, "") and _holds(box.padded(spare), path.vertices):
+            return True
+    return False
+
+
+def _holds(box: Bbox, places: Any) -> bool:
+    x, y = np.asarray(places, dtype=float).T
+    return bool(np.any((box.x0 <= x) & (x <= box.x1) & (box.y0 <= y) & (y <= box.y1)))

@@ -1,0 +1,268 @@
+"""The scoreboard as a picture: how far each published cell is from what the run found.
+
+A few cells have a row each. Many share one row per table, where they lie side by side on the axis,
+and the farthest of each is named. Either way the picture fits a screen, each sign tells in its
+tooltip which cell it is, and has the class of its status, so that a page can hide some.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from markupsafe import escape
+
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
+from campaign.report.content.lines import cell_name, shown_line
+from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS, Look
+from campaign.text import percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+HIGHEST = 8.0
+"""Inches, of 6.9 inches of width: on a page that shows it 768 pixels wide, 890 pixels."""
+PITCH = (0.125, 0.17)
+"""Inches from row to row where each cell has its own: the least that its words need, the most."""
+HEADING = 0.24
+"""Inches for the name of a table above its cells."""
+TABLE_PITCH = (0.13, 0.42)
+"""Inches from row to row where a row is a table: the least that its words need, and the most."""
+AROUND = 0.6
+"""Inches for the axis, and for each row of the legend ..."""
+LEGEND = 0.19
+LINEAR = 1.0
+"""Percent up to which the deviation axis is linear; beyond, it is logarithmic."""
+SMALL = 6.3
+"""Points, of the smallest words: 9.7 pixels on a page that shows it 768 pixels wide."""
+SHORT = 30
+"""Characters that the name of the farthest cell may have."""
+SIGN = 4.2
+"""Points of a sign among many."""
+ACROSS = 4
+"""Statuses side by side in the legend."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the picture: a table, or the tables that have no row of their own."""
+
+    name: str
+    lines: tuple[Line, ...]
+
+    @property
+    def farthest(self) -> Line:
+        return max(self.lines, key=lambda line: abs(line.deviation or 0.0))
+
+
+def draw_overview(scoreboard: Scoreboard) -> str | None:
+    """The picture as an SVG document; None when no cell was compared."""
+    lines = [line for line in scoreboard.lines if line.deviation is not None]
+    if not lines:
+        return None
+    rows = [_row(name, tuple(group)) for name, group in groupby(lines, lambda a: a.cell.table)]
+    around = AROUND + LEGEND * -(-len({line.status for line in lines}) // ACROSS)
+    room = HIGHEST - around
+    pitch = min(PITCH[1], (room - HEADING * len(rows)) / len(lines))
+    by_cell = pitch >= PITCH[0]
+    if by_cell:
+        needed = pitch * len(lines) + HEADING * len(rows)
+    else:
+        rows = _few(rows, int(room / TABLE_PITCH[0]))
+        needed = min(room, TABLE_PITCH[1] * len(rows))
+    with canvas(WIDTH, around + needed) as sheet:
+        ax = sheet.subplots()
+        _draw_axis(ax, lines)
+        if by_cell:
+            _draw_cells(ax, rows, pitch)
+        else:
+            _draw_tables(ax, rows, needed / len(rows))
+        _draw_legend(ax, lines)
+        return _with_tooltips(to_svg(sheet), lines)
+
+
+def _row(name: str, lines: tuple[Line, ...]) -> Row:
+    heading = name if " " in name else f"Table {name}"
+    return Row(heading[:1].upper() + heading[1:], lines)
+
+
+def _few(rows: list[Row], most: int) -> list[Row]:
+    """At most so many rows; the last one then stands for all further tables."""
+    if len(rows) <= most:
+        return rows
+    rest = rows[most - 1 :]
+    lines = tuple(line for row in rest for line in row.lines)
+    return [*rows[: most - 1], Row(f"{len(rest)} further tables", lines)]
+
+
+def _draw_cells(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
+    """A row for each cell, with its name, below the name of its table; `pitch` in inches."""
+    gap = HEADING / pitch
+    size = min(7.5, 54.0 * pitch)
+    y = 0.0
+    for row in rows:
+        _word(ax, -0.015, y + 0.4 * gap, row.name, "right", INK, size=8.0, weight="bold")
+        ax.axhline(y, color=HAIRLINE.light, linewidth=0.6, zorder=0)
+        y += gap
+        for line in row.lines:
+            look = _look(line)
+            ends = [0.0, line.deviation or 0.0]
+            ax.plot(
+                ends, [y + 0.3] * 2, color=look.light, linewidth=1.0, alpha=0.55, gid=_gid(line)
+            )
+            _sign(ax, line, y + 0.3, 5.0)
+            _word(ax, -0.015, y + 0.3, cell_name(line.cell), "right", MUTED, size=size)
+            y += 1.0
+    ax.set_ylim(y, 0.0)
+
+
+def _draw_tables(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
+    """A row for each table: its cells side by side, the farthest by name; `pitch` in inches."""
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    above: dict[str, Any] = {
+        "fontsize": SMALL,
+        "color": MUTED.light,
+        "va": "bottom",
+        "transform": ax.transAxes,
+    }
+    ax.text(-0.015, 1.0, "table (cells)", ha="right", **above)
+    ax.text(1.015, 1.0, "its farthest cell", ha="left", **above)
+    # Signs that would cover each other go to lanes of their own, as many as the row is high.
+    lanes = max(1, int(72.0 * pitch / (SIGN + 0.8)))
+    for y, row in enumerate(rows):
+        ax.axhline(y + 0.5, color=HAIRLINE.light, linewidth=0.6, zorder=0)
+        for line, lane in zip(row.lines, _lanes(ax, row.lines, lanes), strict=True):
+            _sign(ax, line, y + 0.86 * lane / lanes, SIGN)
+        count = len(row.lines)
+        name = f"{row.name} ({count})" if count > 1 else row.name
+        _word(ax, -0.015, y, name, "right", INK)
+        _word(ax, 1.015, y, _told(row.farthest), "left", _look(row.farthest))
+
+
+def _lanes(ax: Axes, lines: Sequence[Line], lanes: int) -> list[int]:
+    """Which lane, counted from the middle one, each sign goes to: the nearest that is free there.
+
+    Where all are taken, the one whose last sign is farthest away.
+    """
+    places = ax.transData.transform([(line.deviation or 0.0, 0.0) for line in lines])[:, 0]
+    width = (SIGN + 0.4) * ax.get_figure(root=True).dpi / 72.0  # type: ignore[union-attr]
+    order = sorted((k // 2 + k % 2) * (-1) ** k for k in range(lanes))
+    order.sort(key=abs)
+    last = dict.fromkeys(order, -np.inf)
+    chosen = [0] * len(lines)
+    for k in np.argsort(places, kind="stable"):
+        free = [lane for lane in order if places[k] - last[lane] >= width]
+        chosen[k] = free[0] if free else min(order, key=lambda lane: last[lane])
+        last[chosen[k]] = float(places[k])
+    return chosen
+
+
+def _told(line: Line) -> str:
+    """The farthest cell in a few words, behind its deviation."""
+    name = cell_name(line.cell)
+    if len(name) > SHORT:
+        name = name[: SHORT - 1].rstrip(" ·") + "…"
+    return f"{percent(line.deviation)}  {name}"
+
+
+def _sign(ax: Axes, line: Line, y: float, size: float) -> None:
+    look = _look(line)
+    ax.plot(
+        [line.deviation or 0.0],
+        [y],
+        marker=look.marker,
+        color=look.light,
+        markersize=1.3 * size if look.marker == "*" else size,
+        markeredgewidth=1.1 if look.marker == "x" else 0,
+        linestyle="none",
+        clip_on=False,
+        gid=_gid(line),
+    )
+
+
+def _word(
+    ax: Axes, x: float, y: float, text: str, side: str, look: Look, size: float = SMALL, **more: Any
+) -> None:
+    """A word beside the axes, x in shares of their width."""
+    along = ax.get_yaxis_transform()
+    style: dict[str, Any] = {
+        "fontsize": size,
+        "color": look.light,
+        "ha": side,
+        "va": "center",
+        "clip_on": False,
+    }
+    ax.text(x, y, text, transform=along, **style, **more)
+
+
+def _look(line: Line) -> Look:
+    return STATUS[line.status or Status.SIMULATED]
+
+
+def _gid(line: Line) -> str:
+    return f"cell:{line.cell.path}"
+
+
+def _with_tooltips(svg: str, lines: Sequence[Line]) -> str:
+    """Every group that stands for a cell gets the class of its status and words to point at."""
+    by_gid = {str(escape(_gid(line))): line for line in lines}
+
+    def told(found: re.Match[str]) -> str:
+        line = by_gid[found[1]]
+        return f'<g class="{_look(line).name}"><title>{escape(_tooltip(line))}</title>'
+
+    return re.sub(r'<g id="(cell:[^"]*)">', told, svg)
+
+
+def _tooltip(line: Line) -> str:
+    shown = shown_line(line)
+    unit = f" {shown.unit}" if shown.unit else ""
+    return (
+        f"{shown.table} · {shown.name}: published {shown.published}{unit}, "
+        f"reproduced {shown.reproduced}{unit} ({shown.deviation}), {shown.verdict}, {shown.status}"
+    )
+
+
+def _draw_axis(ax: Axes, lines: Sequence[Line]) -> None:
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    largest = max(abs(line.deviation or 0.0) for line in lines)
+    powers = [10.0**n for n in range(9) if 10.0**n <= 3 * max(largest, 10.0)]
+    ax.set_xscale("symlog", linthresh=LINEAR, linscale=0.6)
+    limit = max(1.3 * largest, 15.0)
+    ax.set_xlim(-limit, limit)
+    ticks = [t for t in [*(-p for p in reversed(powers)), 0.0, *powers] if abs(t) <= limit]
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(
+        FuncFormatter(lambda t, _: f"{t:+g} %".replace("-", "−") if t else "0")
+    )
+    ax.set_xlabel("Deviation of the reproduced from the published value")
+    ax.yaxis.set_visible(False)
+    ax.spines["left"].set_visible(False)
+    ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
+    ax.grid(axis="y", visible=False)
+
+
+def _draw_legend(ax: Axes, lines: Sequence[Line]) -> None:
+    from matplotlib.lines import Line2D
+
+    sheet = ax.get_figure()
+    if sheet is not None:
+        handles = [
+            Line2D([], [], linestyle="none", marker=look.marker, color=look.light, markersize=5)
+            for look in _present(lines).values()
+        ]
+        names = [str(status) for status in _present(lines)]
+        sheet.legend(handles, names, loc="outside upper left", ncols=ACROSS, borderpad=0)
+
+
+def _present(lines: Sequence[Line]) -> dict[Status, Look]:
+    found = {line.status for line in lines}
+    return {status: look for status, look in STATUS.items() if status in found}

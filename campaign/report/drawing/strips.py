@@ -1,0 +1,95 @@
+"""Draws of a random bench as a picture: one strip per published value, with its place in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
+from campaign.report.content.lines import cell_name
+from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.palette import INK, MUTED, STATUS
+from campaign.text import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PITCH = 0.24
+"""Inches from one strip to the next."""
+BAND = 0.3
+"""Opacity of an interval's bar."""
+MOST = 48
+"""Strips that a page has room for; the tables have every place."""
+
+
+def draw_strips(scoreboard: Scoreboard) -> str | None:
+    """The picture as an SVG document; None when nothing was drawn more than once."""
+    lines = [line for line in scoreboard.lines if _has_strip(line)][:MOST]
+    if not lines:
+        return None
+    with canvas(WIDTH, len(lines) * PITCH + 1.0) as sheet:
+        ax = sheet.subplots()
+        for row, line in enumerate(lines):
+            _draw_strip(ax, line, row)
+        ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
+        ax.set_ylim(len(lines) - 0.4, -0.6)
+        ax.set_xlabel("Draws, in percent from the published value")
+        ax.yaxis.set_visible(False)
+        ax.spines["left"].set_visible(False)
+        ax.grid(axis="y", visible=False)
+        _draw_legend(ax)
+        return to_svg(sheet)
+
+
+def _has_strip(line: Line) -> bool:
+    """Single readings would fill a page; and of a printed 0 nothing has a percentage."""
+    return bool(line.draws and line.cell.value) and line.status is not Status.NOT_REPRODUCIBLE
+
+
+def _draw_strip(ax: Axes, line: Line, row: int) -> None:
+    published = line.cell.value
+
+    def percent(value: float) -> float:
+        return 100 * (value - published) / abs(published)
+
+    colour = STATUS[line.status or Status.SIMULATED].light
+    found = line.found
+    if found is not None and found.low is not None and found.high is not None:
+        ends = [percent(found.low), percent(found.high)]
+        ax.plot(ends, [row, row], color=MUTED.light, alpha=BAND, linewidth=5, solid_capstyle="butt")
+    dots: dict[str, Any] = {"linestyle": "none", "color": colour, "clip_on": False}
+    ax.plot(
+        [percent(draw) for draw in line.draws], [row] * len(line.draws), "|", markersize=8, **dots
+    )
+    if line.reproduced is not None:
+        ax.plot([percent(line.reproduced)], [row], marker="o", markersize=4, **dots)
+    side: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "va": "center"}
+    name = f"{line.cell.table} · {cell_name(line.cell)}"
+    ax.text(-0.015, row, name, fontsize=7.5, color=MUTED.light, ha="right", **side)
+    if line.place is not None:
+        share = f"{number(100 * line.place.value, 2)} %"
+        ax.text(1.015, row, share, fontsize=7.5, color=MUTED.light, ha="left", **side)
+
+
+def _draw_legend(ax: Axes) -> None:
+    """What tick, dot, bar and line are, above the strips; and what stands on their right."""
+    from matplotlib.lines import Line2D
+
+    sign: dict[str, Any] = {"linestyle": "none", "color": INK.light}
+    handles = [
+        Line2D([], [], marker="|", markersize=8, **sign),
+        Line2D([], [], marker="o", markersize=4, **sign),
+        Line2D([], [], color=MUTED.light, alpha=BAND, linewidth=5, solid_capstyle="butt"),
+        Line2D([], [], color=INK.light, linewidth=0.9),
+    ]
+    names = ["a draw", "median", "95 % of further draws", "published"]
+    ax.figure.legend(handles, names, loc="outside upper left", ncols=4, borderpad=0)
+    ax.text(
+        1.015,
+        1.0,
+        "draws below",
+        fontsize=7.5,
+        color=MUTED.light,
+        va="bottom",
+        transform=ax.transAxes,
+    )

@@ -1,0 +1,111 @@
+"""Ticks that mean something: decades or 1-2-5 on a logarithm, whole numbers, angles of a circle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.result import Axis
+from campaign.text import number
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis as DrawnAxis
+
+Array = NDArray[np.float64]
+
+FEWEST = 3
+"""Labelled ticks of a logarithmic axis, if 1-2-5 has as many."""
+MOST_DECADES = 8
+TURN = (5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0)
+"""Steps of an axis in degrees: parts of a turn, and those below that everybody counts in ..."""
+MOST_STEPS = 7
+"""... the smallest of which there are at most as many."""
+WIDE_ANGLE = 20.0
+"""deg; a shorter axis has plain steps, since nobody thinks of 0.45 deg as of a part of a turn."""
+
+
+def set_ticks(drawn: DrawnAxis, axis: Axis, values: Sequence[Array], scale: float) -> None:
+    """Ticks for what is in view; to be called once its limits are set.
+
+    values: all that is drawn along this axis, in display units.
+    scale: display units in one of the axis' own.
+    """
+    from matplotlib.ticker import (
+        AutoMinorLocator,
+        FixedLocator,
+        FuncFormatter,
+        MaxNLocator,
+        MultipleLocator,
+    )
+
+    if axis.places:
+        drawn.set_ticks([place * scale for place, _ in axis.places])
+        drawn.set_ticklabels([name for _, name in axis.places])
+        drawn.set_minor_locator(FixedLocator([]))
+        return
+    low, high = sorted(float(end) for end in drawn.get_view_interval())
+    if drawn.get_scale() == "log":
+        places = logarithmic(low, high)
+        drawn.set_major_locator(FixedLocator(places))
+        drawn.set_major_formatter(FuncFormatter(_plain))
+        drawn.set_minor_locator(FixedLocator(_nines(low, high)))
+        drawn.set_minor_formatter(FuncFormatter(_none))
+        return
+    if _counts(axis, values):
+        drawn.set_major_locator(MaxNLocator(nbins=10, integer=True))
+        drawn.set_minor_locator(AutoMinorLocator(1))
+    elif (axis.display or axis.unit) == "deg" and high - low >= WIDE_ANGLE:
+        steps = [step for step in TURN if high - low <= MOST_STEPS * step]
+        drawn.set_major_locator(MultipleLocator(steps[0]) if steps else MaxNLocator(nbins=8))
+
+
+def logarithmic(low: float, high: float) -> list[float]:
+    """Labelled places of a logarithmic axis from `low` to `high`, both positive.
+
+    Decades where there are enough of them, else 1-2-5, else equal steps.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    if not 0 < low < high or not math.isfinite(high):
+        return []
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    every = range(first, last + 1, max(1, math.ceil((last - first) / MOST_DECADES)))
+
+    def within(shares: Sequence[int], exponents: Sequence[int]) -> list[float]:
+        places = [share * 10.0**e for e in exponents for share in shares]
+        return [place for place in places if low * (1 - 1e-9) <= place <= high * (1 + 1e-9)]
+
+    for places in (within((1,), every), within((1, 2, 5), range(first, last + 1))):
+        if len(places) >= FEWEST:
+            return places
+    steps = MaxNLocator(nbins=5).tick_values(low, high)
+    return [float(place) for place in steps if low <= place <= high and place > 0]
+
+
+def _nines(low: float, high: float) -> list[float]:
+    """The unlabelled ticks between: 2 to 9 of each decade, where these are not too many."""
+    if not 0 < low < high or math.log10(high / low) > MOST_DECADES:
+        return []
+    exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    every = (share * 10.0**e for e in exponents for share in range(2, 10))
+    return [place for place in every if low <= place <= high]
+
+
+def _counts(axis: Axis, values: Sequence[Array]) -> bool:
+    """Whether an axis without a unit shows nothing but whole numbers: of a map, of a reading."""
+    shown = [each[np.isfinite(each)] for each in values]
+    total = sum(each.size for each in shown)
+    whole = all(bool(np.all(each == np.round(each))) for each in shown)
+    return not (axis.display or axis.unit) and total > 0 and whole
+
+
+def _plain(value: float, position: Any) -> str:
+    return number(value)
+
+
+def _none(value: float, position: Any) -> str:
+    return ""

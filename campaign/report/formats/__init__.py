@@ -1,0 +1,32 @@
+"""A report in other formats, from what is laid out: a file per format, or an installed plug-in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+
+from campaign.errors import UsageError
+from campaign.plugins import Kinds
+from campaign.protocol.problems import allowed, nearest
+from campaign.report.formats.interface import Format
+
+
+@cache
+def formats() -> Kinds[Format]:
+    """Every format besides the page, by name."""
+    return Kinds("report format", __name__, "FORMAT", Format)
+
+
+def chosen_formats(names: Iterable[str]) -> tuple[Format, ...]:
+    """The formats of these names, each once. Raises UsageError for an unknown one, and for one
+    that needs what this machine lacks.
+    """
+    kinds = formats()
+    chosen = []
+    for name in dict.fromkeys(names):
+        if name not in kinds:
+            hint = nearest(name, kinds)
+            raise UsageError(f"there is no report format {name!r}; {allowed(kinds)}{hint}")
+        kinds[name].require()
+        chosen.append(kinds[name])
+    return tuple(chosen)

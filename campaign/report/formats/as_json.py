@@ -1,0 +1,359 @@
+"""`report.json`: every number of the page, and what stands behind it, for other programs."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from campaign import __version__, result
+from campaign.access.estimates import row_of
+from campaign.access.results import code_of
+from campaign.access.sentences import sentence
+from campaign.archive.reading.damage_words import in_words
+from campaign.estimate import Estimate
+from campaign.published.headline import headline
+from campaign.published.scoreboard import Line
+from campaign.report.content import lines, tables
+from campaign.report.content.document import Document
+from campaign.report.drawing.decimate import kept
+from campaign.report.formats import report_data as data
+from campaign.report.page.folder import Comparison, Section, ShownFigure, ShownTable
+from campaign.report.page.layout import Layout
+from campaign.units import factor
+
+POINTS = 400
+"""Most points of a curve; the drawing has more, and the results beside the run have all."""
+DIGITS = 7
+"""of the numbers of a curve."""
+
+
+def report_json(layout: Layout) -> str:
+    """The text of `report.json`; the same report gives the same text."""
+    tree = report_data(layout).model_dump(mode="json")
+    return json.dumps(tree, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def read_report(text: str) -> data.ReportData:
+    """A report from its JSON. Raises ValueError where it is not as the schema says."""
+    return data.ReportData.model_validate_json(text)
+
+
+def report_data(layout: Layout) -> data.ReportData:
+    """A report as data."""
+    document = layout.document
+    return data.ReportData(
+        run=_run(document),
+        opening=document.opening,
+        scoreboard=_scoreboard(layout),
+        tests=tuple(map(_test, layout.sections)),
+        incidents=data.Incidents(
+            figures=tuple(map(_figure, layout.incident_figures)),
+            tables=tuple(map(_table, layout.incident_tables)),
+        ),
+        failed=tuple(
+            data.FailedTrial(
+                number=each.trial.number,
+                label=each.trial.label,
+                outcome=each.ending.outcome.value,
+                reason=each.ending.reason,
+                safe_state=each.ending.safe_state.value,
+            )
+            for each in document.failed
+        ),
+        problems=layout.problems,
+        damaged=tuple(in_words(damage) for damage in document.damaged),
+        provenance=_provenance(document),
+    )
+
+
+def number(estimate: Estimate) -> data.Number:
+    """An estimate as data."""
+    said = {name: value for name, value in row_of(estimate).items() if name != "systematic"}
+    systematic = {part.source: part.standard_uncertainty for part in estimate.systematic}
+    fields = {name: plain(value) for name, value in said.items()}
+    return data.Number.model_validate(
+        {**fields, "level": estimate.level, "systematic": plain(systematic)}
+    )
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it; a number that is not finite is null."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, int | str) else str(value)
+
+
+def _run(document: Document) -> data.Run:
+    run, header = document.run, document.run.header
+    return data.Run(
+        name=run.name,
+        file=run.path.name,
+        title=document.title,
+        description=header.description,
+        created=header.created,
+        ended=run.ended,
+        status=run.status.value,
+        reason=run.reason,
+        safe_state=run.safe_state.value,
+        backend=header.backend,
+        source=header.source,
+        operator=header.operator,
+        notes=header.notes,
+        tags=header.tags,
+        planned=len(run.plan),
+        executed=len(run.trials),
+        not_completed=len(document.failed),
+        not_readable=document.lost,
+        not_executed=document.not_executed,
+    )
+
+
+def _test(section: Section) -> data.Test:
+    test, found = section.test, section.test.result
+    return data.Test(
+        name=test.name,
+        kind=test.kind,
+        title=test.title,
+        description=test.description,
+        anchor=section.anchor,
+        reproduces=test.reproduces,
+        problems=section.problems,
+        trials=tuple(each.trial.number for each in test.trials),
+        options=plain(test.options),
+        conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
+        conclusions=tuple(map(_sentence, found.conclusions)),
+        notes=found.notes,
+        findings=tuple(
+            data.Finding(
+                number=number(each.known),
+                conditions=plain(each.conditions),
+                recomputed=each.recomputed,
+            )
+            for each in found.findings
+        ),
+        comparisons=tuple(map(_comparison, section.comparisons)),
+        figures=tuple(map(_figure, section.figures)),
+        tables=tuple(map(_table, section.tables)),
+        truth=None if section.truth is None else _table(section.truth),
+    )
+
+
+def _sentence(conclusion: result.Conclusion) -> data.Sentence:
+    said = (part for part in conclusion.parts if not isinstance(part, str))
+    return data.Sentence(text=sentence(conclusion), numbers=tuple(map(_said, said)))
+
+
+def _said(part: result.Amount | result.Factor) -> data.SaidNumber:
+    ratio = isinstance(part, result.Factor)
+    unit = part.estimate.unit
+    display = "" if isinstance(part, result.Factor) else part.display or unit
+    return data.SaidNumber(
+        number=number(part.estimate),
+        display=display,
+        factor=1.0 if ratio else _factor(unit, display),
+        ratio=ratio,
+    )
+
+
+def _table(shown: ShownTable) -> data.Table:
+    table = shown.data
+    if table is None:
+        raise TypeError(f"{shown.anchor}: a table without its data")
+    return data.Table(
+        key=table.key,
+        title=table.title,
+        place=shown.number,
+        anchor=shown.anchor,
+        file=shown.download.file,
+        note=table.note,
+        remarks=tuple(tables.remarks(table)),
+        published=shown.published,
+        columns=tuple(
+            data.Column(
+                name=each.name,
+                label=each.label,
+                unit=each.unit,
+                display=each.display or each.unit,
+                factor=_factor(each.unit, each.display),
+                exact=each.exact,
+                reason=each.reason,
+            )
+            for each in table.columns
+        ),
+        rows=tuple(
+            {each.name: _cell(row.get(each.name)) for each in table.columns} for row in table.rows
+        ),
+    )
+
+
+def _cell(cell: result.Cell) -> Any:
+    return number(cell) if isinstance(cell, Estimate) else plain(cell)
+
+
+def _figure(shown: ShownFigure) -> data.Figure:
+    figure = shown.data
+    return data.Figure(
+        key="" if figure is None else figure.key,
+        title=shown.title,
+        place=shown.number,
+        anchor=shown.anchor,
+        file=shown.file,
+        caption=shown.caption,
+        published=shown.published,
+        trials=shown.trial_numbers,
+        panels=() if figure is None else tuple(map(_panel, figure.panels)),
+    )
+
+
+def _panel(panel: result.Panel) -> data.Panel:
+    return data.Panel(
+        title=panel.title,
+        x=_axis(panel.x),
+        y=_axis(panel.y),
+        curves=tuple(map(_curve, panel.curves)),
+        marks=tuple(
+            data.Mark(label=m.label, x=plain(m.x), y=plain(m.y), until=plain(m.until))
+            for m in panel.marks
+        ),
+    )
+
+
+def _axis(axis: result.Axis) -> data.Axis:
+    return data.Axis(
+        label=axis.label,
+        unit=axis.unit,
+        display=axis.display or axis.unit,
+        factor=_factor(axis.unit, axis.display),
+        scale=axis.scale,
+        limits=None if axis.limits is None else plain(axis.limits),
+    )
+
+
+def _curve(curve: result.Curve) -> data.Curve:
+    x, y = (np.asarray(each, dtype=float) for each in (curve.x, curve.y))
+    chosen = kept(x, y, POINTS)
+
+    def shortened(values: Any) -> Any:
+        if values is None:
+            return None
+        shown = np.asarray(values, dtype=float)[chosen]
+        return tuple(plain(float(f"{each:.{DIGITS}g}")) for each in shown)
+
+    return data.Curve(
+        label=curve.label,
+        series=curve.series,
+        style=curve.style,
+        points=len(x),
+        x=shortened(x),
+        y=shortened(y),
+        low=shortened(curve.low),
+        high=shortened(curve.high),
+        lower_edge=shortened(curve.y_low),
+    )
+
+
+def _comparison(shown: Comparison) -> data.Comparison:
+    of_table = {line.table for line in shown.lines}
+    return data.Comparison(
+        table=next(iter(of_table), ""),
+        heading=shown.heading,
+        title=shown.title,
+        place=shown.number,
+        anchor=shown.anchor,
+        file=shown.download.file,
+    )
+
+
+def _scoreboard(layout: Layout) -> data.Scoreboard:
+    document = layout.document
+    board, counted = document.scoreboard, headline(document.scoreboard)
+    pictures = [each for each in (layout.picture, layout.strips) if each is not None]
+    return data.Scoreboard(
+        agreement=tables.agreement(board),
+        counts=tuple(
+            data.Count(status=str(each.status), compared=each.compared, good=each.good)
+            for each in counted.counts
+        ),
+        median_deviation_percent=counted.median_deviation,
+        worst_deviation_percent=counted.worst_deviation,
+        not_reached=len(counted.not_reached),
+        not_found=len(counted.not_found),
+        not_run=len(counted.not_run),
+        lines=tuple(map(_line, board.lines)),
+        further=tuple(map(_line, board.further)),
+        statuses={name: count for name, _, _, count in lines.statuses(board)},
+        sources=document.sources,
+        altered=board.altered,
+        contradictions=tuple(
+            data.Contradiction(table=table, cells=cells, reason=reason)
+            for table, cells, reason in lines.contradictions(board)
+        ),
+        figures=tuple(map(_figure, pictures)),
+        file="" if layout.scoreboard_download is None else layout.scoreboard_download.file,
+    )
+
+
+def _line(line: Line) -> data.Line:
+    cell, found = line.cell, line.found
+    return data.Line(
+        table=cell.table,
+        row=cell.row,
+        column=cell.column,
+        cell=lines.cell_name(cell),
+        unit=cell.unit,
+        published=plain(cell.value),
+        printed=cell.printed,
+        relation=cell.relation,
+        reproduced=plain(line.reproduced),
+        low=None if found is None else plain(found.low),
+        high=None if found is None else plain(found.high),
+        kind="" if found is None else found.kind,
+        deviation_percent=plain(line.deviation),
+        verdict=str(line.verdict),
+        status="" if line.status is None else str(line.status),
+        test=line.test,
+        source=line.source,
+        notes=tuple(note for note in (cell.reason, *cell.notes) if note),
+        draws=plain(line.draws),
+        place=None if line.place is None else number(line.place),
+    )
+
+
+def _provenance(document: Document) -> data.Provenance:
+    run, header = document.run, document.run.header
+    plants: Iterable[Mapping[str, Any]] = header.truth.plants.values()
+    return data.Provenance(
+        sha256=run.sha256,
+        seal=run.root,
+        fingerprint=header.fingerprint,
+        command=document.command,
+        seeds=document.seeds,
+        git_revision=header.git_revision,
+        backend_options=plain(header.backend_options),
+        overrides=header.overrides,
+        only=header.only,
+        versions=header.versions,
+        plugins=tuple(plain(each) for each in header.plugins),
+        host=header.host,
+        measured_by=document.measured_by,
+        truths=tuple(dict.fromkeys(str(plant.get("name", "")) for plant in plants)),
+        sources=header.sources,
+        truth_sources=header.truth.sources,
+        program=__version__,
+        code=code_of(document.tests),
+    )
+
+
+def _factor(unit: str, display: str) -> float:
+    """What a number in `unit` is multiplied by to be in `display`, which may be the same."""
+    return 1.0 if not display or display == unit else float(factor(unit, display))

@@ -1,0 +1,97 @@
+"""Tables in LaTeX, ruled by booktabs: as wide as their words, or wrapped to the line's width."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from campaign.report.formats.pieces import Grid
+from campaign.report.latex_text import LONGEST, breakable
+
+LONG = 30
+"""Rows from which on a table may go over pages."""
+ROOM = 84
+"""Characters of a line of an article in footnotesize; a wider table has its cells wrapped."""
+WIDEST = 40
+"""Characters from which on a column's words ask for no more room."""
+GAP = 3
+"""Characters between two columns."""
+MANY = 8
+"""Columns from which on the letters are smaller."""
+
+
+def grid_lines(grid: Grid, label: str) -> Iterator[str]:
+    """A table with its caption and, below it, its notes. `label`: for references to it."""
+    caption = rf"\caption{{{breakable(grid.title)}}}\label{{{label}}}"
+    letters = r"\scriptsize" if len(grid.headers) > MANY else r"\footnotesize"
+    letters += r"\setlength{\tabcolsep}{4pt}"
+    notes = " ".join(map(breakable, filter(None, (*grid.notes, grid.file))))
+    if len(grid.rows) > LONG:
+        yield rf"\begingroup{letters}\setlength{{\LTcapwidth}}{{\linewidth}}"
+        yield from _long(grid, caption)
+        yield rf"\noindent {notes}\par\endgroup" if notes else r"\endgroup"
+    else:
+        yield r"\begin{table}[htbp]\centering"
+        yield rf"{caption if grid.number is not None else _title(grid)}{letters}"
+        yield from _short(grid)
+        yield rf"\par\smallskip\raggedright {notes}" if notes else ""
+        yield r"\end{table}"
+
+
+def _short(grid: Grid) -> Iterator[str]:
+    yield rf"\begin{{tabular}}{{{_columns(grid)}}}"
+    yield rf"\toprule {_row(grid.headers)} \midrule"
+    yield from map(_row, grid.rows)
+    yield r"\bottomrule"
+    yield r"\end{tabular}"
+
+
+def _long(grid: Grid, caption: str) -> Iterator[str]:
+    """Over as many pages as it takes; the heads are repeated."""
+    head = rf"\toprule {_row(grid.headers)} \midrule"
+    if grid.number is None:
+        yield rf"\noindent {_title(grid)}"
+    yield rf"\begin{{longtable}}{{{_columns(grid)}}}"
+    yield rf"{caption} \\ {head} \endfirsthead" if grid.number is not None else ""
+    yield rf"{head} \endhead"
+    yield r"\bottomrule \endfoot"
+    yield from map(_row, grid.rows)
+    yield r"\end{longtable}"
+    if grid.number is None:
+        yield r"\addtocounter{table}{-1}"  # which every long table counts up
+
+
+def _title(grid: Grid) -> str:
+    return rf"\textbf{{{breakable(grid.title)}}}\par "
+
+
+def _row(cells: tuple[str, ...]) -> str:
+    return rf"{' & '.join(map(breakable, cells))} \\"
+
+
+def _columns(grid: Grid) -> str:
+    """The column specification; cells wrap where they are wider than a line together."""
+    right = grid.right or (False,) * len(grid.headers)
+    lines = [grid.headers, *grid.rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(grid.headers))]
+    if sum(widths) + GAP * len(widths) <= ROOM:
+        return "".join("r" if each else "l" for each in right)
+    words = [max(map(_longest, (line[column] for line in lines))) for column in range(len(widths))]
+    asked = _asked([word + GAP for word in words], [min(w, WIDEST) + GAP for w in widths])
+    shares = [each / sum(asked) for each in asked]
+    return "".join(
+        rf">{{\{'raggedleft' if each else 'raggedright'}\arraybackslash}}"
+        rf"p{{\dimexpr{share:.4f}\linewidth-2\tabcolsep\relax}}"
+        for each, share in zip(right, shares, strict=True)
+    )
+
+
+def _longest(text: str) -> int:
+    """Characters of a text's longest word that is not broken."""
+    return min(max(map(len, text.split()), default=0), LONGEST)
+
+
+def _asked(least: Sequence[int], wanted: Sequence[int]) -> list[float]:
+    """What each column gets of the room: its longest word, and of the rest as it has more."""
+    more = [max(want - word, 0) for want, word in zip(wanted, least, strict=True)]
+    spare = max(ROOM - sum(least), 0) / max(sum(more), 1)
+    return [word + spare * each for word, each in zip(least, more, strict=True)]

@@ -1,0 +1,100 @@
+"""`report.md`: for GitHub and pandoc, with the figures and tables of the folder beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from campaign.plain_text import on_a_page
+from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.outline import caption, outline
+from campaign.report.formats.pieces import Facts, Grid, Heading, Items, Paragraph, Piece, Source
+from campaign.report.page.folder import ShownFigure
+
+FILE = "report.md"
+
+_SIGNS = re.compile(r"([\\`*_{}\[\]<>|~$^#@&])")
+"""What begins markup of GitHub's or pandoc's within a line: code, emphasis, links, HTML, maths,
+entities, citations, sub- and superscripts."""
+_ADDRESS = re.compile(r"://|\bwww\.|:(?=[a-z_+-][a-z0-9_+-]*:)", re.IGNORECASE)
+"""What is made a link, or a picture of a face, without any markup."""
+_FIRST = re.compile(r"^([-+=:%]|\d+(?=[.)]))")
+"""What begins a list, a rule, a definition or a title at the beginning of a line."""
+
+
+def write(written: Written) -> None:
+    """Add `report.md`."""
+    text = "\n\n".join(_written(piece) for piece in outline(written)) + "\n"
+    (written.folder / FILE).write_text(on_a_page(text), encoding="utf-8", newline="\n")
+
+
+def escaped(text: str) -> str:
+    """`text` within a line, or in a cell: one line that looks the same and is no markup."""
+    line = _SIGNS.sub(r"\\\1", " ".join(text.split()))
+    return _ADDRESS.sub(lambda found: found[0].replace(":", "&#58;").replace(".", "&#46;"), line)
+
+
+def paragraph(text: str) -> str:
+    """The same where a line begins with it."""
+    line = escaped(text)
+    first = _FIRST.match(line)
+    if first is None:
+        return line
+    if first[0].isdigit():
+        return f"{first[0]}\\{line[first.end() :]}"
+    return f"\\{line}"
+
+
+def _written(piece: Piece) -> str:
+    return "\n\n".join(_lines(piece))
+
+
+def _lines(piece: Piece) -> Iterator[str]:
+    match piece:
+        case Heading():
+            yield f"{'#' * piece.level} {escaped(piece.text)}"
+        case Paragraph():
+            yield f"> **Mind:** {escaped(piece.text)}" if piece.warns else paragraph(piece.text)
+        case Items():
+            yield "\n".join(f"- {paragraph(text)}" for text in piece.texts)
+        case Facts():
+            pairs = (f"- **{escaped(name)}:** {escaped(value)}" for name, value in piece.pairs)
+            yield "\n".join(pairs)
+        case ShownFigure():
+            yield f"![{escaped(piece.title)}]({piece.file})"
+            words = escaped(caption(piece))
+            yield f"**Figure {piece.number}. {escaped(piece.title)}.** {words}"
+        case Grid():
+            yield from _grid(piece)
+        case Source():
+            yield f"{paragraph(piece.title)}:"
+            yield _fenced(piece)
+
+
+def _grid(grid: Grid) -> Iterator[str]:
+    number = "" if grid.number is None else f"Table {grid.number}. "
+    yield f"**{number}{escaped(grid.title)}**"
+    rule = [":---"] * len(grid.headers)
+    for column, right in enumerate(grid.right):
+        rule[column] = "---:" if right else ":---"
+    head = [_row(map(escaped, grid.headers)), _row(rule)]
+    yield "\n".join([*head, *(_row(map(escaped, row)) for row in grid.rows)])
+    notes = [paragraph(" ".join(grid.notes))] if grid.notes else []
+    if grid.file:
+        notes.append(f"[{grid.file}]({grid.file})")
+    if notes:
+        yield " ".join(notes)
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _fenced(source: Source) -> str:
+    """The text as it stands, between fences that are longer than any in it."""
+    longest = max(map(len, re.findall("`+", source.text)), default=0)
+    fence = "`" * max(3, longest + 1)
+    return f"{fence}{source.language}\n{source.text.rstrip()}\n{fence}"
+
+
+FORMAT = Format("markdown", "report.md, for GitHub and pandoc.", write)

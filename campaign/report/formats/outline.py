@@ -1,0 +1,255 @@
+"""The page as a sequence of plain pieces, in its order: what formats without templates write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from campaign.report.content import lines, tables
+from campaign.report.content.citation import citation_of
+from campaign.report.content.document import Document
+from campaign.report.content.lines import ShownLine
+from campaign.report.content.opening import Answer
+from campaign.report.formats.interface import Written
+from campaign.report.formats.pieces import (
+    Facts,
+    Grid,
+    Heading,
+    Items,
+    Paragraph,
+    Piece,
+    Source,
+)
+from campaign.report.page.folder import Comparison, Section, ShownFigure, ShownTable
+from campaign.report.page.layout import Layout
+
+FAILED = 200
+"""Most failed trials that are listed; the archive has them all."""
+
+
+def outline(written: Written) -> Iterator[Piece]:
+    """All that the page says, but for the protocol's text and what only a screen can show."""
+    layout, document = written.layout, written.layout.document
+    header = document.run.header
+    yield Heading(1, document.title)
+    if written.damage is not None:
+        missing = "What cannot be read is missing from this report; tables/damaged.csv lists it."
+        yield Paragraph(f"{written.damage.heading}. {missing}", warns=True)
+    if header.description:
+        yield Paragraph(header.description)
+    yield Facts(tuple(_facts(document)))
+    if layout.problems:
+        yield Heading(2, "Problems with this report")
+        yield Items(layout.problems)
+    yield from _opening(layout)
+    if layout.scoreboard_download is not None:
+        yield Heading(2, "Scoreboard", "scoreboard")
+        yield Paragraph(tables.agreement(document.scoreboard))
+        yield from (shown for shown in (layout.picture, layout.strips) if shown is not None)
+        yield Paragraph(f"Every published number is in {layout.scoreboard_download.file}.")
+    for section in layout.sections:
+        yield from _section(section, layout.telling)
+    yield from _contradictions(document)
+    yield from _failed(document)
+    if document.incidents:
+        yield Heading(2, "What happened besides the plan", "incidents")
+        yield from layout.incident_figures
+        yield from map(_grid, layout.incident_tables)
+    yield from _provenance(document)
+
+
+def _facts(document: Document) -> Iterator[tuple[str, str]]:
+    run = document.run
+    counts = [
+        f"{len(run.trials)} executed",
+        *_counted(len(document.failed), "not completed"),
+        *_counted(document.lost, "not readable"),
+        *_counted(document.not_executed, "not executed"),
+    ]
+    yield "Run", run.header.name
+    yield "Started", run.header.created
+    yield "Status", f"{run.status}{f': {run.reason}' if run.reason else ''}"
+    yield "Trials", ", ".join(counts)
+    yield "Backend", run.header.backend or "not stated"
+    if run.header.operator:
+        yield "Operator", run.header.operator
+
+
+def _counted(count: int, what: str) -> list[str]:
+    return [f"{count} {what}"] if count else []
+
+
+def _opening(layout: Layout) -> Iterator[Piece]:
+    """What was asked and found, each caveat of it, and the page's first figure."""
+    opening = layout.document.opening
+    yield Heading(2, "What was found", "opening")
+    if opening.asked:
+        yield Paragraph(opening.asked)
+    yield from (Paragraph(why, warns=True) for why in opening.wrong)
+    shown = {section.test.name for section in layout.sections if section.truth is not None}
+    if opening.intervals:
+        yield Paragraph(opening.intervals)
+    for answer in opening.in_short.answers if opening.main else opening.answers:
+        yield Facts(((answer.title, " ".join(_answer(answer, answer.test in shown))),))
+    yield from map(Paragraph, opening.in_short.remarks)
+    yield from _compared_and_telling(layout)
+    if not opening.main:
+        return
+    yield Heading(3, f"What each of the {len(opening.answers)} tests found", "every-answer")
+    for group in opening.groups:
+        for answer in group.answers:
+            yield Facts(((answer.title, " ".join(_answer(answer, answer.test in shown))),))
+        yield from (Paragraph(f"Of each of these: {remark}") for remark in group.remarks)
+
+
+def _compared_and_telling(layout: Layout) -> Iterator[Piece]:
+    if layout.document.opening.compared:
+        yield Paragraph(layout.document.opening.compared)
+    if layout.telling is not None:
+        yield layout.telling
+
+
+def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
+    """All that the page says of a test; `with_truth` where its truth is shown."""
+    yield from answer.sentences
+    if answer.problem:
+        yield f"No result: {answer.problem}."
+    if with_truth and answer.truth:
+        yield f"{answer.truth}."
+    yield from answer.remarks
+
+
+def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
+    """A test in the order of the page, which its numbers follow; `telling` is shown already."""
+    yield Heading(2, section.test.title, section.anchor)
+    if section.test.description:
+        yield Paragraph(section.test.description)
+    yield from (Paragraph(problem, warns=True) for problem in section.problems)
+    yield Heading(3, "Conditions")
+    yield Facts(section.conditions)
+    yield from map(_compared, section.comparisons)
+    if section.truth is not None:
+        yield _grid(section.truth)
+    for figure in section.figures:
+        if figure is telling:
+            told = f"Figure {figure.number}, {figure.title}, stands on top of the report."
+            yield Paragraph(told)
+        else:
+            yield figure
+    yield from map(_grid, section.tables)
+    if section.test.result.notes:
+        yield Heading(3, "Notes")
+        yield Items(section.test.result.notes)
+
+
+def _grid(shown: ShownTable) -> Grid:
+    content = shown.content
+    left_out = [f"{content.left_out} more rows are in the file."] if content.left_out else []
+    return Grid(
+        shown.number,
+        shown.anchor,
+        f"{shown.title}.{_published(shown.published, 'Table')}",
+        content.headers,
+        tuple(cell.number for cell in content.rows[0]) if content.rows else (),
+        tuple(tuple(cell.text for cell in row) for row in content.rows),
+        (*filter(None, (shown.note,)), *content.notes, *left_out),
+        shown.download.file,
+    )
+
+
+def caption(shown: ShownFigure) -> str:
+    """A figure's caption, with what to compare it with."""
+    return f"{shown.caption}{_published(shown.published, 'Figure')}"
+
+
+def _published(numbers: Sequence[str], what: str) -> str:
+    if not numbers:
+        return ""
+    return f" Compare {what}{'s' * (len(numbers) > 1)} {', '.join(numbers)} of the source."
+
+
+def _compared(shown: Comparison) -> Grid:
+    remarks: dict[str, list[str]] = {}
+    for line in shown.lines:
+        for note in line.notes:
+            remarks.setdefault(note, []).append(line.name)
+    return Grid(
+        shown.number,
+        shown.anchor,
+        f"Published {shown.heading} and what was reproduced. {shown.title}.",
+        ("Cell", "Unit", "Published", "Reproduced", "Deviation", "Verdict", "Status"),
+        (False, False, True, True, True, False, False),
+        tuple(map(_line, shown.lines)),
+        tuple(f"{', '.join(cells)}: {remark}." for remark, cells in remarks.items()),
+        shown.download.file,
+    )
+
+
+def _line(line: ShownLine) -> tuple[str, ...]:
+    found = f"{line.reproduced} ({line.place})" if line.place else line.reproduced
+    verdict = f"{line.verdict} ✓" if line.good else line.verdict
+    return line.name, line.unit, line.published, found, line.deviation, verdict, line.status
+
+
+def _contradictions(document: Document) -> Iterator[Piece]:
+    found = lines.contradictions(document.scoreboard)
+    if found:
+        yield Heading(2, "Where the source contradicts itself", "contradictions")
+        yield Paragraph(
+            "These published numbers cannot all be right, so no deviation from them counts for or"
+            " against this run."
+        )
+        yield Facts(
+            tuple(
+                (f"{table if ' ' in table else f'Table {table}'}: {', '.join(cells)}", reason)
+                for table, cells, reason in found
+            )
+        )
+
+
+def _failed(document: Document) -> Iterator[Piece]:
+    failed = document.failed
+    if failed:
+        yield Heading(2, "Trials that did not complete", "failed")
+        yield Grid(
+            None,
+            "failed-trials",
+            "Trials that did not complete.",
+            ("Trial", "What", "Outcome", "Reason", "Safe state"),
+            (True, False, False, False, False),
+            tuple(
+                (
+                    str(each.trial.number),
+                    each.trial.label,
+                    str(each.ending.outcome),
+                    each.ending.reason,
+                    str(each.ending.safe_state),
+                )
+                for each in failed[:FAILED]
+            ),
+            tuple(_counted(len(failed) - FAILED, "more are in the archive."))
+            if len(failed) > FAILED
+            else (),
+        )
+
+
+def _provenance(document: Document) -> Iterator[Piece]:
+    run, header, citation = document.run, document.run.header, citation_of(document.run)
+    yield Heading(2, "Provenance", "provenance")
+    yield Paragraph("This report was made from the archive alone.")
+    facts = {
+        "Archive SHA-256": run.sha256,
+        "Protocol fingerprint": header.fingerprint or "not stated",
+        "Repeat it with": document.command,
+        "Protocol's revision": header.git_revision,
+        "Seeds": document.seeds or "none",
+        "Safe state at the end": str(run.safe_state),
+        "Each recording measured by": document.measured_by,
+        "Tags": ", ".join(header.tags),
+        "Notes": header.notes,
+        "Published values from": "; ".join(document.sources),
+        "Versions": ", ".join(f"{name} {version}" for name, version in header.versions.items()),
+    }
+    yield Facts(tuple((name, value) for name, value in facts.items() if value))
+    yield Heading(3, "How to cite this run", "cite")
+    yield Paragraph(citation.sentence)
+    yield Source("As a BibTeX entry", citation.bibtex, "bibtex")

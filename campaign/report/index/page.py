@@ -1,0 +1,201 @@
+"""`index.html` of a results folder: every run with what it came to, searchable."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from html import unescape
+from pathlib import Path
+from urllib.parse import quote
+
+from campaign.archive import RunSummary, list_runs
+from campaign.archive.layout.header import PARTIAL
+from campaign.errors import UsageError
+from campaign.plain_text import on_a_page
+from campaign.report.index.told import told_by
+from campaign.report.output import MARKER
+from campaign.report.page.packaged import fill_packaged
+from campaign.report.palette import variables
+
+NAME = "index.html"
+OURS = '<meta name="generator" content="campaign index">'
+"""What an index of ours says of itself near its beginning."""
+BEGINNING = 4096
+"""Bytes within which it does."""
+COMPARISON = "comparison.html"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One run as the page shows it.
+
+    Attributes:
+        state: one word for how it ended, or `damaged`; the CSS class goes by it.
+        verdict: sentences: the report's first, then how the trials ended.
+        link: address relative to the page; empty where there is none.
+        thumbnail: that of a picture, or the picture itself; `caption` says what it shows.
+        problem: why it cannot be read.
+    """
+
+    name: str
+    title: str
+    when: str
+    tests: tuple[str, ...]
+    benches: tuple[str, ...]
+    status: str
+    state: str
+    verdict: tuple[str, ...]
+    backend: str
+    operator: str
+    tags: tuple[str, ...]
+    link: str = ""
+    thumbnail: str = ""
+    caption: str = ""
+    problem: str = ""
+
+
+def write_index(results: Path, packaged_templates: Path) -> Path:
+    """Write `index.html` into a results folder and return its path.
+
+    The same folder gives the same bytes. Nothing is analysed: headers, journals and what reports
+    say of themselves are read. Raises UsageError when an `index.html` that is not ours is there, or
+    when the folder cannot be read or written.
+    """
+    if not results.is_dir():
+        raise UsageError(f"{results}: there is no such folder")
+    path = results / NAME
+    _refuse_foreign(path)
+    text = on_a_page(render(results, packaged_templates))
+    part = path.with_name(f".{NAME}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8", newline="\n")
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+    return path
+
+
+def render(results: Path, packaged_templates: Path) -> str:
+    """The page's text; nothing is written."""
+    from markupsafe import Markup
+
+    entries = [entry_of(run) for run in reversed(list_runs(results))]
+    colours = {"colours": variables()}
+    style = fill_packaged("style.css", colours, packaged_templates)
+    style += fill_packaged("index.css", {}, packaged_templates)
+    script = (packaged_templates / "index.js").read_text(encoding="utf-8")
+    context = {
+        "generator": Markup(OURS),  # noqa: S704 (packaged)
+        "entries": entries,
+        "damaged": [entry for entry in entries if entry.problem],
+        "partial": [entry for entry in entries if entry.state == "incomplete"],
+        "comparisons": tuple(_comparisons(results)),
+        "style": Markup(style),  # noqa: S704 (packaged)
+        "script": Markup(script),  # noqa: S704 (packaged)
+        "style_hash": _hash(style),
+        "script_hash": _hash(script),
+    }
+    return fill_packaged("index.html", context, packaged_templates)
+
+
+def entry_of(run: RunSummary) -> Entry:
+    """A run in words."""
+    folder = run.path.with_name(f"{run.path.stem}-report")
+    told = told_by(folder)
+    link = _address(told.page, run.path.parent) if told.page else ""
+    thumbnail = f"data:image/svg+xml,{quote(told.sketch)}" if told.sketch else ""
+    if told.figure:
+        thumbnail = _address(told.figure, run.path.parent)
+    if run.problem:
+        problem = run.problem.replace(str(run.path.parent) + os.sep, "")
+        blank: tuple[str, ...] = ()
+        return Entry(
+            run.name, "", "", blank, blank, "damaged", "damaged", blank, "", "", blank,
+            link, thumbnail, told.caption, problem,
+        )  # fmt: skip
+    return Entry(
+        name=run.name,
+        title=run.title or run.protocol or run.name,
+        when=f"{datetime.fromisoformat(run.created):%Y-%m-%d %H:%M}",
+        tests=run.tests,
+        benches=run.benches,
+        status=_status(run),
+        state=str(run.status or "").replace(" ", "-"),
+        verdict=tuple(filter(None, (told.sentence, told.headline, _trials(run)))),
+        backend=run.backend,
+        operator=run.operator,
+        tags=run.tags,
+        link=link,
+        thumbnail=thumbnail,
+        caption=told.caption,
+    )
+
+
+def _status(run: RunSummary) -> str:
+    """The status; of a folder that it is one, still running or killed."""
+    word = str(run.status or "unknown")
+    return f"{word} (not sealed)" if run.path.suffix == PARTIAL else word
+
+
+def _trials(run: RunSummary) -> str:
+    """`18 of 20 trials completed, 1 failed, 1 not executed.`"""
+    parts = [f"{run.trials - run.failed} of {run.planned} trials completed"]
+    if run.failed:
+        parts.append(f"{run.failed} failed")
+    if run.untold:
+        they = "it was" if run.untold == 1 else "they were"
+        parts.append(f"of {run.untold} the journal does not say any more whether {they} executed")
+    elif run.planned > run.trials:
+        parts.append(f"{run.planned - run.trials} not executed")
+    return ", ".join(parts) + "."
+
+
+def _comparisons(results: Path) -> Iterator[tuple[str, str]]:
+    """Title and address of each comparison in the folder."""
+    for folder in sorted(results.iterdir()):
+        page = folder / COMPARISON
+        if page.is_file() and (folder / MARKER).is_file():
+            yield _title(page) or folder.name.removesuffix("-comparison"), _address(page, results)
+
+
+def _title(page: Path) -> str:
+    """What a page calls itself near its beginning; the empty text where it does not."""
+    try:
+        with page.open("rb") as file:
+            beginning = file.read(BEGINNING).decode("utf-8", "replace")
+    except OSError:
+        return ""
+    found = re.search(r"<title>([^<]{1,400})</title>", beginning)
+    return unescape(found[1]).strip() if found else ""
+
+
+def _address(path: Path, base: Path) -> str:
+    """Relative, and no more than an address whatever the names have in them."""
+    relative = path.relative_to(base).as_posix()
+    return "./" + quote(os.fsencode(relative))
+
+
+def _hash(text: str) -> str:
+    """As a Content-Security-Policy names an inline text."""
+    digest = hashlib.sha256(text.encode()).digest()
+    return "sha256-" + base64.b64encode(digest).decode("ascii")
+
+
+def _refuse_foreign(path: Path) -> None:
+    if not (path.exists() or path.is_symlink()):
+        return
+    try:
+        with path.open("rb") as file:
+            ours = OURS.encode() in file.read(BEGINNING)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+    if not ours:
+        raise UsageError(f"{path} is there already and was not written by campaign; move it away")

@@ -1,0 +1,102 @@
+"""One figure of a report by itself: drawing and numbers, as the report's folder has them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from campaign.archive import RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.errors import UsageError
+from campaign.experiments.interface import Experiment
+from campaign.plain_text import on_a_page
+from campaign.protocol.problems import allowed, nearest
+from campaign.report.content.document import document_of
+from campaign.report.page.damage_notice import told_on_page
+from campaign.report.page.layout import lay_out
+
+WRITTEN = ".campaign-figures"
+"""Of a folder of figures: SHA-256 and name of each file that was written there, a line each."""
+
+
+def write_figure(
+    run: RunReader,
+    wanted: str,
+    output: Path,
+    *,
+    experiments: Mapping[str, Experiment],
+    measure_anew: bool = False,
+) -> tuple[Path, tuple[Damage, ...]]:
+    """Write the SVG and the CSV file of the figure `TEST/KEY` into the folder `output`.
+
+    The whole report is laid out for it: colours, names and what stands beside a curve follow from
+    all of it, so that the bytes are those of the report's own files.
+
+    Returns the path of the drawing, and what of the run is damaged. Raises UsageError when the run
+    has no such figure, when a file of that name is somebody's own, or when the folder cannot be
+    written.
+    """
+    document = document_of(run, experiments, measure_anew=measure_anew)
+    layout = lay_out(document)
+    if document.damaged:
+        told_on_page(run, document.damaged, layout.folder)
+    figures = {
+        f"{section.test.name}/{figure.data.key}": figure
+        for section in layout.sections
+        for figure in section.figures
+        if figure.data
+    }
+    figure = figures.get(wanted)
+    if figure is None or figure.download is None:
+        slip = nearest(wanted, figures)
+        raise UsageError(f"{wanted!r} is no figure of this run; {allowed(figures)}{slip}")
+    files = (figure.file, figure.download.file)
+    _write(output, {Path(name).name: on_a_page(layout.folder.files[name]) for name in files})
+    return output / Path(figure.file).name, document.damaged
+
+
+def _write(output: Path, texts: Mapping[str, str]) -> None:
+    """Write files into a folder, none of them in place of one that was not written here."""
+    new = {f"{_digest(text.encode())}  {name}": text for name, text in texts.items()}
+    marker = output / WRITTEN
+    try:
+        ours = (
+            marker.read_text(encoding="utf-8", errors="replace").splitlines()
+            if marker.is_file()
+            else []
+        )
+        for name in texts:
+            path = output / name
+            if (path.exists() or path.is_symlink()) and not _is_one_of(path, {*ours, *new}):
+                raise UsageError(
+                    f"{path} is there already and was not written by campaign, or was changed;"
+                    " name another folder with --output, or move it away"
+                )
+        output.mkdir(parents=True, exist_ok=True)
+        # What is written stands here before it is: whatever happens, it is known for ours.
+        _replace(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))))
+        for line, text in new.items():
+            _replace(output / line.partition("  ")[2], text)
+    except OSError as error:
+        raise UsageError(f"{output}: the figure cannot be written: {error.strerror}") from None
+
+
+def _is_one_of(path: Path, lines: set[str]) -> bool:
+    ordinary = path.is_file() and not path.is_symlink()
+    return ordinary and f"{_digest(path.read_bytes())}  {path.name}" in lines
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _replace(path: Path, text: str) -> None:
+    """The whole text or the old one, also when somebody interrupts."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8", newline="\n")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""The page: content and drawings, numbered, and filled into templates."""

@@ -1,0 +1,55 @@
+"""That a report is not the whole run: on top of the page, in a table, in every figure's file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive import RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import FILE, damaged_csv, heading, in_one_line
+from campaign.report.page.folder import Download, Folder
+
+TRIALS = 12
+"""Most trials that the notice names."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """What stands above everything else on the page.
+
+    Attributes:
+        heading: the run's file, and in how many places it is damaged.
+        trials: names of the trials concerned, as text; empty when it is none in particular.
+        download: the table of all damage.
+    """
+
+    heading: str
+    trials: str
+    download: Download
+
+
+def told_on_page(run: RunReader, damaged: Sequence[Damage], folder: Folder) -> Notice:
+    """The notice; adds `tables/damaged.csv` to the folder, and a word to its figures' files."""
+    name = Path(run.path.name)
+    words = in_one_line(name, damaged)
+    for file, text in folder.files.items():
+        if file.endswith(".svg"):
+            folder.files[file] = _with_word(text, words)
+    download = folder.table(damaged_csv(damaged), Path(FILE).stem)
+    return Notice(heading(name, damaged), _trials(damaged), download)
+
+
+def _trials(damaged: Sequence[Damage]) -> str:
+    names = list(dict.fromkeys(damage.trial for damage in damaged if damage.trial))
+    more = [f"{len(names) - TRIALS} more"] if len(names) > TRIALS else []
+    return ", ".join([*names[:TRIALS], *more])
+
+
+def _with_word(svg: str, words: str) -> str:
+    """The figure's file with a description that says so; on the page, the notice does."""
+    from markupsafe import escape
+
+    place = svg.index(">", svg.index("<svg")) + 1
+    return f"{svg[:place]}\n <desc>{escape(words)}</desc>{svg[place:]}"

@@ -1,0 +1,101 @@
+"""What each figure of a page is drawn from, before any of them is drawn.
+
+Looks are the same on the whole page, and published values stand beside curves: both follow from all
+of a document, and neither needs a drawing. So drawings can be made in any order, and anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from campaign.published.scoreboard import Scoreboard
+from campaign.report.content.document import Document
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.figures import draw, series_of
+from campaign.report.drawing.published_marks import Marks, PublishedBeside, told
+from campaign.report.drawing.scoreboard_picture import draw_overview
+from campaign.report.palette import Look, looks_of_page
+from campaign.result import Figure
+
+AXES = 10
+"""Curves that take as long to draw as the axes that they are in."""
+
+Key = tuple[str, str]
+"""Name of a test and key of its figure."""
+OVERVIEW: Key = ("", "scoreboard")
+"""The picture on top of the page, which is of no test."""
+
+
+class Drawable(Protocol):
+    """What can be drawn in any process."""
+
+    @property
+    def work(self) -> int:
+        """How long it takes, compared with others."""
+
+    def made(self) -> Drawn | None:
+        """The drawing; None when there is nothing to draw."""
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The scoreboard as a picture."""
+
+    scoreboard: Scoreboard
+
+    @property
+    def work(self) -> int:
+        return len(self.scoreboard.lines)
+
+    def made(self) -> Drawn | None:
+        svg = draw_overview(self.scoreboard)
+        return None if svg is None else Drawn.of(svg)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure, whose caption says what is published beside it, and how it looks on its page."""
+
+    figure: Figure
+    marks: Marks = field(default_factory=dict)
+    looks: Mapping[str, Look] | None = None
+
+    @property
+    def work(self) -> int:
+        # Laying out axes takes most of the time, however many curves they have.
+        return sum(AXES + len(panel.curves) for panel in self.figure.panels)
+
+    def svg(self) -> str:
+        """The drawing as a complete SVG document."""
+        return draw(self.figure, self.marks, self.looks)
+
+    def made(self) -> Drawn:
+        return Drawn.of(self.svg(), self.figure)
+
+
+def drawings_of(document: Document) -> dict[Key, Drawing]:
+    """The drawings of all tests; a figure that no drawing can be made of is missing."""
+    series: dict[Key, list[str]] = {}
+    for test in document.tests:
+        for figure in test.result.figures:
+            with suppress(Exception):  # a plug-in's, which is told where it is shown
+                series[test.name, figure.key] = series_of(figure)
+    looks = looks_of_page(series.values())
+    drawings: dict[Key, Drawing] = {}
+    for test in document.tests:
+        beside = PublishedBeside.of(document.published, test.reproduces, test.evidence().known)
+        for figure in test.result.figures:
+            key = test.name, figure.key
+            with suppress(Exception):
+                own = {name: looks[name] for name in series[key]}
+                drawings[key] = _drawing(figure, beside, own)
+    return drawings
+
+
+def _drawing(figure: Figure, beside: PublishedBeside, looks: Mapping[str, Look]) -> Drawing:
+    marks = beside.marks(figure)
+    caption = f"{figure.caption} {told(marks)}".rstrip()
+    return Drawing(replace(figure, caption=caption), marks, looks)

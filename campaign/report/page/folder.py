@@ -1,0 +1,208 @@
+"""What the page shows, numbered, and the files beside it, collected while it is laid out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from campaign.access.analysis import AnalysedTest
+from campaign.plain_text import on_a_page
+from campaign.report.content import tables
+from campaign.report.content.lines import ShownLine
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.figures import inline
+from campaign.report.drawing.legible import legible_width, view_box
+from campaign.report.drawing.pdf import taken
+from campaign.report.page.names import Names
+from campaign.report.palette import Look
+from campaign.result import Figure, Table
+from campaign.text import of_trials
+
+LINKED = 6_000
+"""Characters of a CSV file up to which the page carries it; a longer one is only a file beside it.
+
+What the page carries has to arrive before anything is seen of it.
+"""
+
+
+@dataclass(frozen=True)
+class Download:
+    """A CSV file: its name in the folder, and where the page's link leads."""
+
+    file: str
+    href: str
+
+
+@dataclass(frozen=True)
+class ShownFigure:
+    """A figure on the page. `svg` is markup that is safe to write as it stands.
+
+    Attributes:
+        data: what was drawn; None for a picture that no analysis made.
+        download: its numbers; None likewise.
+        trials: whose recordings it shows, in words; may be empty.
+        trial_numbers: the same as numbers.
+        command: what makes it again.
+        box: width and height of the drawing in its own units.
+        looks: of its series on this page; None where it has no drawing of its own.
+        least: CSS pixels that it must be wide for its smallest label to be legible.
+    """
+
+    number: int
+    anchor: str
+    title: str
+    caption: str
+    svg: str
+    file: str
+    published: tuple[str, ...] = ()
+    data: Figure | None = None
+    download: Download | None = None
+    trials: str = ""
+    command: str = ""
+    box: tuple[float, float] = (1.0, 1.0)
+    least: int = 0
+    looks: Mapping[str, Look] | None = None
+    trial_numbers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class ShownTable:
+    """A numbered table of a test."""
+
+    number: int
+    anchor: str
+    title: str
+    note: str
+    published: tuple[str, ...]
+    content: tables.ShownTable
+    download: Download
+    data: Table | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A published table beside what the run found; `table` is its name there."""
+
+    number: int
+    anchor: str
+    table: str
+    heading: str
+    title: str
+    source: str
+    lines: tuple[ShownLine, ...]
+    download: Download
+
+
+@dataclass(frozen=True)
+class Section:
+    """One test on the page; `left_out` are those of the `problems` that are damaged trials.
+
+    Attributes:
+        truth: what it found beside what is true, where that is known.
+        summary: its conditions in a line.
+    """
+
+    anchor: str
+    test: AnalysedTest
+    conditions: tuple[tuple[str, str], ...]
+    figures: tuple[ShownFigure, ...]
+    tables: tuple[ShownTable, ...]
+    comparisons: tuple[Comparison, ...]
+    problems: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
+    truth: ShownTable | None = None
+    summary: str = ""
+
+    @property
+    def items(self) -> tuple[ShownFigure | ShownTable | Comparison, ...]:
+        """Its figures and tables in the order of the page."""
+        truth = (self.truth,) if self.truth else ()
+        return (*self.comparisons, *truth, *self.figures, *self.tables)
+
+
+@dataclass
+class Folder:
+    """What the report's folder will contain, collected while the page is laid out.
+
+    `pdfs`: the figures once more, for formats that want them so; nothing of the page.
+    """
+
+    files: dict[str, str] = field(default_factory=dict)
+    pdfs: dict[str, bytes] = field(default_factory=dict)
+    table_names: Names = field(default_factory=Names)
+    figure_names: Names = field(default_factory=Names)
+    figures: int = 0
+    tables: int = 0
+
+    def table(self, text: str, *candidates: str) -> Download:
+        """Add a CSV file and say where its link leads."""
+        file = f"tables/{self.table_names.unique(*candidates)}.csv"
+        text = on_a_page(text)
+        self.files[file] = text
+        return Download(file, tables.data_link(text) if len(text) <= LINKED else file)
+
+    def figure(
+        self,
+        figure: Figure,
+        drawn: Drawn,
+        published: tuple[str, ...],
+        *names: str,
+        trials: tuple[int, ...] = (),
+        command: str = "",
+        looks: Mapping[str, Look] | None = None,
+    ) -> ShownFigure:
+        """Add an SVG file, a CSV file of its numbers, and the numbered figure that shows them."""
+        alt = figure.alt or figure.caption
+        shown = self.picture(drawn, figure.title, figure.caption, alt, *names, command=command)
+        file = shown.file.removesuffix(".svg") + ".csv"
+        self.files[file] = drawn.csv
+        href = tables.data_link(drawn.csv) if len(drawn.csv) <= LINKED else file
+        download = Download(file, href)
+        return replace(
+            shown,
+            published=published,
+            data=figure,
+            trials=of_trials(trials),
+            trial_numbers=trials,
+            download=download,
+            looks=looks,
+        )
+
+    def picture(
+        self, drawn: Drawn, title: str, caption: str, alt: str, *names: str, command: str = ""
+    ) -> ShownFigure:
+        """The same for a picture that no analysis made."""
+        from markupsafe import Markup
+
+        svg = drawn.svg
+        name = self.figure_names.unique(*names)
+        file = f"figures/{name}.svg"
+        self.files[file] = svg
+        pdf = taken()
+        if pdf is not None:
+            self.pdfs[f"figures/{name}.pdf"] = pdf
+        self.figures += 1
+        anchor = f"figure-{self.figures}"
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        shown = ShownFigure(self.figures, anchor, title, caption, markup, file)
+        box, least = view_box(svg) or shown.box, math.ceil(legible_width(svg))
+        return replace(shown, command=command, box=box, least=least)
+
+    def shown_table(
+        self, table: Table, published: tuple[str, ...], *names: str, page: Table | None = None
+    ) -> ShownTable:
+        """Add a CSV file and the numbered table that shows it; on the page in other units: `page`.
+
+        The columns of the file are as the analysis named them.
+        """
+        content = tables.show(page or table)
+        download = self.table(tables.table_csv(table), *names)
+        place = self.next_table()
+        return ShownTable(
+            place, f"table-{place}", table.title, table.note, published, content, download, table
+        )
+
+    def next_table(self) -> int:
+        self.tables += 1
+        return self.tables

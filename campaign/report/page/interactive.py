@@ -1,0 +1,190 @@
+"""Figures that zoom and tell their values under a cursor, beside the static ones of the page.
+
+The page carries the points that its drawings show, and one script. Without the script, or before
+somebody turns it on, the page is the static one. uPlot draws (`vendor/`, MIT).
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.report.drawing.curves import drawn_interval, drawn_points, scale_of
+from campaign.report.drawing.figure_csv import points_of_each
+from campaign.report.drawing.figures import axis_label, series_of
+from campaign.report.page.folder import ShownFigure
+from campaign.report.palette import Look, looks
+from campaign.result import Axis, Curve, Figure, Mark, Panel
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+FEWEST = 8
+"""Points of a line from which on a zoom shows more than the picture does."""
+MOST = 5_000
+"""Points of a scatter up to which the page carries them."""
+LINES = ("line", "line+points", "thin")
+
+
+@dataclass(frozen=True)
+class Interactive:
+    """What the page has besides the static one.
+
+    Attributes:
+        style: CSS.
+        data: JSON, by the anchor of each figure that can be zoomed; text, to be escaped as such.
+        script: what the page's policy allows, letter by letter.
+    """
+
+    style: Markup
+    data: str
+    script: Markup
+
+
+def interactive(figures: Iterable[ShownFigure]) -> Interactive:
+    """Style, data and script for those of the figures that are lines over something that grows."""
+    from markupsafe import Markup
+
+    found = {
+        each.anchor: _figure(each.data, each.looks)
+        for each in figures
+        if each.data and zooms(each.data)
+    }
+    data = json.dumps(found, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    script = f"{_vendored('uPlot.iife.min.js')}\n{_text('interactive.js')}"
+    style = f"{_vendored('uPlot.min.css')}\n{_text('interactive.css')}"
+    return Interactive(Markup(style), data, Markup(script))  # noqa: S704 (files of ours)
+
+
+def _vendored(name: str) -> str:
+    return (HERE / "vendor" / name).read_text(encoding="utf-8").strip()
+
+
+def _text(name: str) -> str:
+    return (HERE / name).read_text(encoding="utf-8").strip()
+
+
+def zooms(figure: Figure) -> bool:
+    """Whether every panel has a line worth zooming into, and its lines go from left to right."""
+    return bool(figure.panels) and all(_panel_zooms(figure, panel) for panel in figure.panels)
+
+
+def _panel_zooms(figure: Figure, panel: Panel) -> bool:
+    lines = [curve for curve in panel.curves if curve.style in LINES]
+    bands = [curve for curve in panel.curves if curve.style == "band"]
+    points = [curve for curve in panel.curves if curve.style == "points"]
+    drawn = [drawn_points(curve, panel, points_of_each(figure))[0] for curve in (*lines, *bands)]
+    known = [x[np.isfinite(x)] for x in drawn]
+    return (
+        len(lines) + len(bands) + len(points) == len(panel.curves)
+        and any(len(x) >= FEWEST for x in known[: len(lines)])
+        and all(bool(np.all(np.diff(x) >= 0)) for x in known)
+        and all(len(curve.x) <= MOST for curve in points)
+    )
+
+
+class _Arrays:
+    """Arrays as base64 of little-endian float32, each kept once."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {}
+
+    def place(self, values: Array | NDArray[np.float32]) -> int:
+        """Where the array stands among all."""
+        raw = np.asarray(values, dtype="<f4").tobytes()
+        return self._places.setdefault(base64.b64encode(raw).decode(), len(self._places))
+
+    def all(self) -> list[str]:
+        return list(self._places)
+
+
+def _figure(figure: Figure, chosen: Mapping[str, Look] | None) -> dict[str, Any]:
+    arrays = _Arrays()
+    chosen = chosen or looks(series_of(figure))
+    panels = [
+        {
+            "title": panel.title,
+            "x": _axis(panel.x),
+            "y": _axis(panel.y),
+            "curves": [
+                _curve(figure, panel, curve, chosen[curve.series or curve.label], arrays)
+                for curve in panel.curves
+            ],
+            "marks": [_mark(mark, panel) for mark in panel.marks if not mark.point],
+        }
+        for panel in figure.panels
+    ]
+    return {"across": figure.across, "panels": panels, "arrays": arrays.all()}
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    limits = axis.limits if axis.limits and all(map(np.isfinite, axis.limits)) else None
+    return {
+        "label": axis_label(axis),
+        "log": axis.scale == "log",
+        "limits": limits and [end * scale_of(axis) for end in limits],
+    }
+
+
+def _mark(mark: Mark, panel: Panel) -> dict[str, Any]:
+    """A labelled line; a stretch is told by its beginning and its end."""
+    ends = {"x": (mark.x, panel.x), "y": (mark.y, panel.y)}
+    shown = {
+        name: value * scale_of(axis)
+        for name, (value, axis) in ends.items()
+        if value is not None and np.isfinite(value)
+    }
+    return {"label": mark.label, **shown}
+
+
+def _curve(
+    figure: Figure, panel: Panel, curve: Curve, look: Look, arrays: _Arrays
+) -> dict[str, Any]:
+    """One curve: its look, and where its coordinates stand among the arrays."""
+    x, y, y_low = drawn_points(curve, panel, points_of_each(figure))
+    columns = {"y": y} | ({} if y_low is None else {"low": y_low, "high": y})
+    ends = drawn_interval(curve, panel)
+    if ends is not None:
+        columns |= {"low": _at(x, ends[0], ends[1]), "high": _at(x, ends[0], ends[2])}
+    keep = np.isfinite(x)
+    if curve.style == "points":
+        keep &= np.isfinite(y)
+    order = np.flatnonzero(keep)[np.argsort(x[keep], kind="stable")]
+    return {
+        "label": curve.label,
+        "style": curve.style,
+        "colour": look.name,
+        "dash": list(look.dash),
+        "x": arrays.place(growing(x[order])),
+        **{name: arrays.place(values[order]) for name, values in columns.items()},
+    }
+
+
+def _at(x: Array, whole_x: Array, whole: Array) -> Array:
+    """An interval's end at those of the curve's points that are drawn."""
+    if len(x) == len(whole_x):
+        return whole
+    known = np.isfinite(whole_x)
+    return np.interp(x, whole_x[known], whole[known])
+
+
+def growing(x: Array) -> NDArray[np.float32]:
+    """x, sorted, (n,), as float32 of which each is above the one before.
+
+    What is equal in float32 goes up by one unit in the last place: a joined axis has room for one
+    sample of a curve at each place.
+    """
+    narrow = x.astype(np.float32)
+    while (stuck := np.flatnonzero(narrow[1:] <= narrow[:-1])).size:
+        narrow[stuck + 1] = np.nextafter(narrow[stuck], np.float32(np.inf))
+    return narrow

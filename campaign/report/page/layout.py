@@ -1,0 +1,367 @@
+"""What the templates are given: plain, numbered, ordered data, nothing left to decide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from shlex import quote
+from typing import Any
+
+from campaign.access.analysis import AnalysedTest, one_line
+from campaign.published.scoreboard import Scoreboard, to_csv
+from campaign.published.values import PublishedTable
+from campaign.report.content import tables
+from campaign.report.content.conditions import conditions_of, summary_of
+from campaign.report.content.document import Document
+from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
+from campaign.report.content.symbols import SYMBOLS, Symbol
+from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.strips import draw_strips
+from campaign.report.page.drawings import (
+    OVERVIEW,
+    Drawable,
+    Drawing,
+    Key,
+    Overview,
+    drawings_of,
+)
+from campaign.report.page.folder import (
+    Comparison,
+    Download,
+    Folder,
+    Section,
+    ShownFigure,
+    ShownTable,
+)
+from campaign.report.page.names import figure_name, stood_for
+from campaign.result import Figure, Table
+from campaign.trial import Role
+
+DrawAll = Callable[[Mapping[Key, Drawable]], Callable[[Key], Drawn | None]]
+"""Begins to make drawings; returns what waits for one of them, None when it cannot be made so."""
+
+
+def drawn_here(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+    """Nothing is drawn beforehand: each drawing is made where it is laid out."""
+    return lambda key: None
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Drawings, and those of them that are drawn."""
+
+    drawings: Mapping[Key, Drawing]
+    drawn: Callable[[Key], Drawn | None]
+
+    def of(self, test: AnalysedTest, figure: Figure) -> tuple[Drawing, Drawn]:
+        """Raises whatever drawing raises."""
+        key = test.name, figure.key
+        drawing = self.drawings.get(key) or Drawing(figure)
+        return drawing, self.drawn(key) or drawing.made()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A document with its figures and tables drawn and numbered, for every format alike.
+
+    Attributes:
+        picture: the scoreboard's; None where nothing was compared.
+        strips: published values among draws; None without draws.
+        scoreboard_download: None where no published value takes part.
+        incidents_figures, incidents_tables: what happened besides the plan.
+        problems: what could not be shown or compared, one line each, damage apart.
+        scored: by published table, its numbers at a glance, in the order of the scoreboard.
+        symbols: of the source document, and what files call them.
+    """
+
+    document: Document
+    folder: Folder
+    picture: ShownFigure | None
+    strips: ShownFigure | None
+    scoreboard_download: Download | None
+    sections: tuple[Section, ...]
+    incident_figures: tuple[ShownFigure, ...]
+    incident_tables: tuple[ShownTable, ...]
+    problems: tuple[str, ...]
+    scored: tuple[ScoredTable, ...] = ()
+    symbols: tuple[Symbol, ...] = SYMBOLS
+
+    @property
+    def figures(self) -> tuple[ShownFigure, ...]:
+        """Every figure of the page, by its number."""
+        overview = (each for each in (self.picture, self.strips) if each is not None)
+        of_tests = (figure for section in self.sections for figure in section.figures)
+        every = (*overview, *of_tests, *self.incident_figures)
+        return tuple(sorted(every, key=lambda figure: figure.number))
+
+    @property
+    def figure_groups(self) -> tuple[tuple[ShownFigure, ...], ...]:
+        """The figures in groups of about ten, few enough that any of them is soon reached."""
+        figures = self.figures
+        size = max(10, math.isqrt(len(figures)) + 1)
+        return tuple(figures[n : n + size] for n in range(0, len(figures), size))
+
+    @property
+    def tests_of_figures(self) -> Mapping[str, str]:
+        """By a figure's anchor, the title of its test: several tests have figures of one title."""
+        of = (
+            (section.test.title, figure) for section in self.sections for figure in section.figures
+        )
+        return {figure.anchor: title for title, figure in of}
+
+    @property
+    def telling(self) -> ShownFigure | None:
+        """The figure on top of the page."""
+        wanted = self.document.opening.telling
+        shown = ((s.test.name, figure) for s in self.sections for figure in s.figures)
+        return next((f for name, f in shown if f.data and (name, f.data.key) == wanted), None)
+
+
+def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "") -> Layout:
+    """Draw and number everything, in the order of the page; `draw_all` draws the tests' figures.
+
+    command: what a reader is told to type for this report; made from the run's name when empty.
+    """
+    folder, scoreboard = Folder(), document.scoreboard
+    command = command or f"campaign report {quote(document.run.header.name)}"
+    drawings, top = drawings_of(document), Overview(scoreboard)
+    drawn = draw_all({**drawings, OVERVIEW: top})
+    made = _Made(drawings, drawn)
+    makers = _makers(document, folder, command, made)
+    _make_first(document, makers)
+    download = scoreboard_download(scoreboard, folder) if scoreboard.lines else None
+    picture, strips = (
+        None if shown is None else replace(shown, command=command)
+        for shown in (
+            overview(scoreboard, folder, drawn(OVERVIEW) or top.made()),
+            draws(scoreboard, folder),
+        )
+    )
+    sections = _sections(document, makers)
+    happened = document.incidents
+    figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
+    shown = tuple(_table_of_incident(table, folder) for table in happened.tables)
+    problems = (
+        *(f"{s.test.name}: {p}" for s in sections for p in s.problems if p not in s.left_out),
+        *scoreboard.problems,
+        *happened.problems,
+    )
+    places = {table.table: table.anchor for s in sections for table in s.comparisons}
+    return Layout(
+        document,
+        folder,
+        picture,
+        strips,
+        download,
+        sections,
+        figures,
+        shown,
+        problems,
+        scored_tables(scoreboard, document.published, places),
+    )
+
+
+def _makers(document: Document, folder: Folder, command: str, made: _Made) -> Mapping[str, _Maker]:
+    """By test, who makes its figures and tables."""
+    units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
+    return {t.name: _Maker(t, units[t.name], folder, again, made) for t in document.tests}
+
+
+def _make_first(document: Document, makers: Mapping[str, _Maker]) -> None:
+    """The figure on top of the page is its first; one that cannot be shown is told in its test."""
+    wanted = document.opening.telling
+    for test in document.tests:
+        for figure in test.result.figures:
+            if (test.name, figure.key) == wanted:
+                _attempt([], figure.key, partial(makers[test.name].figure, figure))
+
+
+def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section, ...]:
+    """In the protocol's order; each published table stands with its first test."""
+    spoken: set[str] = set()
+    sections = []
+    published = document.published
+    for place, test in enumerate(document.tests, start=1):
+        mine = [n for n in published if n in test.reproduces and n not in spoken]
+        spoken.update(mine)
+        tables_ = [published[n] for n in mine]
+        truth = document.truths.get(test.name)
+        sections.append(_section(place, makers[test.name], document.scoreboard, tables_, truth))
+    return tuple(sections)
+
+
+def _of_incident(figure: Figure, folder: Folder, command: str) -> ShownFigure:
+    return folder.figure(
+        figure, Drawing(figure).made(), (), f"incidents-{figure.key}", command=command
+    )
+
+
+def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
+    return folder.shown_table(table, (), f"incidents-{table.key}")
+
+
+def overview(scoreboard: Scoreboard, folder: Folder, drawn: Drawn | None) -> ShownFigure | None:
+    """The picture on top of the page."""
+    if drawn is None:
+        return None
+    return folder.picture(
+        drawn,
+        "Deviation from the published values",
+        "One sign per published number: how far the reproduced value is from it, and what the"
+        " comparison is worth; pointing at a sign tells which number it is. The axis is linear up"
+        " to ±1 % and logarithmic beyond.",
+        tables.agreement(scoreboard),
+        "scoreboard",
+    )
+
+
+def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
+    """Where published values stand among the draws of a random bench."""
+    svg = draw_strips(scoreboard)
+    if svg is None:
+        return None
+    return folder.picture(
+        Drawn.of(svg),
+        "Published values among the draws of a random bench",
+        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
+        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
+        " published value, one draw itself; the share of draws below it stands on the right.",
+        "One strip of ticks per published number, around a line at the published value.",
+        "draws",
+    )
+
+
+def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
+    """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
+    download = folder.table(to_csv(scoreboard.lines), "scoreboard")
+    if scoreboard.further:
+        folder.table(to_csv(scoreboard.further, tests=True), "scoreboard-runs")
+    return download
+
+
+def _section(
+    place: int,
+    maker: _Maker,
+    scoreboard: Scoreboard,
+    published: Sequence[PublishedTable],
+    truth: Table | None,
+) -> Section:
+    test, folder = maker.test, maker.folder
+    left_out = tuple(_left_out(test))
+    problems = [test.problem] if test.problem else []
+    comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
+    found = None if truth is None else maker.table(truth)
+    figures = [
+        shown
+        for figure in test.result.figures
+        if (shown := _attempt(problems, figure.key, lambda f=figure: maker.figure(f)))  # type: ignore[misc]
+    ]
+    shown_tables = [
+        shown
+        for table in test.result.tables
+        if (shown := _attempt(problems, table.key, lambda t=table: maker.table(t)))  # type: ignore[misc]
+    ]
+    return Section(
+        anchor=f"test-{place}",
+        test=test,
+        conditions=tuple(conditions_of(test, maker.units)),
+        figures=tuple(figures),
+        tables=tuple(shown_tables),
+        comparisons=tuple(comparisons),
+        problems=(*left_out, *problems),
+        left_out=left_out,
+        truth=found,
+        summary=summary_of(test),
+    )
+
+
+def _left_out(test: AnalysedTest) -> Iterator[str]:
+    """What is damaged of the test's trials, and whether that cost it the trial."""
+    there = {archived.trial.name for archived in test.trials}
+    for damage in test.damaged:
+        is_what = "is damaged" if damage.trial in there else "is left out"
+        yield f"{damage.trial or test.name} {is_what}: {damage}"
+
+
+def _attempt(problems: list[str], key: str, make: Callable[[], Any]) -> Any:
+    try:
+        return make()
+    except Exception as error:  # noqa: BLE001 (one bad figure must not cost the report)
+        problems.append(f"{key} cannot be shown: {one_line(error)}")
+        return None
+
+
+@dataclass(frozen=True)
+class _Maker:
+    """Makes the figures and tables of one test.
+
+    Attributes:
+        command: what draws one of its figures again.
+        shown: its figures that are made already, by their keys.
+    """
+
+    test: AnalysedTest
+    units: TestUnits
+    folder: Folder
+    command: str
+    made: _Made
+    shown: dict[str, ShownFigure] = field(default_factory=dict)
+
+    def figure(self, figure: Figure) -> ShownFigure:
+        if figure.key not in self.shown:
+            self.shown[figure.key] = self._new_figure(figure)
+        return self.shown[figure.key]
+
+    def _new_figure(self, figure: Figure) -> ShownFigure:
+        test = self.test
+        numbers = stood_for(figure.thesis, test.reproduces, "figure ")
+        drawing, drawn = self.made.of(test, figure)
+        return self.folder.figure(
+            drawing.figure,
+            drawn,
+            numbers,
+            *figure_name(numbers, test.name, figure.key),
+            trials=tuple(figure.trials or _measurements(test)),
+            command=f"{self.command} {quote(f'{test.name}/{figure.key}')}",
+            looks=drawing.looks,
+        )
+
+    def table(self, table: Table) -> ShownTable:
+        numbers = stood_for(table.thesis, self.test.reproduces, "")
+        page = self.units.table(table)
+        return self.folder.shown_table(table, numbers, f"{self.test.name}-{table.key}", page=page)
+
+
+def _measurements(test: AnalysedTest) -> list[int]:
+    """The numbers of its completed trials that measure; of all completed where none measures.
+
+    A test that seeks instability learns from those that did not complete as well.
+    """
+    sought = test.experiment is not None and test.experiment.seeks_instability
+    failed = () if sought else {each.trial.number for each in test.failed}
+    every = [archived.trial for archived in test.trials]
+    trials = [each for each in every if each.role is Role.MEASUREMENT] or every
+    return [each.number for each in trials if each.number not in failed]
+
+
+def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -> Comparison:
+    lines = scoreboard.of_table(table.name)
+    place = folder.next_table()
+    return Comparison(
+        number=place,
+        anchor=f"table-{place}",
+        table=table.name,
+        heading=table.heading,
+        title=table.title,
+        source=table.source,
+        lines=tuple(shown_line(line) for line in lines),
+        download=folder.table(tables.published_csv(lines), table.slug),
+    )
+
+
+def anchors(sections: Sequence[Section]) -> Mapping[str, str]:
+    """Test name to the anchor of its section."""
+    return {section.test.name: section.anchor for section in sections}

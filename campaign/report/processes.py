@@ -1,0 +1,191 @@
+"""Tests analysed and drawn in several processes: they know nothing of each other.
+
+What comes back is what one process would have made, to the byte. A process that dies, or that
+cannot be begun, costs time: what it should have done is then done here.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from campaign.access.analysis import Found, find, name_of
+from campaign.archive import RunReader
+from campaign.experiments import experiments
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.page.drawings import Drawable, Key
+from campaign.trial import Tree
+
+WORTHWHILE = 200
+"""Trials from which on more processes than one take less time than they cost to begin."""
+PRELOADED = ("campaign.report.processes", "matplotlib.backends.backend_svg", "scipy.stats")
+"""What every process needs, imported once for all of them."""
+LARGE = 50_000_000
+"""Bytes of a sealed run from which on it probably has as many trials."""
+
+
+def choose_processes(run: RunReader) -> int:
+    """How many processes are worth while for a run on this machine."""
+    many = len(run.trials) >= WORTHWHILE
+    return min(os.cpu_count() or 1, len(run.header.tests)) if many else 1
+
+
+def begin_early(path: Path) -> None:
+    """Have what processes need imported while the run is opened, where it looks worth their while.
+
+    A guess that was wrong costs a moment of another core, and none where there is but one.
+    """
+    method, _ = _context()
+    large = path.is_file() and path.stat().st_size >= LARGE
+    if large and method == "forkserver" and (os.cpu_count() or 1) > 1:
+        from multiprocessing import forkserver  # which is not everywhere
+
+        forkserver.ensure_running()
+
+
+SELDOM = 100_000, 50, 50
+"""When garbage is looked for, as `gc.set_threshold` has it."""
+
+
+@contextmanager
+def seldom_collecting() -> Iterator[None]:
+    """Look for garbage less often: a run's trials are a million objects, and none of them is any.
+
+    Cycles are still found, a hundred thousand objects later.
+    """
+    before = gc.get_threshold()
+    gc.set_threshold(*SELDOM)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
+@dataclass
+class Workers:
+    """Processes that have a run open; none of them, and all is done where it is needed."""
+
+    run: RunReader
+    pool: ProcessPoolExecutor | None = None
+
+    def found(self, *, measure_anew: bool) -> dict[str, Found]:
+        """What the analysis of each test finds, by test.
+
+        Only with the experiments of this installation: an object that somebody made cannot be told
+        to another process.
+        """
+        # The most trials first, so that none is left with a long one at the end.
+        tests = sorted(self.run.header.tests, key=lambda test: -len(self._trials_of(test)))
+        begun = self._begun({name_of(test): (_find, test, measure_anew) for test in tests})
+        found = {name: _result(future) for name, future in begun.items()}
+        return {name: each for name, each in found.items() if each is not None}
+
+    def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+        """Begin to draw; what is returned waits for a drawing, and has none that cannot be made."""
+        longest_first = sorted(drawings.items(), key=lambda item: -item[1].work)
+        begun = self._begun({key: (_draw, drawing) for key, drawing in longest_first})
+        return lambda key: _result(begun[key]) if key in begun else None
+
+    def _trials_of(self, test: Tree) -> Sequence[object]:
+        return self.run.trials_of(name_of(test))
+
+    def _begun(self, work: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Future[Any]]:
+        """Each function with its arguments; nothing once a process has died."""
+        begun: dict[Any, Future[Any]] = {}
+        if self.pool is not None:
+            with suppress(BrokenProcessPool):
+                for key, call in work.items():
+                    begun[key] = self.pool.submit(*call)
+        return begun
+
+
+def _result(future: Future[Any]) -> Any:
+    """What a process made; None when it died of it."""
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return None
+
+
+@contextmanager
+def workers(run: RunReader, processes: int) -> Iterator[Workers]:
+    """So many processes, for as long as the block lasts; fewer than two are none."""
+    if processes < 2:
+        yield Workers(run)
+        return
+    with _pool(run, processes) as pool:
+        yield Workers(run, pool)
+
+
+@contextmanager
+def _pool(run: RunReader, processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that have the run open; when the block is left early, they are ended."""
+    _, context = _context()
+    others = set(multiprocessing.active_children())
+    # What was read and checked here is handed over: reading it again takes ten times as long.
+    handed = pickle.dumps(run, pickle.HIGHEST_PROTOCOL)
+    pool = ProcessPoolExecutor(processes, context, _begin, (handed,))
+    try:
+        yield pool
+    except BaseException:  # Ctrl-C: nobody waits for an analysis that nobody wants
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _context() -> tuple[str, Any]:
+    """How processes are begun here. Not by fork: this process has threads, and whatever they hold
+    would stay locked.
+    """
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    context = multiprocessing.get_context(method)
+    context.set_forkserver_preload(list(PRELOADED))
+    return method, context
+
+
+_run: RunReader | None = None
+"""Of a process of the pool: the run that it works on."""
+
+
+def _begin(handed: bytes) -> None:
+    """Ctrl-C is for the process that asked, which ends this one; it ends with that one, too."""
+    global _run
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    gc.set_threshold(*SELDOM)
+    _run = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    gc.freeze()
+
+
+def _end_with_parent() -> None:
+    """A process of a pool would wait for its next task for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _find(test: Tree, measure_anew: bool) -> Found:
+    if _run is None:
+        raise RuntimeError("the process was not told which run it works on")
+    return find(_run, test, experiments(), measure_anew=measure_anew)
+
+
+def _draw(drawing: Drawable) -> Drawn | None:
+    try:
+        return drawing.made()
+    except Exception:  # noqa: BLE001 - it is drawn again where that is told
+        return None

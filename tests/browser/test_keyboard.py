@@ -1,0 +1,87 @@
+"""Everything can be reached by keyboard, in few strokes, and one sees where one is."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.browser.keyboard import Stop, stops, strokes
+
+FEW = 25
+"""Most strokes of the Tab key from the top of a page to a figure."""
+PER_FIGURE = 3
+
+
+@pytest.mark.parametrize("name", ["usual", "long"])
+def test_any_figure_is_a_few_strokes_away(show, name):
+    page = show(name).page
+    found = stops(page)
+    places = page.evaluate(
+        "() => { const order = [...document.querySelectorAll('*')];"
+        " return [...document.querySelectorAll('figure')].map((e) => order.indexOf(e)); }"
+    )
+    assert places
+    far = {place: count for place in places if (count := strokes(found, place)) > FEW}
+    assert far == {}
+
+
+@pytest.mark.parametrize("name", ["usual", "long"])
+def test_a_figure_has_few_stops_and_focus_is_seen_everywhere(show, name):
+    found = stops(show(name).page)
+    within = [stop.figure for stop in found if stop.figure >= 0]
+    assert {n: within.count(n) for n in within if within.count(n) > PER_FIGURE} == {}
+    assert [stop.what for stop in found if not stop.shown] == []
+
+
+def test_the_first_stop_skips_to_the_results(show):
+    page = show("usual").page
+    page.keyboard.press("Tab")
+    first = page.evaluate("document.activeElement.getAttribute('href')")
+    assert first.startswith("#")
+    assert page.evaluate(
+        "(() => { const box = document.activeElement.getBoundingClientRect();"
+        " return box.left >= 0 && box.top >= 0 && box.height > 10; })()"
+    )
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    assert page.evaluate(
+        "!!document.activeElement.closest('main') || !!document.activeElement.closest(':target')"
+    )
+
+
+def test_strokes_are_counted_with_jumps():
+    def stop(place, target=-1):
+        return Stop(place, target, -1, True, "")
+
+    plain = [stop(10 * n) for n in range(1, 9)]
+    assert strokes(plain, 75) == 8  # the eighth stop is the first within
+    assert strokes([stop(1, 75), *plain], 75) == 1  # the link leads there
+    assert strokes([stop(1, 65), *plain], 75) == 3  # one to the link, one to 70, one to 80
+    assert strokes([stop(1, 9), stop(10, 70), *[stop(20 + n) for n in range(60)]], 70) == 2
+
+
+NUMBERS = """() => [...document.querySelectorAll("#scoreboard table li")]
+  .filter((e) => e.checkVisibility()).map((e) => e.textContent.trim())"""
+"""The scoreboard's published numbers that are seen; each begins with the sign of its status."""
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+def test_the_scoreboard_is_filtered_by_status_with_the_keyboard(show, scripts):
+    """Each choice says its status, its sign and how many it leaves; the first leaves all."""
+    page = show("usual", java_script_enabled=scripts).page
+    everything = page.evaluate(NUMBERS)
+    choices = page.locator("#scoreboard").get_by_role("radio")
+    names = [choice.evaluate("e => e.labels[0].textContent.trim()") for choice in choices.all()]
+    told = [re.fullmatch(r"(\S)\s+([a-z ]+) \((\d+)\)", name) for name in names[1:]]
+    assert len(told) > 1
+    assert sum(int(each[3]) for each in told) <= len(everything)
+    assert choices.first.is_checked()
+    choices.first.focus()
+    for sign, status, count in (each.groups() for each in told):
+        page.keyboard.press("ArrowDown")
+        left = page.evaluate(NUMBERS)
+        assert left == [each for each in everything if each.startswith(sign)], status
+        assert len(left) == int(count)
+    page.keyboard.press("ArrowDown")  # from the last to the first
+    assert page.evaluate(NUMBERS) == everything

@@ -1,0 +1,179 @@
+"""Everybody can read the page: on a telephone and on a desk, in the light and in the dark."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from matplotlib.image import imread
+
+from campaign.report.palette import contrast
+from tests.browser.pages import PAGES
+
+WIDTHS = (360, 768, 1024, 1440)
+SMALLEST_LABEL = 9.0
+"""Pixels."""
+LARGEST_SHIFT = 0.01
+
+
+@pytest.mark.parametrize(
+    ("scheme", "width", "height"),
+    [("light", 1440, 500), ("dark", 360, 740)],
+    ids=["light-and-low", "dark-and-narrow"],
+)
+@pytest.mark.parametrize("name", PAGES)
+def test_axe_finds_nothing(show, axe, name, scheme, width, height):
+    page = show(name, color_scheme=scheme, width=width, height=height).page
+    assert axe(page) == []
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", PAGES)
+def test_the_page_is_no_wider_than_the_window(show, name, width):
+    page = show(name, width=width).page
+    page.evaluate("document.querySelectorAll('details').forEach((each) => (each.open = true))")
+    found = page.evaluate(
+        """() => {
+          const wide = document.documentElement.clientWidth;
+          const scrolls = (e) => {
+            for (let up = e; up && up !== document.body; up = up.parentElement)
+              if (/auto|scroll|hidden|clip/.test(getComputedStyle(up).overflowX)) return true;
+            return false;
+          };
+          const out = [...document.body.querySelectorAll("*:not(svg *)")].filter((e) => {
+            const box = e.getBoundingClientRect();
+            return box.width && box.right > wide + 0.5 && box.left < 1e4 && !scrolls(e);
+          });
+          return {
+            wider: document.documentElement.scrollWidth - wide,
+            out: [...new Set(out.map((e) => `${e.tagName} ${e.className}`))].slice(0, 10),
+          };
+        }"""
+    )
+    assert found == {"wider": 0, "out": []}
+
+
+@pytest.mark.parametrize("width", [360, 1440])
+@pytest.mark.parametrize("name", PAGES)
+def test_nothing_moves_while_it_loads_and_is_scrolled(show, name, width):
+    shown = show(name, width=width)
+    shown.scroll_through()
+    assert shown.page.evaluate("window.moved()") < LARGEST_SHIFT
+
+
+@pytest.mark.parametrize("width", [360, 1440])
+@pytest.mark.parametrize("name", PAGES)
+def test_everything_has_its_place_before_it_is_seen(show, name, width):
+    """What is laid out later than the rest has its size before, or links far down would overlap."""
+    shown = show(name, width=width)
+    before = shown.page.evaluate(PLACES)
+    assert len(before) > 3
+    shown.scroll_through()
+    assert shown.page.evaluate(PLACES) == pytest.approx(before, abs=0.5)
+
+
+PLACES = """() => [...document.querySelectorAll("section, figure, table")].flatMap((e) => {
+  const box = e.getBoundingClientRect();
+  return [box.top + scrollY, box.height];
+})"""
+
+
+def test_a_shift_would_be_noticed(show):
+    shown = show("usual")
+    shown.page.evaluate(
+        "() => { const e = document.createElement('div'); e.style.height = '300px';"
+        " document.body.prepend(e); }"
+    )
+    assert shown.page.evaluate("window.moved()") > LARGEST_SHIFT
+
+
+EDGES = """() => [...document.querySelectorAll(".scroll, .sheet")]
+  .filter((e) => e.scrollWidth > e.clientWidth + 40 && e.checkVisibility())
+  .map((e) => { e.id ||= `wide-${e.parentElement.id}`; return e.id; })"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_what_goes_on_beyond_the_edge_says_so(show, scheme):
+    """A shadow at the edge, until one is at the end; in a place where nothing is drawn."""
+    page = show("long", width=360, color_scheme=scheme).page
+    wide = page.evaluate(EDGES)
+    assert wide
+    for name in (wide[0], wide[-1]):
+        box = page.locator(f"[id='{name}']")
+        box.evaluate("e => e.scrollIntoView({ block: 'start' })")
+        shades = []
+        for end in (0, 10_000):
+            left, top = box.evaluate(
+                "(e, end) => { e.scrollLeft = end; const box = e.getBoundingClientRect();"
+                " return [box.right - 3, box.top]; }",
+                end,
+            )
+            strip = {"x": left, "y": top + 1, "width": 2, "height": 3}
+            shot = imread(io.BytesIO(page.screenshot(clip=strip)))
+            shades.append(shot[..., :3].mean())
+        assert abs(shades[0] - shades[1]) > 0.08, name
+
+
+@pytest.mark.parametrize("name", ["usual", "long"])
+def test_captions_of_tables_are_no_wider_than_a_small_window(show, name):
+    """The table below may be: what it shows must be readable without scrolling."""
+    page = show(name, width=360).page
+    ends = page.eval_on_selector_all("caption", "all => all.map((e) => e.offsetWidth)")
+    assert ends
+    assert max(ends) <= 360
+
+
+LABELS = """() => [...document.querySelectorAll("figure svg text")]
+  .filter((e) => e.textContent.trim() && e.getClientRects().length && e.checkVisibility())
+  .map((e) => {
+    const { a, b } = e.getScreenCTM();
+    const parts = [e, ...e.querySelectorAll("tspan")];
+    const size = Math.min(...parts.map((p) => parseFloat(getComputedStyle(p).fontSize)));
+    return { text: e.textContent.trim(), size: size * Math.hypot(a, b),
+             figure: e.closest("figure").id };
+  })"""
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", ["usual", "long"])
+def test_labels_of_figures_can_be_read(show, name, width):
+    labels = show(name, width=width).page.evaluate(LABELS)
+    assert len(labels) > 20
+    small = [each for each in labels if each["size"] < SMALLEST_LABEL]
+    assert small == []
+
+
+COLOURS = """() => {
+  const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  const hex = (colour) => {
+    canvas.clearRect(0, 0, 1, 1);
+    canvas.fillStyle = colour;
+    canvas.fillRect(0, 0, 1, 1);
+    const [r, g, b, alpha] = canvas.getImageData(0, 0, 1, 1).data;
+    return alpha === 255 ? "#" + [r, g, b].map((c) => c.toString(16).padStart(2, "0")).join("")
+                         : null;
+  };
+  const paper = (e) => {
+    for (let up = e; up; up = up.parentElement) {
+      const found = hex(getComputedStyle(up).backgroundColor);
+      if (found) return found;
+    }
+    return "#ffffff";
+  };
+  return [...document.querySelectorAll("figure svg text")]
+    .filter((e) => e.textContent.trim() && e.checkVisibility())
+    .map((e) => [e.textContent.trim(), hex(getComputedStyle(e).fill), paper(e.closest("svg"))]);
+}"""
+
+
+@pytest.mark.parametrize("media", ["screen", "print"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_in_figures_stands_out_from_the_paper_it_is_on(show, scheme, media):
+    """What axe does not decide for SVG; paper is white whatever the screen was."""
+    page = show("usual", color_scheme=scheme).page
+    page.emulate_media(media=media, color_scheme=scheme)
+    found = page.evaluate(COLOURS)
+    assert len(found) > 20
+    assert {text: (ink, paper) for text, ink, paper in found if contrast(ink, paper) < 4.5} == {}
+    papers = {paper for _, _, paper in found}
+    assert (min(papers) > "#8") == (scheme == "light" or media == "print")

@@ -1,0 +1,158 @@
+"""Of many tests a page opens with answers that have an interval, and has all in full below."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunReader
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.interface import Experiment, TestData
+from campaign.report.build import build_report
+from campaign.report.content.document import document_of
+from campaign.report.content.opening import MANY, Opening
+from campaign.report.formats import chosen_formats
+from campaign.result import Amount, Axis, Conclusion, Curve, Figure, Panel, Result
+
+EXACT = "nothing scatters"
+
+
+ONE_TRIAL, ONE_DAY = "the interval is of that one trial", "the interval is of that one day"
+REMARKED = {"measured_0": ONE_TRIAL, "measured_1": ONE_TRIAL, "measured_2": ONE_DAY}
+"""Of numbers with an interval: what is not in it."""
+
+
+def number(
+    name: str, half: float | None = None, *, given: bool = False, reason: str = ""
+) -> Amount:
+    ends = (None, None) if half is None else (2.0 - half, 2.0 + half)
+    origin = Origin.GIVEN if given else Origin.MEASURED
+    reason = EXACT if half is None else reason
+    return Amount(Estimate(name, 2.0, "rad", *ends, 0.95, reason=reason, origin=origin))
+
+
+SAID = {
+    # Nothing is known of how far these are true: no interval, or one narrower than any digit.
+    **{f"exact_{n}": ((number("x"), number("x", 1e-9), number("x", 0.1, given=True)),) * 3
+       for n in range(3)},
+    **{f"measured_{n}": ((number("x", 0.1, reason=REMARKED.get(f"measured_{n}", "")),),
+                         (number("y"),)) for n in range(MANY - 1)},
+    "tells_late": ((number("x"),), (number("x", 0.1), number("y", 0.1))),
+    "tells_first": ((number("x", 0.1),), (number("y"),)),
+}  # fmt: skip
+
+
+def analyse(data: TestData) -> Result:
+    name = data.name.replace("-", "_")
+    said = enumerate(SAID[name], start=1)
+    x = np.arange(5.0)
+    ends = {"low": x - 1, "high": x + 1} if name.startswith("exact") else {}
+    axis, curve = Axis("Rate", "rad/s"), Curve(x, x, "measured", "measured", "points", **ends)
+    return Result(
+        figures=(
+            Figure("a", f"Figure {name}", "A caption.", "A line.", (Panel(axis, axis, [curve]),)),
+        ),
+        conclusions=tuple(
+            Conclusion((f"Sentence {place} of {name}: ", *parts, ".")) for place, parts in said
+        ),
+    )
+
+
+@pytest.fixture(scope="module")
+def run(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> RunReader:
+    """Of a kind each, but for the last two, which are of one."""
+    made = made_up.made_up_run(tmp_path_factory.mktemp("many"), tests=dict.fromkeys(SAID, ()))
+    *others, last = made.header.tests
+    header = made.header.model_copy(update={"tests": (*others, {**last, "kind": "tells_late"})})
+    return replace(made, header=header)
+
+
+@pytest.fixture(scope="module")
+def kinds(made_up: ModuleType) -> dict[str, Experiment]:
+    return {
+        kind: Experiment(kind, kind, made_up.ShakeOptions, lambda options, bench: (), analyse)
+        for kind in SAID
+    }
+
+
+@pytest.fixture(scope="module")
+def opening(run: RunReader, kinds: dict[str, Experiment]) -> Opening:
+    return document_of(run, kinds).opening
+
+
+def test_what_has_an_interval_stands_on_top_one_test_of_a_kind(opening: Opening) -> None:
+    measured = [f"measured-{n}" for n in range(MANY - 1)]
+    assert list(opening.main) == [*measured, "tells-first"], "which says it in its first sentence"
+    assert [each.test for each in opening.chosen] == list(opening.main)
+
+
+def test_the_figure_on_top_is_of_a_test_that_stands_there(opening: Opening) -> None:
+    """Though others draw intervals, and these do not."""
+    assert opening.telling == ("measured-0", "a")
+
+
+def test_few_tests_stand_there_all(
+    made_up: ModuleType, tmp_path: Path, kinds: dict[str, Experiment]
+) -> None:
+    few = made_up.made_up_run(tmp_path, tests=dict.fromkeys(list(SAID)[:MANY], ()))
+    assert document_of(few, kinds).opening.main == ()
+
+
+def test_every_answer_is_below_with_those_of_its_kind(opening: Opening) -> None:
+    assert [each.kind for each in opening.groups][-1] == "tells late"
+    *others, last = opening.groups
+    assert [each.test for each in last.answers] == ["tells-late", "tells-first"]
+    assert sum(len(each.answers) for each in opening.groups) == len(SAID)
+    assert last.remarks == (f"Without an interval: {EXACT}.",), "said once of both"
+    assert [each.remarks for each in last.answers] == [(), ()]
+    assert others[0].answers[0].remarks[0] == f"Without an interval: {EXACT}."
+
+
+def test_the_page_has_a_sentence_of_each_and_the_rest_folded(
+    made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
+) -> None:
+    report = build_report(
+        run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
+    )
+    html = report.path.read_text(encoding="utf-8")
+    top, folded = html[html.index('<section id="opening">') :].split('<details class="every-', 1)
+    folded = folded.partition("</section>")[0]
+    for name in SAID:
+        assert f"Sentence 1 of {name}:" in folded
+        on_top = name in ("tells_first", *(f"measured_{n}" for n in range(MANY - 1)))
+        assert (f"Sentence 1 of {name}:" in top) == on_top
+        assert f"Sentence 2 of {name}:" not in top
+    assert f"What each of the {len(SAID)} tests found" in folded
+
+
+def test_what_is_not_in_an_interval_on_top_is_told_there(
+    made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
+) -> None:
+    """A remark of one below its sentence, one of several once below all, and of which."""
+    report = build_report(
+        run,
+        tmp_path / "out",
+        experiments=kinds,
+        packaged_templates=made_up.TEMPLATES,
+        formats=chosen_formats(("markdown", "latex")),
+    )
+    texts = [report.path, *(report.path.with_suffix(suffix) for suffix in (".md", ".tex"))]
+    for text in (path.read_text(encoding="utf-8") for path in texts):
+        top = text[text.index("What was found") : text.index("What each of the")]
+        assert top.count(f"{ONE_TRIAL[1:]}.") == 1
+        assert ": The interval is of that one trial." in top
+        assert top.count(f"{ONE_DAY[1:]}.") == 1
+        assert top.index("Sentence 1 of") < top.index(ONE_DAY[1:]) < top.index(ONE_TRIAL[1:])
+        assert EXACT not in top, "of the second sentences, which are not there"
+        assert top.count("and brackets behind a number") == 1
+
+
+def test_without_intervals_nothing_is_said_of_them(
+    made_up: ModuleType, tmp_path: Path, kinds: dict[str, Experiment]
+) -> None:
+    exact = made_up.made_up_run(tmp_path, tests={"exact_0": ()})
+    assert document_of(exact, kinds).opening.intervals == ""

@@ -1,0 +1,157 @@
+"""Tests analysed and drawn in several processes: the same page, and nobody is left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import open_run
+from campaign.experiments import experiments
+from campaign.report import processes
+from campaign.report.build import render
+from campaign.report.content.document import Document, document_of
+from campaign.report.page.drawings import drawings_of
+from campaign.report.processes import workers
+from campaign.resources import templates_folder
+from tests.system.user import campaign, environment, write
+
+PROTOCOL = """
+title = "Two tests"
+
+[[test]]
+name = "calm"
+kind = "stabilization"
+bench = "simulink"
+cycles = 1
+settle_cycles = 1
+frequency = "5 Hz"
+
+[[test]]
+name = "steps"
+kind = "step_response"
+bench = "simulink"
+"""
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("two-tests")
+    protocol = write(folder, PROTOCOL)
+    campaign(folder, "run", protocol)
+    (found,) = (folder / "results").glob("*.nxs")
+    return found
+
+
+def page_of(archive: Path, count: int) -> tuple[str, dict[str, str]]:
+    html, folder, _ = render(
+        open_run(archive), archive.parent, experiments(), templates_folder(), processes=count
+    )
+    return html, folder.files
+
+
+def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
+    run = open_run(archive)
+    with workers(run, 2) as two:
+        found = two.found(measure_anew=False)
+        document = document_of(run, experiments(), found=found)
+        drawings = drawings_of(document)
+        awaited = two.draw(drawings)
+        drawn = {key: awaited(key) for key in drawings}
+    assert found.keys() == {"calm", "steps"}
+    assert {test for test, _ in drawn} == {"calm", "steps"}
+    assert drawn == {key: drawing.made() for key, drawing in drawings.items()}
+    assert page_of(archive, 2) == page_of(archive, 1)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_was_found_is_told_once_and_the_page_is_the_same(archive: Path, count: int) -> None:
+    told: list[Document] = []
+    run = open_run(archive)
+    html, folder, report = render(
+        run,
+        archive.parent,
+        experiments(),
+        templates_folder(),
+        processes=count,
+        when_found=told.append,
+    )
+    (document,) = told
+    assert document is report.layout.document
+    assert (html, folder.files) == page_of(archive, 1)
+
+
+def test_a_process_that_dies_costs_no_more_than_time(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dead(*_: object) -> Future[object]:
+        future: Future[object] = Future()
+        future.set_exception(BrokenProcessPool())
+        return future
+
+    whole = page_of(archive, 1)
+    monkeypatch.setattr(processes.ProcessPoolExecutor, "submit", dead)
+    with workers(open_run(archive), 2) as two:
+        assert two.found(measure_anew=False) == {}
+    assert page_of(archive, 2) == whole
+
+
+STRANDED = """
+import multiprocessing, os, signal, sys, time
+from pathlib import Path
+from campaign.archive import open_run
+from campaign.report.processes import _pool
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever began it may ignore it
+    with _pool(open_run(Path(sys.argv[1])), 2) as pool:
+        waiting = [pool.submit(time.sleep, 600) for _ in range(2)]
+        pids = [process.pid for process in multiprocessing.active_children()]
+        while not all(each.running() for each in waiting):
+            time.sleep(0.05)
+        print(*pids, flush=True)
+        sys.stdin.read(1)
+        os.kill(os.getpid(), getattr(signal, sys.argv[2]))
+        time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT"])
+def test_no_process_outlives_the_one_that_began_it(archive: Path, tmp_path: Path, how: str) -> None:
+    script = tmp_path / "stranded.py"
+    script.write_text(STRANDED, encoding="utf-8")
+    with subprocess.Popen(
+        [sys.executable, str(script), str(archive), how],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=environment(),
+        text=True,
+    ) as parent:
+        assert parent.stdout
+        pids = [int(pid) for pid in parent.stdout.readline().split()]
+        assert len(pids) == 2
+        assert all(_lives(pid) for pid in pids)
+        parent.communicate("x", timeout=120)
+        assert parent.returncode == -getattr(signal, how)
+    limit = time.monotonic() + 120
+    while any(_lives(pid) for pid in pids) and time.monotonic() < limit:
+        time.sleep(0.05)
+    assert not any(_lives(pid) for pid in pids)
+
+
+def _lives(pid: int) -> bool:
+    """Whether there is such a process that has not ended; its parent may still have to hear it."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{pid}/stat")
+    return not state.exists() or state.read_text().rpartition(")")[2].split()[0] != "Z"

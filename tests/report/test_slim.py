@@ -1,0 +1,218 @@
+"""A drawing in fewer bytes paints what it painted before."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from types import ModuleType
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from campaign.experiments.interface import TestData
+from campaign.report.drawing.figures import draw, inline
+from campaign.report.drawing.legible import legible_width
+from campaign.report.drawing.short_paths import short_path
+from campaign.report.drawing.slim import slim
+from campaign.result import Axis, Curve, Figure, Mark, Panel
+
+ABOUT = 0.0051
+"""Half of a hundredth, and a rounding error."""
+NOT_INHERITED = {"opacity", "clip-path"}
+INITIAL = {
+    "fill": "#000000",
+    "stroke": "none",
+    "stroke-width": "1",
+    "stroke-linecap": "butt",
+    "stroke-linejoin": "miter",
+    "stroke-dasharray": "none",
+}
+Numbers = tuple[float, ...]
+
+
+def figures(made_up: ModuleType) -> Iterator[Figure]:
+    """Lines, points, bars, bands, log axes, dense scatters and hostile words."""
+    data = TestData("t", "t", {}, ())
+    yield from made_up.stabilization(data).figures
+    yield from made_up.velocity_map(data).figures
+    x = np.linspace(1, 9, 60)
+    words = "<b>&\"' σ₀ – µrad"
+    many = np.random.default_rng(5).normal(size=(2, 3000))
+    yield Figure(
+        "odd",
+        words,
+        words,
+        words,
+        (
+            Panel(
+                Axis(words),
+                Axis("y", scale="log"),
+                [
+                    Curve(x, x, words, "measured", "points", low=x - 0.5, high=x + 2),
+                    Curve(x, x * x, "step", "static", "line+points"),
+                    Curve(x, np.where(x < 5, x, np.nan), "gap", "fit", "thin"),
+                ],
+                words,
+                [Mark(words, x=3.0), Mark("level", y=20.0)],
+            ),
+            Panel(Axis("x"), Axis("y"), [Curve(*many, "dense", "other", "points")]),
+            Panel(Axis("x"), Axis("y"), [Curve(x, np.full(60, np.nan), "nothing")]),
+        ),
+    )
+
+
+def test_what_is_painted_stays(made_up: ModuleType) -> None:
+    for figure in figures(made_up):
+        before = draw(figure)
+        after = slim(before)
+        if "<image" not in before:
+            assert len(after) < 0.62 * len(before), figure.key
+        old, new = list(painted(before)), list(painted(after))
+        assert [how for _, how, _ in old] == [how for _, how, _ in new]
+        for (_, how, was), (_, _, is_) in zip(old, new, strict=True):
+            assert was == pytest.approx(is_, abs=ABOUT), how
+
+
+def test_the_same_drawing_gives_the_same_bytes(made_up: ModuleType) -> None:
+    for figure in figures(made_up):
+        svg = draw(figure)
+        assert slim(svg) == slim(svg)
+        assert slim(svg).startswith('<?xml version="1.0" encoding="utf-8"?>\n<svg ')
+        page = inline(slim(svg), "figure-3", "t", "a")
+        ids = re.findall(r'\bid="([^"]*)"', page)
+        assert all(name.startswith("figure-3-") for name in ids)
+        used = set(re.findall(r'(?:href="|url\()#([^")]+)', page))
+        assert used == set(ids) - {"figure-3-title", "figure-3-alt"}
+
+
+def test_paths_of_steps_do_not_drift() -> None:
+    """Twenty thousand random steps end where they should: rounding errors do not add up."""
+    places = np.cumsum(np.random.default_rng(7).normal(size=(20_000, 2)), axis=0)
+    text = "M " + "\nL ".join(f"{x:.6f} {y:.6f}" for x, y in places)
+    found = np.array(points(short_path(text))).reshape(-1, 2)
+    steps = {tuple(row) for row in np.round(found, 2)}
+    assert np.abs(found[-1] - places[-1]).max() < ABOUT
+    assert all(tuple(np.round(place, 2)) in steps for place in places[::97])
+
+
+@pytest.mark.parametrize(
+    ("path", "short"),
+    [
+        ("M 0 0\nL 10 0\nL 10 5.5\nz", "m0 0h10v5.5z"),
+        ("M 1 1\nL 2 2\nL 2.001 2.002\nL 3 3", "m1 1 1 1 1 1"),  # a step of nothing
+        ("M 3 4\nL 3 4", "m3 4h0"),  # a dot stays one
+        ("M 1 2\nL 3 4\nM 5 6\nL 7 8", "m1 2 2 2m2 2 2 2"),
+        ("M 1 2\nM 5 6\nL 7 8", "m1 2m4 4 2 2"),  # a move that follows a move
+        ("M 0 1\nC 1.5 2 3 4 5 6", "m0 1c1.5 1 3 3 5 5"),
+        ("", ""),
+    ],
+)
+def test_paths_are_short(path: str, short: str) -> None:
+    assert short_path(path) == short
+    assert points(short) == pytest.approx(points(path), abs=ABOUT)
+
+
+@pytest.mark.parametrize("path", ["M 0 1\nL 1e-3 2", "M 0 0 A 1 1 0 0 0 2 2", "m 1 1 l 2 2"])
+def test_paths_that_matplotlib_does_not_write_stay(path: str) -> None:
+    assert short_path(path) == path
+
+
+def test_the_width_at_which_labels_are_legible() -> None:
+    """9 px over the smallest of 7.5 and 8 units, of a drawing that is 500 units wide."""
+    svg = '<svg viewBox="0 0 500 200"><text style="font-size: 8px"/><g style="font-size:7.5px"/>'
+    assert legible_width(svg) == pytest.approx(600.0)
+    assert legible_width('<svg viewBox="0 0 500 200">') == 0.0
+
+
+# An SVG reader of this test's own: what is painted, with the style that is in force there.
+
+
+def painted(svg: str) -> Iterator[tuple[str, tuple[str, ...], Numbers]]:
+    """Shape, looks and coordinates of everything that leaves a trace."""
+    root = ET.fromstring(svg)
+    named = {e.attrib["id"]: e for e in root.iter() if "id" in e.attrib}
+    sheet = re.search(r"\*\{([^}]*)\}", svg)
+    yield from _of(root, INITIAL | (_css(sheet[1]) if sheet else {}), (), named)
+
+
+def _of(
+    element: ET.Element,
+    style: dict[str, str],
+    clips: tuple[Numbers, ...],
+    named: dict[str, ET.Element],
+) -> Iterator[tuple[str, tuple[str, ...], Numbers]]:
+    tag = element.tag.rpartition("}")[2]
+    if tag in ("defs", "clipPath", "style", "metadata"):
+        return
+    style = {k: v for k, v in style.items() if k not in NOT_INHERITED} | _css(
+        element.get("style", "")
+    )
+    if "clip-path" in element.attrib:
+        (frame,) = named[element.attrib["clip-path"][5:-1]]
+        clips = (*clips, tuple(float(frame.attrib[k]) for k in ("x", "y", "width", "height")))
+    at = tuple(float(element.get(k, "0")) for k in ("x", "y"))
+    if tag == "use":
+        (href,) = (v for k, v in element.items() if k.endswith("href"))
+        target = named[href[1:]]
+        yield from _painted("sign", style | _css(target.get("style", "")), clips, at)
+        yield "", (), points(target.attrib["d"])
+    elif tag == "path":
+        numbers = points(element.get("d", ""))
+        yield from _painted("path", style, clips, numbers) if numbers else ()
+    elif tag == "text":
+        fonts = tuple(style.get(k, "") for k in ("font-size", "font-weight", "text-anchor"))
+        turn = re.findall(r"rotate\((-?[\d.]+)", element.get("transform", ""))
+        turned = [float(angle) for angle in turn if float(angle)]
+        moved = re.findall(r"translate\((\S+) (\S+)\)", element.get("transform", ""))
+        at = tuple(map(float, moved[0])) if moved else at
+        words = "".join(element.itertext())
+        yield f"text {words}", (*fonts, style["fill"], words), (*at, *turned)
+    elif tag == "image":
+        yield "image", (element.get("transform", ""),), at
+    for child in element:
+        yield from _of(child, style, clips, named)
+
+
+def _painted(
+    shape: str, style: dict[str, str], clips: tuple[Numbers, ...], numbers: Numbers
+) -> Iterator[tuple[str, tuple[str, ...], Numbers]]:
+    """Nothing for what has neither a line nor a filling; of a straight line no filling."""
+    filling = "none" if shape == "path" and len(numbers) == 4 else style["fill"]
+    if (filling, style["stroke"]) == ("none", "none"):
+        return
+    shown = {"fill": filling, "opacity": "1", "fill-opacity": "1", "stroke": style["stroke"]}
+    line = [name for name in style if name.startswith("stroke") and style["stroke"] != "none"]
+    shown |= {name: style[name] for name in ("opacity", "fill-opacity", *line) if name in style}
+    looks = tuple(f"{name}={value}" for name, value in sorted(shown.items()))
+    yield shape, (shape, *looks), (*numbers, *(end for clip in clips for end in clip))
+
+
+def _css(text: str) -> dict[str, str]:
+    pairs = (part.split(":", 1) for part in text.split(";") if ":" in part)
+    return {name.strip(): value.strip() for name, value in pairs}
+
+
+def points(path: str) -> Numbers:
+    """The places that a path comes by; a repeated one once, as it paints nothing."""
+    here = start = (0.0, 0.0)
+    found: list[tuple[float, float]] = []
+    for command, text in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
+        numbers = [float(n) for n in re.findall(r"-?\d*\.?\d+", text)]
+        if command in "zZ":
+            here = start
+            found.append(here)
+            continue
+        if command in "hv":
+            numbers = [v for n in numbers for v in ((n, 0.0) if command == "h" else (0.0, n))]
+        for place, (x, y) in enumerate(zip(numbers[::2], numbers[1::2], strict=True)):
+            relative = command.islower()
+            origin = here
+            if command in "cq":  # of a curve all points are told from where it begins
+                origin = found[-1 - place % {"c": 3, "q": 2}[command]]
+            here = (origin[0] + x, origin[1] + y) if relative else (x, y)
+            if command in "mM" and place == 0:
+                start = here
+            if not found or command not in "lLhv" or np.hypot(*np.subtract(here, found[-1])) > 0.01:
+                found.append(here)
+    return tuple(number for place in found for number in place)
