@@ -1,0 +1,90 @@
+"""Why a difference is not judged although both findings have intervals.
+
+Some numbers follow from others of the same test: one change of an error is a change of each of its
+ratios, too, and would be declared as often as there are ratios.
+
+Besides, two intervals are known not to hold what a comparison of benches asks of them. That of a
+single trial has no scatter between trials in it. And that of a parameter whose fellow was held at a
+value which the same data exclude is the interval of a wrong model, whose residuals are no noise: on
+the `platform` bench, whose Stribeck exponent is about 0.9, viscous friction fitted with the
+exponent held at 2 scatters between runs by 1.5 times its standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from campaign.access.analysis import AnalysedTest
+from campaign.comparing.pairing import same_value
+from campaign.estimate import Origin
+from campaign.result import Finding
+from campaign.text import interval
+from campaign.trial import Outcome, Role
+
+DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
+"""Quantities that are functions of other numbers of the same test."""
+FOLLOWS = "it follows from other numbers of the same test, which are compared themselves"
+REPEAT = "how trials scatter is not in the interval; `repeat = 3` would show it"
+WRONG_MODEL = "its interval is that of a model that the data contradict"
+
+
+def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> str:
+    """Why two findings are not judged although both have intervals; empty when they are.
+
+    sides, findings: of the reference and of the other run.
+    """
+    if findings[0].quantity in DERIVED:
+        return FOLLOWS
+    names = ("the reference", "the other")
+    own = list(zip(names, sides, findings, strict=True))
+    alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]
+    if alone:
+        told = "one trial each" if len(alone) == 2 else f"{alone[0]} is of one trial"
+        return f"{told}: {REPEAT}"
+    for name, test, finding in own:
+        for held in contradicted(test, finding):
+            return f"{name}: {held}; {WRONG_MODEL}"
+    return ""
+
+
+def trials_behind(test: AnalysedTest, finding: Finding) -> int:
+    """How many trials the finding may rest on: those that its conditions do not contradict."""
+    return sum(
+        archived.ending.outcome is Outcome.COMPLETED
+        and archived.trial.role is Role.MEASUREMENT
+        and all(
+            same_value(finding.conditions[path], value)  # type: ignore[arg-type]
+            for path, value in archived.trial.point.items()
+            if path in finding.conditions
+        )
+        for archived in test.trials
+    )
+
+
+def contradicted(test: AnalysedTest, finding: Finding) -> Iterator[str]:
+    """What was held, under the finding's own conditions, at a value that the test excludes.
+
+    That is a number of origin `given` of which the same test, at conditions that differ in one
+    word, measured an interval that does not hold it.
+    """
+    for held in test.result.findings:
+        if held.known.origin is not Origin.GIVEN or held.conditions != finding.conditions:
+            continue
+        for free in test.result.findings:
+            if free.quantity == held.quantity and _in_one(free, held) and _excludes(free, held):
+                told = free.known
+                found = interval(told.value, *told.combined)
+                yield f"{held.quantity.replace('_', ' ')} held at {held.value:g}, found {found}"
+
+
+def _in_one(one: Finding, other: Finding) -> bool:
+    """Whether the conditions have the same names and differ in one value."""
+    a, b = one.conditions, other.conditions
+    return a.keys() == b.keys() and sum(not same_value(a[name], b[name]) for name in a) == 1
+
+
+def _excludes(free: Finding, held: Finding) -> bool:
+    if free.known.origin not in (Origin.MEASURED, Origin.NOT_DETERMINED):
+        return False
+    low, high = free.known.combined
+    return (low is not None and held.value < low) or (high is not None and held.value > high)
