@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import subprocess
 import sys
@@ -10,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from campaign.cli import main as command_line
+from campaign.cli import output
 from campaign.cli.kinds import show_kind
-from campaign.cli.output import bytes_text, print_table
+from campaign.cli.output import PlainConsole, bytes_text, print_line, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.errors import (
     ArchiveError,
@@ -21,6 +23,7 @@ from campaign.errors import (
     ProtocolError,
     UsageError,
 )
+from campaign.execution.naming import typed
 from campaign.resources import protocols_folder
 
 HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "scipy", "tree_sitter")
@@ -109,6 +112,88 @@ def test_without_a_terminal_a_table_is_tab_separated_and_one_line_per_row(capsys
     assert capsys.readouterr().out == "a\tb\n1\ttwo lines and a tab\n"
 
 
+def on_a_terminal(monkeypatch: pytest.MonkeyPatch, width: int) -> io.StringIO:
+    """What is printed from now on, as a terminal of that width is given it."""
+    shown = io.StringIO()
+    out = PlainConsole(shown)
+    out._force_terminal, out._color_system, out.width = True, None, width
+    monkeypatch.setattr(output, "console", lambda: out)
+    return shown
+
+
+RUN = "2026-11-22T19-57-33-a-name-that-is-long"
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_a_table_on_a_terminal_breaks_no_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], width: int
+) -> None:
+    shown = on_a_terminal(monkeypatch, width)
+    headings = ("run", "status", "what", "size")
+    told = "failed because of a reason that nobody can read in one line"
+    print_table(headings, [(RUN, "failed", told, "317.2 MB")], spare=("size",))
+    lines = [line.rstrip() for line in shown.getvalue().splitlines()]
+    assert max(map(len, lines)) <= width
+    words = {word for line in lines for word in line.split()}
+    assert {RUN, "failed", *told.split()} <= words
+    assert ("317.2" in words) == (width != 60)  # spare, or below the others
+    told = "left out: size; with `| cat` all is shown\n" if width == 60 else ""
+    assert capsys.readouterr().err == told
+
+
+@pytest.mark.parametrize("width", [20, 60])
+def test_a_command_to_be_typed_is_in_one_line(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
+    shown = on_a_terminal(monkeypatch, width)
+    print_line(f"interrupted: 17 trials are done; to go on:\n{typed('resume', RUN, '--yes')}")
+    assert shown.getvalue().splitlines()[-1] == f"  campaign resume {RUN} --yes"
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_a_message_on_a_terminal_goes_on_between_words(
+    monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    shown = on_a_terminal(monkeypatch, width)
+    path = "results/" + RUN + "/a/path/that/is/longer/than/the/terminal.toml:3:14:"
+    text = f"{path} there is no such-and-such key; did you mean another-one-that-is-long?"
+    print_line(f"  {text}")
+    lines = shown.getvalue().splitlines()
+    assert [word for line in lines for word in line.split()] == text.split()
+    assert all(len(line) <= width for line in lines if path not in line)
+    assert all(line.startswith("  ") for line in lines)
+
+
+def completions(monkeypatch: pytest.MonkeyPatch, capsys, *words: str) -> list[str]:
+    monkeypatch.setattr("sys.argv", ["campaign"])
+    monkeypatch.setenv("_CAMPAIGN_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", " ".join(("campaign", *words)))
+    monkeypatch.setenv("COMP_CWORD", str(len(words)))
+    with pytest.raises(SystemExit):
+        command_line()
+    return capsys.readouterr().out.split()
+
+
+def test_the_shell_completes_commands_runs_protocols_and_kinds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "quick").mkdir()
+    (tmp_path / "quick/own.toml").touch()
+    results = tmp_path / "runs"
+    for name in ("2026-01-01-a.nxs", "2026-01-02-b.partial", "notes.txt"):
+        results.mkdir(exist_ok=True)
+        (results / name).touch()
+
+    def complete(*words: str) -> list[str]:
+        return completions(monkeypatch, capsys, *words)
+
+    assert set(complete("re")) == {"resume", "rerun", "report"}
+    assert complete("show", "--results", str(results), "2026") == ["2026-01-02-b", "2026-01-01-a"]
+    assert complete("run", "quick") == ["quickstart", "quick/"]
+    assert complete("run", "quick/") == ["quick/own.toml"]
+    assert complete("kinds", "stabi") == ["stabilization"]
+    assert complete("show", "--results", "/nowhere/at/all", "2026") == []
+
+
 @pytest.mark.parametrize(
     ("count", "text"), [(0, "0 B"), (999, "999 B"), (14_230_000, "14.2 MB"), (2e15, "2000.0 TB")]
 )
@@ -122,7 +207,22 @@ def test_the_kind_of_a_bench_tells_its_tables_of_paths(capsys):
     told = {row[0]: row[1:3] for row in rows if len(row) == 4}
     assert told["gear.preload.shares"] == ["table of number", "{ static_torque = 1.0 }"]
     assert told["variation.day_to_day"] == ["table", "none"]
-    assert told["variation.trial_to_trial.paths"] == ["list of text", "none"]
+    assert told["variation.trial_to_trial.NAME.paths"] == ["list of text", "none"]
+
+
+def test_kinds_go_down_to_the_last_table(capsys):
+    """Of tables that are one of several, each one's options, and the word that they come with."""
+    show_kind("bench")
+    rows = [tuple(line.split("\t")) for line in capsys.readouterr().out.splitlines()]
+    integral = {
+        row[1]: row[3].partition(":")[0] for row in rows if row[0].endswith("rate.integral")
+    }
+    assert integral == {"1/s": "With form = ideal", "A/rad": "With form = parallel"}
+    names = [row[0] for row in rows]
+    assert names.count("controller.rate.proportional") == 1  # both forms have it
+    assert "friction.NAME.bristle_stiffness" in names
+    assert "compensation.NAME.friction.NAME.negative.static_torque" in names
+    assert not any(name.endswith((".form", ".model", ".method")) for name in names)
 
 
 def test_the_version_names_what_is_numbered_for_itself(monkeypatch, capsys):

@@ -18,6 +18,7 @@ from campaign.cli.parameters import (
     BackendOption,
     ClearStopOption,
     FromOption,
+    JsonOption,
     LargeOption,
     OnlyOption,
     PortOption,
@@ -30,6 +31,8 @@ from campaign.cli.parameters import (
     TruthOption,
     WorkersOption,
     YesOption,
+    output_option,
+    workers_option,
 )
 
 app = typer.Typer(
@@ -38,7 +41,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 some trials failed, 2 bad usage or protocol, 3 a limit or a "
     "backend fault, 4 a damaged archive, 5 safe state NOT confirmed, 130 interrupted.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # its consoles would be none of ours: `cli.output`
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -66,7 +69,7 @@ def _options(
 @app.command()
 def plan(
     protocol: ProtocolArgument,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
     only: OnlyOption = None,
     changes: SetOption = None,
     backend: BackendOption = "sim",
@@ -204,24 +207,14 @@ def calibrate(
     results: ResultsOption = RESULTS,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            metavar="FILE",
-            help="Where the result goes, with the bench beside it; a new file in --results when "
-            "absent.",
-            show_default=False,
+        output_option(
+            "FILE",
+            "Where the result goes, with the bench beside it; a new file in --results when absent.",
         ),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            "--workers",
-            metavar="N",
-            min=1,
-            max=256,
-            help="Simulations at once; one per processor if absent.",
-            show_default=False,
-        ),
+        workers_option("Simulations at once"),
     ] = None,
     leave_out: Annotated[
         bool,

@@ -1,4 +1,4 @@
-"""What can be typed to read archived runs: report, export, list, show, verify, sign."""
+"""What can be typed to read archived runs: report, compare, index, export, list, show ..."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import typer
 from campaign.cli.app import app
 from campaign.cli.parameters import (
     RESULTS,
+    JsonOption,
     NewestRunArgument,
+    OpenOption,
     ResultsOption,
     RunArgument,
     TemplatesOption,
+    output_option,
 )
 
 __all__ = ["app"]
@@ -25,15 +28,10 @@ def report(
     results: ResultsOption = RESULTS,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            metavar="DIR",
-            help="Where to write it; RUN-report beside the archive when absent.",
-            show_default=False,
-        ),
+        output_option("DIR", "Where to write it; RUN-report beside the archive when absent."),
     ] = None,
     templates: TemplatesOption = None,
-    open_it: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+    open_it: OpenOption = False,
     measure_anew: Annotated[
         bool,
         typer.Option(
@@ -41,15 +39,115 @@ def report(
             help="Measure the recordings by this program, not as they were when executed.",
         ),
     ] = False,
+    only_figure: Annotated[
+        str | None,
+        typer.Option(
+            "--only-figure",
+            metavar="TEST/KEY",
+            help="Only this figure, SVG and CSV; into RUN-figures, or --output. Its caption on "
+            "the page names it.",
+            show_default=False,
+        ),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME",
+            help="Besides the page: markdown, latex, pdf; may be given again.",
+        ),
+    ] = None,
+    trials: Annotated[
+        str,
+        typer.Option(
+            "--trials",
+            metavar="WHICH",
+            help="Trials that get a page of their own: failed, all, N..M, or N,M.",
+            show_default=False,
+        ),
+    ] = "",
+    zoom: Annotated[
+        bool,
+        typer.Option("--interactive", help="Lines of the page can be zoomed into and read off."),
+    ] = False,
 ) -> None:
     """Write report.html, its tables and its figures, from an archive alone."""
-    from campaign.cli.report import report_run
+    from campaign.cli.report import draw_figure, report_run
 
+    if only_figure is not None:
+        of_the_page = {
+            "--templates": templates,
+            "--open": open_it,
+            "--format": formats,
+            "--trials": trials,
+            "--interactive": zoom,
+        }
+        useless = [option for option, value in of_the_page.items() if value]
+        file, code = draw_figure(
+            run, results, output, only_figure, measure_anew=measure_anew, useless=useless
+        )
+        typer.echo(file)
+        raise typer.Exit(code)
     page, code = report_run(
-        run, results, output, templates, open_it=open_it, measure_anew=measure_anew
+        run,
+        results,
+        output,
+        templates,
+        open_it=open_it,
+        measure_anew=measure_anew,
+        formats=formats or (),
+        trials=trials,
+        zoom=zoom,
     )
     typer.echo(page)
     raise typer.Exit(code)
+
+
+@app.command()
+def compare(
+    runs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RUN RUN...",
+            help="The reference, and what is compared with it: paths, names, or their beginnings.",
+            show_default=False,
+        ),
+    ],
+    results: ResultsOption = RESULTS,
+    output: Annotated[
+        Path | None,
+        output_option("DIR", "Where to write it; beside the reference when absent."),
+    ] = None,
+    exchanged: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--exchanged",
+            metavar="SOURCE",
+            help="What is not the same in all runs although the benches say so, as `torque "
+            "constant` of a motor that was exchanged; may be given again.",
+        ),
+    ] = None,
+    open_it: OpenOption = False,
+) -> None:
+    """Say which numbers of runs differ from those of the first, and how sure that is."""
+    from campaign.cli.compare import compare_archives
+
+    page, code = compare_archives(runs, results, output, exchanged or (), open_it=open_it)
+    typer.echo(page)
+    raise typer.Exit(code)
+
+
+@app.command()
+def index(
+    results: Annotated[
+        Path, typer.Argument(metavar="[RESULTS]", help="The folder of the archives.")
+    ] = RESULTS,
+    open_it: OpenOption = False,
+) -> None:
+    """Write index.html into a results folder: one searchable page over all its runs."""
+    from campaign.cli.index import index_results
+
+    typer.echo(index_results(results, open_it=open_it))
 
 
 @app.command()
@@ -61,12 +159,7 @@ def export(
     results: ResultsOption = RESULTS,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            metavar="DIR",
-            help="A new folder; RUN-FORMAT beside the archive when absent.",
-            show_default=False,
-        ),
+        output_option("DIR", "A new folder; RUN-FORMAT beside the archive when absent."),
     ] = None,
     tests: Annotated[
         list[str] | None,
@@ -110,7 +203,7 @@ def list_command(
     tag: Annotated[
         list[str] | None, typer.Option("--tag", metavar="TAG", help="With every tag given.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List the archived runs, the newest first; options but --since and --until may be repeated."""
     from campaign.cli.archives import list_archives
@@ -136,7 +229,7 @@ def show(
         bool,
         typer.Option("--metrics", help="Also what each recording says by itself, with intervals."),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show what a run was, how it ended, and all that did not go as planned."""
     from campaign.cli.show import show_archive
@@ -173,7 +266,7 @@ def verify(
             show_default=False,
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Check every byte of archives against checksums, journal, format and fingerprints.
 

@@ -16,6 +16,9 @@ _HEADINGS = (
     "run", "status", "date", "duration", "trials", "failed", "protocol", "backend", "tags", "size",
 )  # fmt: skip
 
+_SPARE = ("size", "tags", "backend", "protocol", "date", "duration")
+"""What a narrow terminal does without first; the name of a run begins with its date."""
+
 
 def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None:
     """The runs in `results`, the newest first; one that cannot be read says why."""
@@ -28,7 +31,7 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     elif not shown:
         print_note(f"{results}: none of {len(runs)} runs is like that")
     else:
-        print_table(_HEADINGS, [_row(run) for run in shown])
+        print_table(_HEADINGS, [_row(run) for run in shown], spare=_SPARE)
     for path, what in find_remnants(results).items():
         print_note(f"{path}: is {what}; it can be removed", style="yellow")
     for run in runs:

@@ -7,34 +7,29 @@ from typing import Annotated
 
 import typer
 
+from campaign.cli.parameters import (
+    BaudOption,
+    BenchArgument,
+    ControllerOption,
+    JsonOption,
+    PatienceOption,
+    output_option,
+)
 from campaign.cli.setup_commands import app
 
 __all__ = ["app"]
 
-ControllerOption = Annotated[
-    str, typer.Option("--port", metavar="PORT", help="Where the controller is.")
-]
-BaudOption = Annotated[
-    int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
-]
-
 
 @app.command()
 def check(
-    bench: Annotated[
-        str,
-        typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name."),
-    ],
+    bench: BenchArgument,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            metavar="FILE",
-            help="The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent.",
-            show_default=False,
+        output_option(
+            "FILE", "The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent."
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the loops of a bench, their margins, and whether its sizes fit each other."""
     from campaign.cli.check import check_bench
@@ -44,10 +39,7 @@ def check(
 
 @app.command()
 def fingerprint(
-    bench: Annotated[
-        str,
-        typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name."),
-    ],
+    bench: BenchArgument,
     check: Annotated[
         bool, typer.Option("--check", help="Only say whether the bench is the one described.")
     ] = False,
@@ -142,10 +134,7 @@ def device(
 def stop(
     port: ControllerOption,
     baud: BaudOption = 2_000_000,
-    patience: Annotated[
-        float,
-        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
-    ] = 10.0,
+    patience: PatienceOption = 10.0,
 ) -> None:
     """Panic stop: drive off, and off it stays; works whoever has the port, and while that hangs."""
     from campaign.cli.stop import stop_bench
@@ -157,11 +146,8 @@ def stop(
 def status(
     port: ControllerOption,
     baud: BaudOption = 2_000_000,
-    patience: Annotated[
-        float,
-        typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
-    ] = 3.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    patience: PatienceOption = 3.0,
+    as_json: JsonOption = False,
 ) -> None:
     """Show how a controller is, who holds it, and whether somebody has stopped it."""
     from campaign.cli.status import show_status

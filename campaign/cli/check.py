@@ -18,7 +18,7 @@ from campaign.physics.loops_used import loops_of
 from campaign.physics.open_loop import Mode
 from campaign.protocol.bench_file import load_bench
 from campaign.protocol.plan_tree import margins_tree
-from campaign.report.text import number
+from campaign.text import number
 from campaign.units import convert
 
 TWO_PI = 2.0 * math.pi
@@ -97,7 +97,7 @@ def loops_checked(bench: Bench) -> Iterator[CheckedLoop]:
 
 
 def _write_picture(bench: Bench, path: Path) -> None:
-    from campaign.report.bode import bode_png, bode_svg
+    from campaign.report.drawing.bode import bode_png, bode_svg
 
     suffix = path.suffix.lower()
     if suffix not in (".svg", ".png"):

@@ -21,6 +21,7 @@ from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
 from campaign.plugins import Kinds, stray_entries
 from campaign.protocol.stages import FIRST
+from campaign.report.formats import formats
 from campaign.unit_grammar import listed
 from campaign.units import convert
 
@@ -60,13 +61,7 @@ def show_kind(name: str) -> None:
         return
     rooms = [room for room in _rooms() if name in room]
     if not rooms:
-        names = {
-            CHANNELS[1],
-            UNITS_KIND[1],
-            BENCH[1],
-            *(each for room in _rooms() for each in room),
-        }
-        close = difflib.get_close_matches(name, sorted(names), n=1)
+        close = difflib.get_close_matches(name, kind_names(), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
     for room in rooms:
@@ -81,6 +76,12 @@ def show_kind(name: str) -> None:
                     "not suit it: `campaign plan` shows them, and why."
                 )
             _show_needs(kind)
+
+
+def kind_names() -> list[str]:
+    """All that `show_kind` knows, sorted."""
+    own = (CHANNELS[1], UNITS_KIND[1], BENCH[1])
+    return sorted({*own, *(name for room in _rooms() for name in room)})
 
 
 def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:
@@ -117,7 +118,8 @@ def _show_channels() -> None:
 
 
 def _rooms() -> Iterator[Kinds[Any]]:
-    yield from (experiments(), friction_models(), compensation_methods(), backends(), exports())
+    yield from (experiments(), friction_models(), compensation_methods(), backends())
+    yield from (exports(), formats())
 
 
 def _whose(room: Kinds[Any], name: str) -> str:
@@ -136,7 +138,8 @@ def _show_units() -> None:
 
 def _row(info: OptionInfo) -> tuple[str, str, str, str]:
     takes = " | ".join(filter(None, (info.unit, info.accepts)))
-    return info.name, takes, "required" if info.required else _default(info), info.meaning
+    meaning = f"With {info.when}: {info.meaning}" if info.when else info.meaning
+    return info.name, takes, "required" if info.required else _default(info), meaning
 
 
 def _default(info: OptionInfo) -> str:

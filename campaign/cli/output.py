@@ -9,17 +9,25 @@ of what they are given before they add their own.
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from campaign.plain_text import json_text, printable
+
+TYPED = "  campaign "
+"""What a line begins with that is to be typed as it is, and therefore never broken."""
+ONE_LINE = 20
+"""Characters up to which no cell of a table on a terminal goes on below."""
 
 
 class PlainConsole(Console):
@@ -84,13 +92,36 @@ def error_console() -> Console:
 
 
 def print_line(text: str = "") -> None:
-    """One line of output as it is, never wrapped by us."""
-    console().print(Text(_plain(text)), soft_wrap=True)
+    """One line of output; on a terminal it goes on below between words, and no word is broken."""
+    _print_words(console(), Text(_plain(text)))
 
 
 def print_note(text: str, style: str = "") -> None:
-    """One line on standard error."""
-    error_console().print(Text(_plain(text), style=style), soft_wrap=True)
+    """One line on standard error, likewise."""
+    _print_words(error_console(), Text(_plain(text), style=style))
+
+
+def _print_words(out: Console, text: Text) -> None:
+    """Line by line; where a terminal is too narrow for one, the rest of it goes below, indented."""
+    if out.is_terminal:
+        lines = (_wrapped(line, out.width) for line in text.plain.split("\n"))
+        text = Text("\n".join(lines), style=text.style)
+    out.print(text, soft_wrap=True)
+
+
+def _wrapped(line: str, width: int) -> str:
+    if line.startswith(TYPED):
+        return line
+    text = line.lstrip()
+    indent = line[: len(line) - len(text)]
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def print_json(tree: Any) -> None:
@@ -98,19 +129,69 @@ def print_json(tree: Any) -> None:
     print_line(json_text(tree))
 
 
-def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table for people on a terminal, tab-separated lines for other programs."""
+def print_table(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], *, spare: Sequence[str] = ()
+) -> None:
+    """A table for people on a terminal, tab-separated lines for other programs.
+
+    On a terminal no word is broken: columns that are `spare` are left out, the first of them first,
+    until the others fit, and rows that fit in no way stand one cell below the other. What was left
+    out is named in a line on standard error.
+    """
     out = console()
     if not out.is_terminal:
         for row in (headings, *rows):
             print("\t".join(_plain(" ".join(cell.split())) for cell in row))  # noqa: T201
         return
+    columns = [[heading, *cells] for heading, *cells in _columns(headings, rows)]
+    kept = _fitting(out, columns, list(spare))
+    if kept is not None:
+        out.print(_table(kept))
+        there = {column[0] for column in kept}
+        if missing := [heading for heading in headings if heading not in there]:
+            print_note(f"left out: {', '.join(missing)}; with `| cat` all is shown", style="dim")
+        return
+    for row in list(zip(*columns, strict=True))[1:]:
+        _print_record(out, headings, row)
+
+
+def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
+    return zip(*([_plain(cell) for cell in row] for row in (headings, *rows)), strict=True)
+
+
+def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> list[list[str]] | None:
+    """The columns of a table that fits the terminal; None where there is none."""
+    unlimited = out.options.update(width=1_000_000)
+    while Measurement.get(out, unlimited, _table(columns)).minimum > out.width:
+        if not spare:
+            return None
+        without = spare.pop(0)
+        columns = [column for column in columns if column[0] != without]
+    return columns
+
+
+def _table(columns: Sequence[Sequence[str]]) -> Table:
+    """Columns, each with its heading first, that wrap between words only."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(_plain(cell)) for cell in row))
-    out.print(table)
+    for column in columns:
+        table.add_column(column[0], no_wrap=_in_one_line(column))
+    for row in list(zip(*columns, strict=True))[1:]:
+        table.add_row(*map(Text, row))
+    return table
+
+
+def _print_record(out: Console, headings: Sequence[str], row: Sequence[str]) -> None:
+    """A row where no table fits: its first cell, and what else there is below it, line by line."""
+    _print_words(out, Text(row[0], style="bold"))
+    wide = max(map(len, headings[1:]), default=0)
+    for heading, cell in zip(headings[1:], row[1:], strict=True):
+        if cell:
+            _print_words(out, Text(f"  {heading:<{wide}}  {cell}"))
+
+
+def _in_one_line(column: Sequence[str]) -> bool:
+    """Short cells and names stay in one line; other texts may go on below between words."""
+    return all(cell_len(cell) <= ONE_LINE or " " not in cell for cell in column)
 
 
 def _plain(text: str) -> str:

@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from campaign.cli.completion import complete_protocol, complete_run
+
+
+def output_option(metavar: str, help_text: str) -> Any:
+    """`--output`: what is written differs from command to command, how it is named does not."""
+    return typer.Option("--output", metavar=metavar, help=help_text, show_default=False)
+
+
+def workers_option(help_text: str) -> Any:
+    """`--workers`: how many of something at once, one per processor when absent."""
+    told = f"{help_text}; one per processor if absent."
+    return typer.Option("--workers", metavar="N", min=1, max=256, help=told, show_default=False)
+
+
 ProtocolArgument = Annotated[
     str,
-    typer.Argument(metavar="PROTOCOL", help="A TOML file, or the name of a shipped protocol."),
+    typer.Argument(
+        metavar="PROTOCOL",
+        help="A TOML file, or the name of a shipped protocol.",
+        autocompletion=complete_protocol,
+    ),
 ]
 RunArgument = Annotated[
     str,
@@ -17,6 +35,7 @@ RunArgument = Annotated[
         metavar="RUN",
         help="A path, a run's name, or a unique beginning of it.",
         show_default=False,
+        autocompletion=complete_run,
     ),
 ]
 NewestRunArgument = Annotated[
@@ -25,7 +44,11 @@ NewestRunArgument = Annotated[
         metavar="[RUN]",
         help="A path, a run's name, or a unique beginning of it; the newest when absent.",
         show_default=False,
+        autocompletion=complete_run,
     ),
+]
+BenchArgument = Annotated[
+    str, typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name.")
 ]
 ResultsOption = Annotated[
     Path, typer.Option("--results", metavar="DIR", help="Where the archives are.")
@@ -48,6 +71,8 @@ BackendOption = Annotated[
 LargeOption = Annotated[
     bool, typer.Option("--allow-large", help="Accept a plan of more than 100 000 trials.")
 ]
+OpenOption = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 TemplatesOption = Annotated[
     Path | None,
     typer.Option(
@@ -58,15 +83,7 @@ TemplatesOption = Annotated[
     ),
 ]
 WorkersOption = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        metavar="N",
-        min=1,
-        max=256,
-        help="Trials executed at once, where the backend can; one per processor if absent.",
-        show_default=False,
-    ),
+    int | None, workers_option("Trials executed at once, where the backend can")
 ]
 ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
 YesOption = Annotated[
@@ -90,6 +107,16 @@ PortOption = Annotated[
         help="Where the controller is; short for --set backend.port=PORT.",
         show_default=False,
     ),
+]
+ControllerOption = Annotated[
+    str, typer.Option("--port", metavar="PORT", help="Where the controller is.")
+]
+BaudOption = Annotated[
+    int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
+]
+PatienceOption = Annotated[
+    float,
+    typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
 ]
 FromOption = Annotated[
     str | None,

@@ -80,7 +80,7 @@ def _print(
         print_line(plan.title)
         print_line()
     headings = ("test", "kind", "bench", "trials", "bench time", "closest limits")
-    print_table(headings, [_row(test) for test in plan.tests])
+    print_table(headings, [_row(test) for test in plan.tests], spare=("bench", "kind"))
     for test in plan.tests:
         own = [loss for loss in losses if loss["test"] == test.name]
         _print_details(plan, test, own, cost.get(test.name))

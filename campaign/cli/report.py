@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 import webbrowser
-from pathlib import Path
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from shlex import quote
 
-from campaign.archive import find_run, open_run
+from campaign.archive import RunReader, find_run, open_run
+from campaign.archive.writing.results_file import PreparedResults
 from campaign.cli.damage import say_damaged
+from campaign.cli.keep_results import written_results
 from campaign.cli.output import print_note
-from campaign.errors import ExitCode
+from campaign.errors import ArchiveError, ExitCode, UsageError
+from campaign.execution.naming import reference
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.report.build import build_report
+from campaign.report.content.document import Document
+from campaign.report.content.trial_choice import chosen_trials
+from campaign.report.formats import chosen_formats
+from campaign.report.one_figure import write_figure
+from campaign.report.processes import begin_early, choose_processes, seldom_collecting
 from campaign.resources import templates_folder
+
+LISTED = 4
+"""Most files of a folder that are named one by one."""
 
 
 @unwinding()
+@seldom_collecting()
 def report_run(
     name: str | None,
     results: Path,
@@ -24,21 +39,118 @@ def report_run(
     *,
     open_it: bool,
     measure_anew: bool = False,
+    formats: Sequence[str] = (),
+    trials: str = "",
+    zoom: bool = False,
 ) -> tuple[Path, ExitCode]:
     """Build the report of the run that `name` means; its page, and whether all could be read."""
     path = find_run(results, name)
+    begin_early(path)
     run = open_run(path)
-    report = build_report(
-        run,
-        output or path.with_name(f"{path.stem}-report"),
-        experiments=experiments(),
-        packaged_templates=templates_folder(),
-        templates=templates,
-        measure_anew=measure_anew,
-    )
+    written: list[PreparedResults] = []
+
+    def write_results(document: Document) -> None:
+        results = written_results(run, document, measured_anew=measure_anew)
+        written.extend([results] if results else [])
+
+    try:
+        report = build_report(
+            run,
+            output or path.with_name(f"{path.stem}-report"),
+            experiments=experiments(),
+            packaged_templates=templates_folder(),
+            templates=templates,
+            measure_anew=measure_anew,
+            processes=choose_processes(run),
+            formats=chosen_formats(formats),
+            trials=_wanted_trials(run, trials),
+            zoom=zoom,
+            command=_command(path, measure_anew=measure_anew),
+            when_found=write_results,
+        )
+        kept = [_published(each) for each in written]
+    finally:
+        for each in written:
+            each.discard()
     code = say_damaged(path, report.damaged)
-    for problem in report.problems:
+    for problem in (*report.problems, *report.left_out):
         print_note(problem, style="yellow")
+    print_note(f"written: {'; '.join([*_told(report.files), *filter(None, kept)])}")
     if open_it and not webbrowser.open(report.path.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
     return report.path, code
+
+
+def _published(results: PreparedResults) -> str:
+    """The results' path; "" where there is a warning instead."""
+    try:
+        return str(results.publish())
+    except ArchiveError as error:
+        print_note(f"no file of results: {error}", style="yellow")
+        return ""
+
+
+def _command(path: Path, *, measure_anew: bool) -> str:
+    """What to type for the same numbers again, from where this command was typed.
+
+    A page goes to others, whom no folder of this machine concerns: of an absolute path only the
+    name is told, and that its folder must be.
+    """
+    elsewhere = path.is_absolute()
+    words = ["campaign report", quote(path.stem) if elsewhere else reference(path)]
+    words += [
+        *(["--results FOLDER"] if elsewhere else []),
+        *(["--measure-anew"] if measure_anew else []),
+    ]
+    return " ".join(words)
+
+
+def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
+    """Those that `--trials` means; where it means none, that is said."""
+    chosen = chosen_trials(run, wanted)
+    if wanted and not chosen:
+        print_note(f"--trials {wanted}: there is none, so no page of a trial is made for it")
+    return chosen
+
+
+def _told(files: Iterable[str]) -> Iterator[str]:
+    """The files of a report, folder by folder; of many the kinds, with how many there are."""
+    folders: dict[str, list[PurePosixPath]] = {}
+    for file in map(PurePosixPath, files):
+        folders.setdefault(str(file.parent), []).append(file)
+    for folder, own in sorted(folders.items()):
+        if folder == "." or len(own) <= LISTED:
+            yield ", ".join(map(str, own))
+        else:
+            counts = Counter(file.suffix.removeprefix(".") for file in own)
+            kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+            yield f"{folder}/ ({kinds})"
+
+
+@unwinding()
+def draw_figure(
+    name: str | None,
+    results: Path,
+    output: Path | None,
+    wanted: str,
+    *,
+    measure_anew: bool = False,
+    useless: Sequence[str] = (),
+) -> tuple[Path, ExitCode]:
+    """Write one figure of a run's report, TEST/KEY; its drawing, and whether all could be read.
+
+    useless: options that were given besides and are of the whole page; UsageError for any.
+    """
+    if useless:
+        raise UsageError(
+            f"--only-figure writes a figure and no page; leave {', '.join(useless)} out"
+        )
+    path = find_run(results, name)
+    file, damaged = write_figure(
+        open_run(path),
+        wanted,
+        output or path.with_name(f"{path.stem}-figures"),
+        experiments=experiments(),
+        measure_anew=measure_anew,
+    )
+    return file, say_damaged(path, damaged)

@@ -24,7 +24,7 @@ from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.measuring import Measuring
-from campaign.execution.naming import how_to_go_on, reference
+from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.runner import run_plan
 from campaign.execution.safety import (
@@ -233,7 +233,7 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     reason = f" ({outcome.reason})" if outcome.reason else ""
     go_on = ""
     if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):
-        go_on = f"; `campaign resume {reference(outcome.archive)}` goes on from there"
+        go_on = f"; to go on from there:\n{typed('resume', reference(outcome.archive))}"
     print_note(f"{outcome.status.value}{reason}: {counts}, in {clock(elapsed)}{go_on}")
     if outcome.exit_code is ExitCode.NOT_SAFE:
         print_note(NOT_SAFE, "bold red")
@@ -274,7 +274,7 @@ def _build_report(outcome: RunOutcome) -> ExitCode:
     archive: Path = outcome.archive
     if outcome.exit_code is ExitCode.INTERRUPTED:
         name = reference(archive)
-        print_note(f"no report of an interrupted run; `campaign report {name}` makes one")
+        print_note(f"no report of an interrupted run; to make one:\n{typed('report', name)}")
         return ExitCode.DONE
     page, code = report_run(str(archive), archive.parent, None, None, open_it=False)
     print_note(f"report: {page}")

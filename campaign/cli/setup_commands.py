@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from campaign.cli.archive_commands import app
+from campaign.cli.completion import complete_kind
+from campaign.cli.parameters import output_option
 
 __all__ = ["app"]
 
@@ -16,7 +18,12 @@ __all__ = ["app"]
 def kinds(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[NAME]", help="One of them, with its options.", show_default=False),
+        typer.Argument(
+            metavar="[NAME]",
+            help="One of them, with its options.",
+            show_default=False,
+            autocompletion=complete_kind,
+        ),
     ] = None,
 ) -> None:
     """List experiments, friction models, compensation methods and backends."""
@@ -68,12 +75,7 @@ def migrate(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            metavar="FILE",
-            help="A new file to write it to, instead of the one that is read.",
-            show_default=False,
-        ),
+        output_option("FILE", "A new file to write it to, instead of the one that is read."),
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; exit code 1 if anything would change.")

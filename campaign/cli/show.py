@@ -24,7 +24,7 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
-from campaign.report.text import interval, pretty_unit
+from campaign.text import interval, pretty_unit
 from campaign.trial import Outcome, Tree
 
 
@@ -52,7 +52,7 @@ def _print(run: RunReader, story: Lines) -> None:
             print_line(f"{label + ':':<13}{value}")
     print_line()
     headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
-    print_table(headings, _tests(run))
+    print_table(headings, _tests(run), spare=("kind",))
     failed = [trial for trial in run.trials if trial.ending.outcome is not Outcome.COMPLETED]
     rows = [(t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed]
     _section(("trial", "what", "outcome", "reason"), rows)

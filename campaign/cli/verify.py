@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from campaign.archive import find_runs
+from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words
+from campaign.archive.reading.results_file import holds_results, read_any_results
 from campaign.archive.verifying.result import Verification
 from campaign.archive.verifying.verification import verify_run
 from campaign.cli.output import error_console, print_json, print_line, print_note
 from campaign.cli.signature import Checked, Wanted, check_signature
-from campaign.errors import ExitCode
+from campaign.errors import ArchiveError, ExitCode
 
 
 def verify_archives(
@@ -20,11 +22,20 @@ def verify_archives(
 ) -> ExitCode:
     """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them.
 
-    A run without the signature that is `wanted` is wrong, too.
+    A run without the signature that is `wanted` is wrong, too; results have none. Results, which
+    `*.nxs` means as well when a shell spells it out, are held against their own hash.
     """
     paths = list(dict.fromkeys(path for name in names for path in find_runs(results, name)))
     found = []
     for path in paths:
+        if holds_results(path):
+            kept = _of_results(path)
+            found.append((kept, check_signature(path, None)))
+            if kept.sound and not as_json:
+                print_line(f"{path}: sound (holds results of a run, and no run)")
+            elif not as_json:
+                _print_problems(kept)
+            continue
         with _progress(path) as progress:
             found.append((verify_run(path, progress), check_signature(path, wanted)))
         if not as_json:
@@ -35,10 +46,24 @@ def verify_archives(
     return ExitCode.DONE if good else ExitCode.ARCHIVE
 
 
-def _print(found: Verification, signature: Checked) -> None:
-    """One line per problem on standard output; one when there is none; one for a signature."""
+def _of_results(path: Path) -> Verification:
+    """Whether a file of results is as it was written; it has no trials and no seal."""
+    problems: tuple[Damage, ...] = ()
+    try:
+        read_any_results(path)
+    except ArchiveError as error:
+        problems = (Damage.of(path, error),)
+    return Verification(path, problems, remarks=(), trials=0, datasets=0)
+
+
+def _print_problems(found: Verification) -> None:
     for damage in found.problems:
         print_line(f"{found.path}: {in_words(damage)}")
+
+
+def _print(found: Verification, signature: Checked) -> None:
+    """One line per problem on standard output; one when there is none; one for a signature."""
+    _print_problems(found)
     if found.sound:
         root = f", seal {found.root}" if found.root else ""
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets{root})")

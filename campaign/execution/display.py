@@ -191,7 +191,8 @@ def clock(seconds: float) -> str:
 
 
 def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
-    if ended is None or ended[1].outcome is Outcome.COMPLETED:
+    # How many trials a stop has interrupted, and who stopped them, is said once: at the end.
+    if ended is None or ended[1].outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):
         return None
     trial, ending = ended
     reason = f": {ending.reason}" if ending.reason else ""

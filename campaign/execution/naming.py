@@ -15,6 +15,13 @@ def reference(run: Path) -> str:
 
 
 def how_to_go_on(run: Path) -> str:
-    """What can be done with a run that did not come to its end."""
+    """What can be done with a run that did not come to its end; each command has its own line."""
     name = reference(run)
-    return f"`campaign report {name}` shows them, `campaign resume {name}` goes on from there"
+    return (
+        f"to see them, and to go on from there:\n{typed('report', name)}\n{typed('resume', name)}"
+    )
+
+
+def typed(command: str, *words: str) -> str:
+    """A line of a message that is to be typed or copied as it is; no terminal's width breaks it."""
+    return " ".join(("  campaign", command, *words))

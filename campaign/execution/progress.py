@@ -6,7 +6,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from campaign.execution.forecast import Forecast, worth
 from campaign.trial import Array, ChannelInfo, Ending, Outcome, Trial
 
 
@@ -26,6 +28,7 @@ class Progress:
         remark: what the run has just decided, for people.
         closing: whether all trials have ended and the archive is being closed.
         under_way: how much of the running trials is done, in trials.
+        time_left: wall-clock time to the end (s); None before it can be told.
     """
 
     total: int
@@ -40,18 +43,12 @@ class Progress:
     remark: str = ""
     closing: bool = False
     under_way: float = 0.0
+    time_left: float | None = None
 
     @property
     def left(self) -> int:
         """Trials that have not ended."""
         return self.total - self.done - self.failed
-
-    @property
-    def time_left(self) -> float | None:
-        """Wall-clock time to the end (s) at the pace so far; None before there is one."""
-        if self.bench_time <= 0:
-            return None
-        return self.elapsed * self.bench_time_left / self.bench_time
 
 
 Display = Callable[[Progress], None]
@@ -61,15 +58,26 @@ class Ledger:
     """Counts what a run has done and tells its display. Used from one thread, but for `reached`.
 
     A trial counts once, by how its last attempt ended. `finished` are trials of an earlier session:
-    they count as done, and say nothing about today's pace.
+    they count as done, and say nothing about today's pace. `computed`: the backend computes its
+    samples, and no bench takes its time.
     """
 
     def __init__(
-        self, trials: Sequence[Trial], display: Display, finished: Mapping[int, Outcome]
+        self,
+        trials: Sequence[Trial],
+        display: Display,
+        finished: Mapping[int, Outcome],
+        *,
+        computed: bool = False,
     ) -> None:
+        waiting = [trial for trial in trials if trial.number not in finished]
         self._total = len(trials)
-        self._bench_time_left = sum(t.task.duration for t in trials if t.number not in finished)
+        self._bench_time_left = sum(trial.task.duration for trial in waiting)
         self._bench_time = 0.0
+        self._worth = partial(worth, computed=computed)
+        self._worth_left = sum(map(self._worth, waiting))
+        self._worth_done = 0.0
+        self._forecast = Forecast()
         self._display = display
         self._running: dict[int, Trial] = {}
         self._reached: dict[int, float] = {}
@@ -91,6 +99,7 @@ class Ledger:
         """Further trials follow from what was found."""
         self._total += len(trials)
         self._bench_time_left += sum(trial.task.duration for trial in trials)
+        self._worth_left += sum(map(self._worth, trials))
 
     def begin(self, trial: Trial) -> None:
         """A trial is about to be executed."""
@@ -117,6 +126,8 @@ class Ledger:
         self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
         self._bench_time += trial.task.duration
         self._bench_time_left -= trial.task.duration
+        self._worth_done += self._worth(trial)
+        self._worth_left -= self._worth(trial)
         self._tell((trial, ending))
 
     def repeat(self, trial: Trial, ending: Ending) -> None:
@@ -138,6 +149,12 @@ class Ledger:
     ) -> None:
         done = self._outcomes.get(Outcome.COMPLETED, 0)
         self._told = running = self._of_running()
+        shares = {
+            number: self._reached.get(number, 0.0) / trial.task.duration
+            for number, trial in self._running.items()
+        }
+        begun = sum(share * self._worth(self._running[n]) for n, share in shares.items())
+        now = time.monotonic()
         self._display(
             Progress(
                 total=self._total,
@@ -145,15 +162,15 @@ class Ledger:
                 failed=sum(self._outcomes.values()) - done,
                 running=tuple(self._running[number] for number in sorted(self._running)),
                 started=self._started,
-                elapsed=time.monotonic() - self._started,
+                elapsed=now - self._started,
                 bench_time=self._bench_time + running,
                 bench_time_left=max(0.0, self._bench_time_left - running),
                 ended=ended,
                 remark=remark,
                 closing=closing,
-                under_way=sum(
-                    self._reached.get(number, 0.0) / trial.task.duration
-                    for number, trial in self._running.items()
+                under_way=sum(shares.values()),
+                time_left=self._forecast.time_left(
+                    now, self._worth_done + begun, max(0.0, self._worth_left - begun)
                 ),
             )
         )

@@ -17,7 +17,7 @@ from types import MappingProxyType
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
-from campaign.backends.interface import Backend
+from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attendance import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
@@ -70,7 +70,7 @@ def run_plan(
         CampaignError: the archive cannot be written any more; nothing is sealed.
         Exception: a bug in a backend, after the archive has been sealed as a fault.
     """
-    ledger = Ledger(trials, display, finished)
+    ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = Ended(kept=writer.folder)
     stages = stages or no_stages()
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)

@@ -24,10 +24,8 @@ from campaign.execution.guardian import MAKING_SAFE, NOTE, Asked
 from campaign.execution.safety import NOT_SAFE, SAFE
 from campaign.plain_text import printable
 
-_NOTICE = (
-    "\nstopping: the running trial is stopped, then the archive is closed, which can take some "
-    "seconds; Ctrl-C again leaves it unclosed\n"
-)
+_NOTICE = "\nstopping: archive closes; Ctrl-C again leaves it unclosed\n"
+"""Short enough for a narrow terminal: what wraps it breaks words."""
 NOTHING_BEGUN = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
 _LONGEST = 2000

@@ -16,8 +16,10 @@ from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import CompensationMethod
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
+from campaign.report.formats import formats
+from campaign.report.formats.interface import Format
 
-AnyKind = Experiment | FrictionModel | CompensationMethod | BackendKind | ExportKind
+AnyKind = Experiment | FrictionModel | CompensationMethod | BackendKind | ExportKind | Format
 
 
 @contextmanager
@@ -41,3 +43,5 @@ def _room(kind: AnyKind) -> Any:
             return backends()
         case ExportKind():
             return exports()
+        case Format():
+            return formats()

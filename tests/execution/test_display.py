@@ -56,6 +56,18 @@ def test_without_a_terminal_there_are_plain_lines_only_when_there_is_news():
     assert last == "test: 2 done, 1 failed, 0 left"
 
 
+def test_trials_that_a_stop_interrupts_are_not_told_one_by_one():
+    """The end of the run says how many they are, and who stopped it."""
+    stream = io.StringIO()
+    with progress_display(Console(file=stream, force_terminal=False, width=40)) as display:
+        trials = make_trials(3)
+        ledger = Ledger(trials, display, {})
+        for trial in trials:
+            ledger.begin(trial)
+            ledger.end(trial, Ending(Outcome.INTERRUPTED, "stopped by the operator"))
+    assert "stopped" not in stream.getvalue()
+
+
 def test_a_terminal_keeps_failures_above_the_live_line_and_reads_no_markup_in_them():
     stream = io.StringIO()
     console = Console(file=stream, force_terminal=True, width=100, color_system=None)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import campaign
+from campaign.access.analysis import analyse_run
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import Decision
 from campaign.archive.layout.storage import CHUNK
@@ -30,8 +31,8 @@ from campaign.execution.stop import StopSwitch
 from campaign.experiments import experiments
 from campaign.experiments.friction_lag import cycle_windows
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.report.analysis import analyse_run
-from campaign.report.build import ANEW, render
+from campaign.report.build import render
+from campaign.report.content.document import ANEW
 from campaign.resources import templates_folder
 from campaign.result import Finding, Result
 from campaign.trial import Role, Trial

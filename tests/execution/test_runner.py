@@ -435,7 +435,7 @@ def test_a_fault_lets_parallel_trials_end_without_calling_it_an_interruption():
     assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
 
 
-def test_progress_adds_up_to_the_plan_and_scales_the_time_left_by_bench_time():
+def test_progress_adds_up_to_the_plan_and_tells_the_time_left():
     bench = Bench(4, FakeBackend({2: ends(Outcome.DIVERGED)}))
     bench.run()
     last = bench.progress[-1]
@@ -443,5 +443,7 @@ def test_progress_adds_up_to_the_plan_and_scales_the_time_left_by_bench_time():
     assert (last.bench_time, last.bench_time_left) == (8.0, 0.0)
     half_way = bench.progress[3]  # begin, end, begin, end
     assert half_way.left == 2
-    assert half_way.time_left == pytest.approx(half_way.elapsed)
+    pace = half_way.elapsed - bench.progress[1].elapsed  # of a trial, after the first
+    assert half_way.time_left == pytest.approx(2 * pace)
     assert bench.progress[0].time_left is None
+    assert bench.progress[1].time_left is None

@@ -54,6 +54,12 @@ def interrupt(process: subprocess.Popen[str]) -> None:
         process.send_signal(signal.SIGINT)
 
 
+def last_words(err: str) -> str:
+    """The last line that is no command to go on with."""
+    lines = (line for line in err.splitlines() if line and not line.startswith("  campaign "))
+    return next(reversed(list(lines)), "")
+
+
 def check(folder: Path, seed: int, times: int) -> float:
     """Interrupt a run `times` times at instants drawn from `seed`; s until it had ended."""
     chance = random.Random(seed)
@@ -67,7 +73,7 @@ def check(folder: Path, seed: int, times: int) -> float:
     began = time.monotonic()
     out, err = process.communicate(timeout=120)
     took = time.monotonic() - began
-    said = err.strip().splitlines()[-1] if err.strip() else ""
+    said = last_words(err)
     told = f"seed {seed}: exit code {process.returncode}\n{out}\n{err}"
     assert process.returncode == 130, told
     assert "Traceback" not in err, told
@@ -112,7 +118,7 @@ def test_twice_while_the_run_is_begun(tmp_path: Path) -> None:
     _, err = process.communicate(timeout=120)
     (partial,) = (tmp_path / "results").glob("*.partial")
     assert process.returncode == 130, err
-    assert str(Path("results") / partial.name) in err.strip().splitlines()[-1], err
+    assert str(Path("results") / partial.name) in last_words(err), err
 
 
 @pytest.mark.soak
@@ -179,6 +185,6 @@ def test_inside_a_call_that_does_not_return(tmp_path: Path, hold: bool) -> None:
     (kept,) = (tmp_path / "results").glob("*.partial")
     assert re.fullmatch(
         rf"stopped at once; the finished trials are in results/{kept.name}; .*",
-        err.strip().splitlines()[-1],
+        last_words(err),
     )
     campaign(tmp_path, "show", kept.stem)

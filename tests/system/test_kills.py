@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -113,6 +114,8 @@ def kill_again_and_again(folder: Path, kills: int, seed: int) -> int:
                 assert len(run.trials) == TRIALS
                 known = set()
                 run.path.unlink()
+                # A kill may have come while the folder that was sealed was being removed.
+                shutil.rmtree(run.path.with_suffix(".partial"), ignore_errors=True)
         if run_paths(results):
             assert nursery.live(f"resume {find_run(results).stem} --workers 1") == 0
             run = open_run(find_run(results))

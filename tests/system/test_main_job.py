@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -26,14 +27,35 @@ def test_a_run_leaves_one_sealed_archive_and_a_report_where_documented(quickstar
     folder, archive = quickstart
     report = archive.with_name(f"{archive.stem}-report")
     assert archive.parent == folder / "results"
-    assert {path.name for path in archive.parent.iterdir()} == {archive.name, report.name}
+    results = archive.with_name(f"{archive.stem}-results.nxs")
+    assert set(archive.parent.iterdir()) == {archive, report, results}
     assert (report / "report.html").is_file()
+    assert (report / "report.json").is_file()
     assert list((report / "tables").glob("*.csv"))
     assert list((report / "figures").glob("*.svg"))
 
 
-def test_the_scoreboard_reproduces_the_published_stabilization_error(quickstart):
+def test_the_demo_opens_with_what_was_found_what_is_true_and_what_compensation_gains(quickstart):
+    """The bench's Coulomb friction at the load is 25.2968 N m in the positive direction."""
     _, archive = quickstart
+    report = archive.with_name(f"{archive.stem}-report")
+    html = (report / "report.html").read_text(encoding="utf-8")
+    start = html.index('<section id="opening">')
+    opening = html[start : html.index("</section>", start)]
+    coulomb = re.search(r"positive direction: Coulomb friction Tc ([\d.]+) ± ([\d.]+) N·m", opening)
+    assert coulomb
+    assert abs(float(coulomb[1]) - 25.2968) <= float(coulomb[2]) < 0.3
+    held = re.findall(r"(\d+) of (\d+) intervals hold the true values", opening)
+    assert len(held) == 2
+    assert all(int(of) >= 10 and int(yes) >= 0.8 * int(of) for yes, of in held)
+    assert len(re.findall(r"[\d.]+ times less \([\d.]+ to [\d.]+\)", opening)) == 3
+    assert '<figure id="' in opening
+    assert not (report / "tables" / "scoreboard.csv").exists()
+    assert "ublished" not in opening
+
+
+def test_the_scoreboard_reproduces_the_published_stabilization_error(tmp_path: Path):
+    archive = tmp_path / campaign(tmp_path, "run", "stabilization", "--report").last_line
     path = archive.with_name(f"{archive.stem}-report") / "tables" / "scoreboard.csv"
     with path.open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(file))
@@ -106,7 +128,7 @@ def test_the_plan_executes_nothing_and_is_what_runs(tmp_path: Path):
 
 
 def test_the_plan_warns_of_what_it_can_know_before(tmp_path: Path):
-    few = ", ".join(f'"{speed} deg/s"' for speed in (0.1, 0.5, 1, 2, 4))
+    few = ", ".join(f'"{speed} deg/s"' for speed in (0.1, 0.5, 1, 2, 8))
     write(
         tmp_path,
         f'[[test]]\nname = "m"\nkind = "velocity_map"\nbench = "simulink"\nspeeds = [{few}]\n',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 from dataclasses import replace
@@ -233,7 +234,10 @@ def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
         out, err = process.communicate(timeout=120)
     assert process.returncode == 130
     name = Path(out.splitlines()[-1]).stem
-    assert f"`campaign resume {name}` goes on from there" in err
+    assert err.splitlines()[-1] == f"  campaign resume {name}"
+    # The trials that were running are counted where the run says how it ended, and only there.
+    assert len(re.findall("interrupted", err)) == 2
+    assert re.search(r"\d+ interrupted, in ", err)
     done = campaign(tmp_path, "resume", name)
     assert done.last_line == f"results/{name}.nxs"
     assert done.err.splitlines()[-1].startswith("complete: 60 trials done")

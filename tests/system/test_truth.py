@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign.access import analysis
 from campaign.archive import open_run
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
@@ -20,8 +21,8 @@ from campaign.cli.show import show_archive
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
-from campaign.report import analysis, build
 from campaign.report.build import render
+from campaign.report.content import document
 from campaign.resources import templates_folder
 from tests.system.user import campaign, write
 
@@ -173,9 +174,9 @@ def test_the_report_opens_it_when_the_analyses_are_done(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
-    looks, analyses = build.truth_tables, analysis.result_of
+    looks, analyses = document.truth_tables, analysis.result_of
     monkeypatch.setattr(
-        build, "truth_tables", lambda *given: (order.append("truth"), looks(*given))[1]
+        document, "truth_tables", lambda *given: (order.append("truth"), looks(*given))[1]
     )
     monkeypatch.setattr(
         analysis, "result_of", lambda *given: (order.append("analysis"), analyses(*given))[1]
@@ -185,7 +186,7 @@ def test_the_report_opens_it_when_the_analyses_are_done(
     assert "True and found" in html
     assert "Plan and analysis were given the stated bench" in html
     (text,) = (text for name, text in folder.files.items() if name.endswith("map-truth.csv"))
-    rows = [row for row in csv.reader(text.splitlines()) if row[0] == "viscous friction"]
+    rows = [row for row in csv.reader(text.splitlines()) if row[0] == "viscous friction σ2"]
     nominal = [float(row[3]) for row in rows if "nominal" in row[1]]
     assert nominal == pytest.approx([4.0 + 141.176 * 0.001] * 2)  # load, and N times the motor's
 

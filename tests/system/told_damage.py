@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import warnings
 from collections.abc import Iterator
@@ -15,9 +16,12 @@ from typer.testing import CliRunner
 import campaign
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.results import results_path
 from campaign.archive.layout.story import read_lines
+from campaign.archive.reading.results_file import read_results
 from campaign.cli.bench_commands import app
 from campaign.errors import ArchiveError, CampaignError
+from campaign.report.output import MARKER
 from campaign.trial import Recording
 
 PROTOCOL = """
@@ -209,9 +213,15 @@ def _report(archive: Path, folder: Path) -> Said:
     told = _told(done)
     if folder.exists():
         digest = open_run(archive).sha256.encode()
-        page = files["report.html"]
-        assert digest in page  # of the file as it is: it differs by any flip
-        files["report.html"] = page.replace(digest, b"")
+        del files[MARKER]  # hashes of the others
+        page, numbers = files["report.html"], files["report.json"]
+        for name in ("report.html", "report.json"):
+            assert digest in files[name]  # of the file as it is: it differs by any flip
+            files[name] = files[name].replace(digest, b"")
+        told = told and bool(json.loads(numbers)["damaged"])
+        if "kept as it is" not in done.stderr:  # results of before the damage
+            root = open_run(archive).identity
+            told = told and bool(read_results(results_path(archive), root).damaged)
         told = told and b"damage-heading" in page and b"tables/damaged.csv" in _names(files)
         told = told and all(TOLD.encode() in text for n, text in files.items() if n[-4:] == ".svg")
     return Said(code_of(done), told, dict(files))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive import find_run, open_run
 from campaign.testing import backend_checks
 from campaign.trial import Fault, Outcome, SafeState
 from tests.testing.drive import Drive
@@ -133,7 +133,7 @@ def test_a_whole_run(package: Path, tmp_path: Path) -> None:
         backend = ("--backend", "tx1", "--set", f"backend.port={drive.port}")
         done = campaign(package, tmp_path, "run", "home.toml", *backend, "--yes", "--report")
     assert done.returncode == 0, done.stderr
-    (archive,) = (tmp_path / "results").glob("*.nxs")
+    archive = find_run(tmp_path / "results")
     run = open_run(archive)
     assert run.header.backend == "tx1"
     assert run.safe_state is SafeState.CONFIRMED

@@ -1,0 +1,114 @@
+"""`campaign compare`: which numbers of runs differ, by how much, and how sure that is."""
+
+from __future__ import annotations
+
+import textwrap
+import webbrowser
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+from campaign.archive import find_run, open_run
+from campaign.cli.damage import say_damaged
+from campaign.cli.output import print_line, print_note, print_table
+from campaign.comparing.comparison import Against, Comparison, compare_runs
+from campaign.comparing.judging import Pair, Verdict
+from campaign.comparing.page import write_comparison
+from campaign.comparing.tables import (
+    bare_differing,
+    bench_lines,
+    change_of,
+    name_of,
+    not_judged,
+    number_of,
+    sentences,
+)
+from campaign.errors import ExitCode, worst_exit_code
+from campaign.experiments import experiments
+from campaign.interrupts import unwinding
+from campaign.resources import templates_folder
+from campaign.text import pretty_unit
+
+WIDTH = 80
+"""Columns of a terminal that is not wide."""
+STEM = 90
+"""Letters of a run's name that a folder is called by."""
+BENCH_LINES = 8
+"""Most values of benches that differ which the terminal lists."""
+REASONS = 6
+"""Most reasons for not judging that the terminal lists."""
+SHOWN = 16
+"""Most pairs of one run that the terminal lists; the page has them all."""
+
+
+@unwinding()
+def compare_archives(
+    names: Sequence[str],
+    results: Path,
+    output: Path | None,
+    exchanged: Sequence[str],
+    *,
+    open_it: bool,
+) -> tuple[Path, ExitCode]:
+    """Compare the runs that `names` mean with the first; the page, and whether all was read."""
+    paths = [find_run(results, name) for name in names]
+    runs = [open_run(path) for path in paths]
+    comparison = compare_runs(runs, experiments(), exchanged)
+    page = write_comparison(comparison, output or _beside(paths), templates_folder())
+    for against in comparison.against:
+        _tell(against, comparison)
+    for side in comparison.sides:
+        for problem in side.problems:
+            print_note(problem, style="yellow")
+    if open_it and not webbrowser.open(page.resolve().as_uri()):
+        print_note("no browser was found; open the file by hand", style="yellow")
+    codes = [say_damaged(side.run.path, side.damaged) for side in comparison.sides]
+    return page, worst_exit_code(codes)
+
+
+def _beside(paths: Sequence[Path]) -> Path:
+    """`A-against-B-comparison` beside the reference: the first of the others names it."""
+    first, other, *more = paths
+    rest = f"-and-{len(more)}-more" if more else ""
+    return first.with_name(f"{first.stem[:STEM]}-against-{other.stem[:STEM]}{rest}-comparison")
+
+
+def _tell(against: Against, comparison: Comparison) -> None:
+    """A few lines and a table, the declared differences first."""
+    reference, other = against.reference, against.other
+    print_line(f"{reference.letter}  {reference.run.name}  {reference.title}")
+    print_line(f"{other.letter}  {other.run.name}  {other.title}")
+    benches = list(bench_lines(against))
+    for told in benches[:BENCH_LINES]:
+        for line in textwrap.wrap(told, WIDTH, subsequent_indent="  "):
+            print_line(line)
+    if len(benches) > BENCH_LINES:
+        print_line(f"and {len(benches) - BENCH_LINES} more of the bench, on the page")
+    for line in textwrap.wrap(" ".join(sentences(against, comparison.tested)), WIDTH):
+        print_line(line)
+    for why in islice(not_judged(against.pairs), REASONS):
+        for line in textwrap.wrap(f"not judged, {why}", WIDTH, subsequent_indent="  "):
+            print_line(line)
+    shown = list(_order(against))
+    if shown:
+        heads = ("finding", reference.letter, other.letter, "change", "")
+        print_table(heads, [_row(pair) for pair in shown[:SHOWN]])
+    if len(shown) > SHOWN:
+        print_line(f"and {len(shown) - SHOWN} more, on the page")
+
+
+def _order(against: Against) -> Iterator[Pair]:
+    yield from against.of(Verdict.DIFFERENT)
+    yield from against.of(Verdict.BEYOND_BOUND)
+    yield from bare_differing(against)
+    yield from against.of(Verdict.NOT_SHOWN)
+
+
+def _row(pair: Pair) -> tuple[str, ...]:
+    unit = pretty_unit(pair.display)
+    mark = {Verdict.DIFFERENT: "differs", Verdict.BEYOND_BOUND: "bound"}.get(pair.verdict, "")
+    if pair.simulated_bare:
+        mark = "no interval"
+    numbers = (number_of(each, pair.display) for each in (pair.reference, pair.other))
+    named = f"{name_of(pair)} ({unit})" if unit else name_of(pair)
+    return (named, *numbers, change_of(pair), mark)

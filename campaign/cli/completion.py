@@ -1,0 +1,54 @@
+"""What the shell offers at Tab: runs, protocols, kinds. Quick and silent, whatever is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import typer
+
+RESULTS = "-results"
+"""How what analysis found is called beside its run."""
+RUNS = (".nxs", ".partial")
+"""How runs end; who lists them for good opens them, which takes longer than a Tab may."""
+
+
+def complete_run(context: typer.Context, incomplete: str) -> list[str]:
+    """Names of runs in the folder that the command line says, the newest first."""
+    results = context.params.get("results")
+    with suppress(OSError):
+        paths = (results if isinstance(results, Path) else Path("results")).iterdir()
+        names = {path.stem for path in paths if path.suffix in RUNS}
+        names -= {f"{name}{RESULTS}" for name in names}
+        return [name for name in sorted(names, reverse=True) if name.startswith(incomplete)]
+    return []
+
+
+def complete_protocol(context: typer.Context, incomplete: str) -> list[str]:
+    """Shipped protocols by name, and files and folders that lie there."""
+    from campaign.resources import shipped_protocols
+
+    names = [name for name in shipped_protocols() if name.startswith(incomplete)]
+    with suppress(OSError):
+        return names + list(_files(incomplete))
+    return names
+
+
+def complete_kind(context: typer.Context, incomplete: str) -> list[str]:
+    """What `campaign kinds` explains."""
+    from campaign.cli.kinds import kind_names
+
+    return [name for name in kind_names() if name.startswith(incomplete)]
+
+
+def _files(incomplete: str) -> Iterator[str]:
+    """Protocols below the path that was begun, and folders on the way to some."""
+    folder, begun = incomplete.rpartition("/")[::2]
+    prefix = f"{folder}/" if "/" in incomplete else ""
+    for path in sorted(Path(prefix or ".").iterdir()):
+        if path.name.startswith(begun) and not path.name.startswith("."):
+            if path.is_dir():
+                yield f"{prefix}{path.name}/"
+            elif path.suffix == ".toml":
+                yield f"{prefix}{path.name}"
