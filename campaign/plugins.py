@@ -187,6 +187,8 @@ GROUPS = {
     "compensation method": "campaign.compensation",
     "backend": "campaign.backends",
     "export format": "campaign.exports",
+    "report format": "campaign.report_formats",
+    "recording format": "campaign.recording_formats",
 }
 """Entry point group by room."""
 

@@ -1,0 +1,103 @@
+"""Named arrays of a file as tables: vectors of one length stand together, with a clock if one is.
+
+MAT and HDF5 files have no tables. What was recorded together has one length; a matrix is a column
+for each of its narrow side; single numbers and texts are what the file says besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from campaign.importing.interface import ROWS, Array, Column, Table
+
+WIDEST = 64
+"""Most columns of a matrix; what is wider on both sides is an image or a map, and no recording."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """An array of one or two dimensions with a name, read in parts.
+
+    Attributes:
+        shape: (n,), (n, m) or (m, n).
+        part: rows [start, stop) along the longer side, shape (stop - start,) or, whichever side
+            that is, (stop - start, m).
+        by_rows: each series is a row of the matrix, as its program counts them.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    part: Callable[[int, int], Array]
+    unit: str = ""
+    by_rows: bool = False
+
+    @property
+    def length(self) -> int:
+        """Samples of each series."""
+        return max(self.shape)
+
+    @property
+    def width(self) -> int:
+        """How many series it is."""
+        return 1 if len(self.shape) == 1 else min(self.shape)
+
+
+def named(name: str, array: np.ndarray, unit: str = "") -> Named | None:
+    """An array that is in memory; None where it is nothing that is recorded over time."""
+    array = np.squeeze(array)
+    if array.ndim not in (1, 2) or array.dtype.kind not in "fiub" or array.size < 2:
+        return None
+    by_rows = array.ndim == 2 and array.shape[0] < array.shape[1]
+    if by_rows:
+        array = array.T
+    if array.ndim == 2 and array.shape[1] > WIDEST:
+        return None
+
+    def part(start: int, stop: int) -> Array:
+        return array[start:stop].astype(np.float64)
+
+    return Named(name, array.shape, part, unit, by_rows)
+
+
+def tables_of(arrays: Sequence[Named], said: dict[str, str]) -> list[Table]:
+    """A table for each length, the longest first."""
+    lengths = sorted({each.length for each in arrays}, reverse=True)
+    return [
+        table_of(
+            [each for each in arrays if each.length == length],
+            said,
+            "" if len(lengths) == 1 else f"{length} samples",
+        )
+        for length in lengths
+    ]
+
+
+def table_of(arrays: Sequence[Named], said: dict[str, str], name: str) -> Table:
+    """Arrays of one length as one table."""
+    columns: list[Column] = []
+    where: list[tuple[Named, int]] = []
+    for array in arrays:
+        for k in range(array.width):
+            of = f"({k + 1},:)" if array.by_rows else f"(:,{k + 1})"
+            place = array.name if array.width == 1 else f"{array.name}{of}"
+            columns.append(Column(place, array.unit, place))
+            where.append((array, k))
+    length = arrays[0].length
+    return Table(name, tuple(columns), partial(_read, where, length), rows=length, said=said)
+
+
+def _read(
+    where: Sequence[tuple[Named, int]], length: int, places: Sequence[int]
+) -> Iterator[Array]:
+    for start in range(0, length, ROWS):
+        stop = min(start + ROWS, length)
+        parts: dict[int, Array] = {}
+        chosen = [where[place] for place in places]
+        for array, _ in chosen:
+            if id(array) not in parts:
+                parts[id(array)] = array.part(start, stop).reshape(stop - start, -1)
+        yield np.column_stack([parts[id(array)][:, k] for array, k in chosen])

@@ -1,0 +1,89 @@
+"""What a cell of a text file may be: a number in either notation, a unit, a name with a unit."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from campaign.unit_grammar import parse_unit
+
+_EXPONENT = r"(?:[eEdD][+-]?\d+)?"
+NUMBER = {
+    ".": re.compile(rf"[+-]?(?:\d+(?:\.\d*)?|\.\d+){_EXPONENT}"),
+    ",": re.compile(rf"[+-]?(?:\d{{1,3}}(?:\.\d{{3}})+(?:,\d*)?|\d+(?:,\d*)?|,\d+){_EXPONENT}"),
+}
+"""A number by its decimal sign; with a comma, points may group thousands."""
+LOST = frozenset(
+    {"", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "#n/a", "inf", "+inf", "-inf"}
+    | {
+        "-",
+        "--",
+        "---",
+        "1.#qnan",
+        "-1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+        "1.#inf",
+        "-1.#inf",
+        "-nan(ind)",
+    }
+)
+"""Cells of a column of numbers that hold none, in lower case; infinity was never measured."""
+NO_UNIT = frozenset({"", "-", "–", "1", "none", "(none)", "[-]", "(-)", "unitless", "n/a"})
+_BRACKETED = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
+
+
+def plain(text: str) -> str:
+    """Text as people see it: no byte order mark, one form of µ and of superscripts, no edges."""
+    return unicodedata.normalize("NFC", text).replace("\u00b5", "\u03bc").strip("\ufeff \t\r\n\xa0")
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a finite number with that decimal sign, `.` or `,`."""
+    return NUMBER[decimal].fullmatch(cell) is not None
+
+
+def is_lost(cell: str) -> bool:
+    """Whether a cell says that there is no number."""
+    return cell.lower() in LOST
+
+
+def value_of(cell: str, decimal: str) -> float:
+    """The number in a cell, NaN where it holds none; ValueError where it is something else."""
+    if is_lost(cell):
+        return float("nan")
+    if not is_number(cell, decimal):
+        raise ValueError(cell)
+    if decimal == ",":
+        cell = cell.replace(".", "").replace(",", ".")
+    return float(cell.replace("d", "e").replace("D", "e"))
+
+
+def is_unit(cell: str) -> bool:
+    """Whether a cell may stand in a row of units, where an empty one may, too."""
+    bare = without_brackets(cell)
+    if bare.lower() in NO_UNIT or bare in ("%", "‰"):
+        return True
+    try:
+        parse_unit(bare)
+    except ValueError:
+        return False
+    return True
+
+
+def without_brackets(cell: str) -> str:
+    """A unit without the brackets around all of it."""
+    cell = cell.strip()
+    pair = cell[:1] + cell[-1:]
+    return cell[1:-1].strip() if pair in ("()", "[]", "<>") and len(cell) > 1 else cell
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """`speed [rpm]` as `speed` and `rpm`; a heading whose brackets hold no unit is all name."""
+    found = _BRACKETED.fullmatch(heading.strip())
+    if found is None:
+        return heading.strip(), ""
+    unit = (found["square"] if found["square"] is not None else found["round"]).strip()
+    if not unit or unit.lower() in NO_UNIT:
+        return (heading.strip(), "") if unit.isdigit() else (found["name"], "")
+    return (found["name"], unit) if is_unit(unit) else (heading.strip(), "")

@@ -1,0 +1,54 @@
+"""CSV, TSV and any other table of text: separator, decimal sign and heading are found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+from campaign.errors import Problem
+from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
+from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
+from campaign.importing.rows import blocks, lines_of
+
+SAMPLE = 400
+"""Lines by which the table is."""
+
+
+def tables(path: Path) -> Sequence[Table]:
+    """The one table of a text file. Raises RecordingError."""
+    with path.open("rb") as raw:
+        head = raw.read(HEAD)
+        encoding = encoding_of(head, whole=not raw.read(1))
+    with path.open(encoding=encoding) as file:
+        sample = list(islice(lines_of(file, path), SAMPLE))
+    dialect = dialect_of(sample)
+    if dialect is None:
+        separators = ", ".join(SEPARATORS.values())
+        message = f"no table of numbers, separated by {separators}, was found in it"
+        raise RecordingError([Problem(path, 0, 0, message)])
+    count = len(dialect.numeric)
+    names = dialect.names or tuple(f"column {k}" for k in range(1, count + 1))
+    columns = tuple(
+        Column(name, unit, f"column {k}", numeric)
+        for k, (name, unit, numeric) in enumerate(
+            zip(names, dialect.units, dialect.numeric, strict=True), start=1
+        )
+    )
+    read = partial(blocks, path, encoding, dialect)
+    return (Table("", columns, read, said=dialect.said, doubts=dialect.doubts),)
+
+
+def _recognises(head: bytes) -> bool:
+    text = head.decode(encoding_of(head, whole=len(head) < HEAD), "ignore")
+    return "\0" not in text
+
+
+FORMAT = RecordingFormat(
+    "text",
+    "a table of text: CSV, TSV, or separated by anything usual",
+    (".csv", ".tsv", ".txt", ".dat", ".asc"),
+    _recognises,
+    tables,
+)

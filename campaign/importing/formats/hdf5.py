@@ -1,0 +1,146 @@
+"""HDF5 files, those of MATLAB's version 7.3 among them: datasets by their path, read in parts.
+
+Nothing outside the file is opened: links to other files, and datasets whose numbers lie in others,
+are left out and named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.arrays import WIDEST, Named, tables_of
+from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+MOST = 10_000
+"""Objects of a file that are looked at."""
+LONGEST_TEXT = 10_000
+"""Characters of a text that the file says."""
+CLASS = "MATLAB_class"
+PLAIN = {"double", "single", "logical", "int8", "int16", "int32", "int64"}
+PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
+"""MATLAB's classes of numbers."""
+OPAQUE = (
+    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
+    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y', '-v7.3')"
+)
+
+
+def _tables(path: Path) -> Sequence[Table]:
+    import h5py
+
+    arrays: list[Named] = []
+    said: dict[str, str] = {}
+    try:
+        with h5py.File(path, "r") as file:
+            for name, dataset in _datasets(file, said):
+                _sort_out(path, name, dataset, arrays, said)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+        # What h5py makes of files that are no longer what they were.
+        raise RecordingError(
+            [Problem(path, 0, 0, f"this HDF5 file cannot be read: {error}")]
+        ) from None
+    if not arrays:
+        message = said.pop("", "no dataset of it is a series of numbers")
+        raise RecordingError([Problem(path, 0, 0, message)])
+    return tables_of(arrays, said)
+
+
+def _datasets(group: Any, said: dict[str, str], inside: str = "") -> Iterator[tuple[str, Any]]:
+    """Every dataset in the file itself, by dotted path, in the order of names."""
+    import h5py
+
+    waiting = [(inside, group)]
+    seen, looked = {h5py.h5o.get_info(group.id).addr}, 0
+    while waiting:
+        prefix, here = waiting.pop()
+        for name in sorted(here):
+            looked += 1
+            if looked > MOST:
+                said["Not looked at"] = f"what is beyond the first {MOST} objects"
+                return
+            link = here.get(name, getlink=True)
+            path = f"{prefix}{name}"
+            if not isinstance(link, h5py.HardLink) or name == "#refs#":
+                if name != "#refs#":
+                    said[path] = "a link, which is not followed"
+                continue
+            item = here[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if isinstance(item, h5py.Dataset):
+                yield path, item
+            elif isinstance(item, h5py.Group) and address not in seen:
+                seen.add(address)
+                waiting.append((f"{path}.", item))
+
+
+def _sort_out(
+    path: Path, name: str, dataset: Any, arrays: list[Named], said: dict[str, str]
+) -> None:
+    kind = dataset.attrs.get(CLASS, b"")
+    kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+    if dataset.shape is None:
+        return  # a dataspace without any number
+    if dataset.is_virtual or dataset.external:
+        said[name] = "its numbers lie in other files, which are not opened"
+    elif kind and kind not in PLAIN:
+        if kind == "char" and dataset.size <= LONGEST_TEXT:
+            said[name] = "".join(map(chr, dataset[()].T.ravel()))
+        elif kind not in ("char", "cell", "struct", "function_handle"):
+            said.setdefault("", f"{name} {OPAQUE}")
+    elif "MATLAB_empty" in dataset.attrs:
+        return
+    elif dataset.dtype.kind in "fiub" and dataset.size > 1:
+        shape = [length for length in dataset.shape if length > 1]
+        if len(shape) in (1, 2) and (len(shape) == 1 or min(shape) <= WIDEST):
+            arrays.append(_named(path, name, dataset, bool(kind)))
+    elif dataset.size == 1 and dataset.dtype.kind in "fiubSO":
+        value = dataset[()]
+        value = value.reshape(-1)[0] if isinstance(value, np.ndarray) else value
+        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+        said[name] = text[:LONGEST_TEXT]
+
+
+def _named(path: Path, name: str, dataset: Any, matlab: bool) -> Named:
+    """A series; MATLAB's arrays lie transposed in the file."""
+    along = int(np.argmax(dataset.shape))
+    unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
+    unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+    return Named(
+        name,
+        tuple(length for length in dataset.shape if length > 1),
+        partial(_part, path, dataset.name, along),
+        unit if isinstance(unit, str) else "",
+        by_rows=(along == 0) == matlab and dataset.ndim > 1,
+    )
+
+
+def _part(path: Path, name: str, along: int, start: int, stop: int) -> Array:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            dataset = file[name]
+            where = [slice(None)] * dataset.ndim
+            where[along] = slice(start, stop)
+            values = np.moveaxis(dataset[tuple(where)], along, 0)
+    except (OSError, RuntimeError, KeyError) as error:
+        message = f"{name} cannot be read from sample {start}: {error}"
+        raise RecordingError([Problem(path, 0, 0, message)]) from None
+    series: Array = values.reshape(stop - start, -1).astype(np.float64)
+    return series
+
+
+FORMAT = RecordingFormat(
+    "hdf5",
+    "HDF5, and MAT files of version 7.3",
+    (".h5", ".hdf5", ".hdf", ".mat", ".nxs"),
+    lambda head: head.startswith(MAGIC) or head[512 : 512 + len(MAGIC)] == MAGIC,
+    _tables,
+)

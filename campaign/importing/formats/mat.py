@@ -1,0 +1,200 @@
+"""MAT files of version 4 to 7.2: plain variables, Simulink's structures, dSPACE's X and Y.
+
+Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) are in
+no documented form; they are named, with how to save what is in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.apart import tables_apart
+from campaign.importing.arrays import Named, named, table_of, tables_of
+from campaign.importing.interface import RecordingError, RecordingFormat, Table
+
+DEEPEST = 8
+"""Structures within each other."""
+OPAQUE = (
+    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
+    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y')"
+)
+
+
+def tables(path: Path) -> Sequence[Table]:
+    """What is in a MAT file, read in this process. Raises RecordingError."""
+    from scipy.io import loadmat
+
+    try:
+        # mat_dtype: whole numbers were written as bytes; their differences would wrap around.
+        found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
+    except Exception as error:  # noqa: BLE001 - scipy raises whatever a broken file leads it to
+        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        message = f"this is no MAT file of version 4 to 7.2 that can be read ({why})"
+        raise RecordingError([Problem(path, 0, 0, message)]) from None
+    opaque = [
+        name
+        for name, value in found.items()
+        if name in ("None", "__function_workspace__") or _is_opaque(value)
+    ]
+    if opaque:
+        shown = next((name for name in opaque if not name.startswith(("None", "__"))), "a variable")
+        raise RecordingError([Problem(path, 0, 0, f"{shown} {OPAQUE}")])
+    whole: list[Table] = []
+    arrays: list[Named] = []
+    said: dict[str, str] = {}
+    for name, value in found.items():
+        if not name.startswith("__"):
+            _sort_out(name, value, whole, arrays, said)
+    whole += tables_of(arrays, said) if arrays else []
+    if not whole:
+        message = "no variable of it is a series of numbers"
+        raise RecordingError([Problem(path, 0, 0, message)])
+    return whole
+
+
+def _sort_out(
+    name: str,
+    value: Any,
+    tables: list[Table],
+    arrays: list[Named],
+    said: dict[str, str],
+    deep: int = 0,
+) -> None:
+    """Put a variable where it belongs: a table of its own, an array, or what the file says."""
+    if deep > DEEPEST:
+        return
+    fields = _fields(value)
+    if fields is not None:
+        for special in (_dspace, _with_time):
+            own = list(special(name, fields))
+            if own:
+                tables += own
+                return
+        for field, item in fields.items():
+            _sort_out(f"{name}.{field}", item, tables, arrays, said, deep + 1)
+        return
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        for k, item in enumerate(value.ravel(), start=1):
+            _sort_out(f"{name}({k})", item, tables, arrays, said, deep + 1)
+        return
+    array = np.asarray(value)
+    series = named(name, array) if array.dtype.kind in "fiub" else None
+    if series is not None:
+        arrays.append(series)
+    elif array.ndim == 0 or array.size == 1:
+        said[name] = str(array.reshape(-1)[0]) if array.size else ""
+
+
+def _fields(value: Any) -> Mapping[str, Any] | None:
+    """The fields of a structure; None for anything else."""
+    names = getattr(value, "_fieldnames", None)
+    return None if names is None else {name: getattr(value, name) for name in names}
+
+
+def _listed(value: Any) -> list[Any]:
+    """An array of structures as a list, where a single one is no array."""
+    return list(value.ravel()) if isinstance(value, np.ndarray) else [value]
+
+
+def _text(value: Any) -> str:
+    return value.strip() if isinstance(value, str) else ""
+
+
+def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
+    """ControlDesk's recordings: times in `X`, each signal in `Y` with the index of its times."""
+    if not {"X", "Y"} <= set(fields):
+        return
+    clocks = [
+        np.atleast_1d(of["Data"])
+        for each in _listed(fields["X"])
+        if "Data" in (of := _fields(each) or {})
+    ]
+    signals = [each for each in _listed(fields["Y"]) if _has_data(each)]
+    if not clocks or not signals:
+        return
+    groups: dict[int, list[Named]] = {}
+    said: dict[str, str] = {}
+    for k, signal in enumerate(signals, start=1):
+        of = _fields(signal) or {}
+        data = np.atleast_1d(of["Data"])
+        called = _text(of.get("Name")) or f"Y({k})"
+        if _text(of.get("Path")):
+            said[f"Path of {called}"] = _text(of.get("Path"))
+        index = of.get("XIndex")
+        alike = [x for x, times in enumerate(clocks) if len(times) == len(data)]
+        if isinstance(index, int | float) and 1 <= index <= len(clocks):
+            place = int(index) - 1
+        elif len(alike) == 1:
+            place = alike[0]
+        else:
+            # Two clocks of one length: whose it is cannot be told. A short one is a parameter.
+            said[called] = f"{len(data)} values, of which no time is known"
+            continue
+        series = named(called, data, _text(of.get("Unit")))
+        if series is not None and series.length == len(clocks[place]):
+            groups.setdefault(place, []).append(series)
+    for place, found in sorted(groups.items()):
+        times = named("time", clocks[place], "s")
+        if times is not None:
+            part = name if len(groups) == 1 else f"{name}.X({place + 1})"
+            yield table_of([times, *found], said, part)
+
+
+def _has_data(value: Any) -> bool:
+    return "Data" in (_fields(value) or {})
+
+
+def _with_time(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
+    """Simulink's structure with time: `time`, and `signals` of values and labels."""
+    if not {"time", "signals"} <= set(fields):
+        return
+    times = named("time", np.atleast_1d(np.asarray(fields["time"])), "s")
+    if times is None:
+        return
+    series = []
+    for k, signal in enumerate(_listed(fields["signals"]), start=1):
+        of = _fields(signal) or {}
+        values = np.asarray(of.get("values", ()))
+        called = _text(of.get("label")) or f"signals({k})"
+        one = named(called, values)
+        if one is not None and one.length == times.length:
+            series.append(one)
+    if series:
+        yield table_of([times, *series], {}, name)
+
+
+def _is_opaque(value: Any) -> bool:
+    names = getattr(getattr(value, "dtype", None), "names", None) or ()
+    return type(value).__name__ == "MatlabOpaque" or "MCOS" in names or "_TypeSystem" in names
+
+
+def _recognises(head: bytes) -> bool:
+    versions = (b"\x00\x01IM", b"\x01\x00MI")  # as little and as big machines write 0x0100
+    return (head[:6] == b"MATLAB" and head[124:128] in versions) or _version_4(head)
+
+
+def _version_4(head: bytes) -> bool:
+    """A header of five numbers: type below 5000, size, whether complex, length of the name."""
+    if len(head) < 21:
+        return False
+    for order in "<>":
+        kind, rows, columns, imaginary, length = np.frombuffer(head[:20], f"{order}i4")
+        sizes = 0 <= rows < 1 << 30 and 0 <= columns < 1 << 30 and 1 < length <= 64
+        if 0 <= kind < 5000 and sizes and imaginary in (0, 1):
+            return head[20 : 20 + length - 1].decode("ascii", "replace").isidentifier()
+    return False
+
+
+FORMAT = RecordingFormat(
+    "mat",
+    "MAT file of version 4 to 7.2",
+    (".mat",),
+    _recognises,
+    partial(tables_apart, __name__),
+)

@@ -1,0 +1,95 @@
+"""Parquet: columns by name, read in batches; needs pyarrow (`pip install 'campaign[parquet]'`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.interface import (
+    ROWS,
+    Array,
+    Column,
+    RecordingError,
+    RecordingFormat,
+    Table,
+)
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MAGIC = b"PAR1"
+OURS = frozenset({"pandas", "ARROW:schema"})
+"""What libraries say to each other in the file's metadata."""
+
+
+def _tables(path: Path) -> Sequence[Table]:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        message = "Parquet needs pyarrow: pip install 'campaign[parquet]'"
+        raise RecordingError([Problem(path, 0, 0, message)]) from None
+    try:
+        with parquet.ParquetFile(path) as file:
+            schema, rows = file.schema_arrow, file.metadata.num_rows
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise _broken(path, error) from None
+    columns = tuple(
+        Column(each.name, _unit(each), f"column {place}", _is_numeric(each))
+        for place, each in enumerate(schema, start=1)
+    )
+    if not any(column.numeric for column in columns):
+        raise RecordingError([Problem(path, 0, 0, "no column of it holds numbers")])
+    said = {name: text for name, text in _texts(schema.metadata).items() if name not in OURS}
+    return [Table("", columns, partial(_read, path), rows=rows, said=said)]
+
+
+def _read(path: Path, places: Sequence[int]) -> Iterator[Array]:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        with parquet.ParquetFile(path) as file:
+            # By place: two columns may have one name.
+            for batch in file.iter_batches(ROWS, use_threads=False):
+                columns = (batch.column(place).cast(pa.float64(), safe=False) for place in places)
+                yield np.column_stack([each.to_numpy(zero_copy_only=False) for each in columns])
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise _broken(path, error) from None
+
+
+def _broken(path: Path, error: Exception) -> RecordingError:
+    return RecordingError([Problem(path, 0, 0, f"this Parquet file cannot be read: {error}")])
+
+
+def _is_numeric(field: pa.Field) -> bool:
+    from pyarrow import types
+
+    kinds = (types.is_floating, types.is_integer, types.is_boolean)
+    return any(is_kind(field.type) for is_kind in kinds)
+
+
+def _unit(field: pa.Field) -> str:
+    told = _texts(field.metadata)
+    return told.get("units") or told.get("unit", "")
+
+
+def _texts(metadata: dict[bytes, bytes] | None) -> dict[str, str]:
+    return {
+        name.decode("utf-8", "replace"): value.decode("utf-8", "replace")
+        for name, value in (metadata or {}).items()
+    }
+
+
+FORMAT = RecordingFormat(
+    "parquet",
+    "Parquet, by pyarrow",
+    (".parquet", ".pq"),
+    lambda head: head.startswith(MAGIC),
+    _tables,
+)

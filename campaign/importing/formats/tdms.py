@@ -1,0 +1,98 @@
+"""TDMS of LabVIEW and other programs of NI; needs npTDMS (`pip install 'campaign[tdms]'`).
+
+Time is no channel there: a waveform states its offset and its step, and one that states none has no
+known time. Channels with different clocks, or that started at different moments, are apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.interface import (
+    ROWS,
+    Array,
+    Clock,
+    Column,
+    RecordingError,
+    RecordingFormat,
+    Table,
+)
+
+MAGIC = b"TDSm"
+
+
+def _tables(path: Path) -> Sequence[Table]:
+    try:
+        from nptdms import TdmsFile
+    except ImportError:
+        message = "TDMS needs npTDMS: pip install 'campaign[tdms]'"
+        raise RecordingError([Problem(path, 0, 0, message)]) from None
+    alike: dict[tuple[str, int, Clock | None, str], list[tuple[str, Any]]] = {}
+    try:
+        with TdmsFile.open(path) as file:
+            said = {str(name): str(value) for name, value in file.properties.items()}
+            for group in file.groups():
+                for channel in group.channels():
+                    if len(channel) > 1 and channel.dtype.kind in "fiub":
+                        told = channel.properties
+                        clock = _clock(told)
+                        start = told.get("wf_start_time")
+                        key = (group.name, len(channel), clock, str(start))
+                        alike.setdefault(key, []).append((channel.name, told.get("unit_string")))
+    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
+        raise _broken(path, error) from None
+    if not alike:
+        raise RecordingError([Problem(path, 0, 0, "no channel of it is a series of numbers")])
+    return [
+        Table(
+            str(group),
+            tuple(Column(name, str(unit or ""), f"{group}/{name}") for name, unit in channels),
+            partial(_read, path, group, [name for name, _ in channels], length),
+            clock,
+            length,
+            {**said, **({"wf_start_time": start} if start != "None" else {})},
+        )
+        for (group, length, clock, start), channels in alike.items()
+    ]
+
+
+def _clock(told: Any) -> Clock | None:
+    """Of a waveform; both of what it needs, or none: half a clock is no clock."""
+    step, offset = told.get("wf_increment"), told.get("wf_start_offset")
+    if step is None or offset is None or not float(step) > 0:
+        return None
+    return Clock(float(step), float(offset))
+
+
+def _read(
+    path: Path, group: str, names: Sequence[str], length: int, places: Sequence[int]
+) -> Iterator[Array]:
+    from nptdms import TdmsFile
+
+    try:
+        with TdmsFile.open(path) as file:
+            channels = [file[group][names[place]] for place in places]
+            for start in range(0, length, ROWS):
+                stop = min(start + ROWS, length)
+                yield np.column_stack(
+                    # Scaled, as the file says how; raw counts are nobody's quantity.
+                    [np.asarray(channel[start:stop], dtype=np.float64) for channel in channels]
+                )
+    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
+        raise _broken(path, error) from None
+
+
+def _broken(path: Path, error: Exception) -> RecordingError:
+    why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return RecordingError([Problem(path, 0, 0, f"this TDMS file cannot be read ({why})")])
+
+
+FORMAT = RecordingFormat(
+    "tdms", "TDMS of NI, by npTDMS", (".tdms",), lambda head: head.startswith(MAGIC), _tables
+)

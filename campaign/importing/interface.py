@@ -1,0 +1,100 @@
+"""What a file from elsewhere holds: named columns on clocks, with what the file says of them.
+
+Nothing is converted here and nothing is guessed: a unit is text, a number what was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.errors import Problem, UsageError
+
+Array = NDArray[np.float64]
+HEAD = 1 << 16
+"""Bytes by which a format is recognised, and an encoding judged."""
+ROWS = 65_536
+"""Most rows of a block: memory does not grow with a recording."""
+
+
+class RecordingError(UsageError):
+    """A file that cannot be read as recordings: all that is wrong with it, placed."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        name: as the file has it, nothing added; two columns may have one name.
+        unit: as the file states it; "" where it states none.
+        place: where in the file, for people: `column 3`, `rec1.Y(2)`.
+        numeric: whether its cells are numbers; others may only be looked at.
+    """
+
+    name: str
+    unit: str = ""
+    place: str = ""
+    numeric: bool = True
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Times that a file states instead of storing them: sample k is at start + k step (s)."""
+
+    step: float
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length that were sampled together.
+
+    Attributes:
+        name: of the part of the file; "" where the file has only one.
+        clock: None where time is a column, or is not told.
+        rows: how many, where that is known without reading all of them.
+        said: what else the file says of it, as written, e.g. `Operator`.
+        doubts: how else the file could be read, in words.
+        read: blocks of at most `ROWS` rows of the columns at the given places (from 0), in order:
+            shape (k, len(places)), NaN where a cell is empty. Raises RecordingError.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    read: Callable[[Sequence[int]], Iterator[Array]] = field(repr=False)
+    clock: Clock | None = None
+    rows: int | None = None
+    said: Mapping[str, str] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+
+    def whole(self, places: Sequence[int] | None = None) -> Array:
+        """All rows of some columns, or of every numeric one: shape (n, columns)."""
+        wanted = [k for k, c in enumerate(self.columns) if c.numeric] if places is None else places
+        blocks = list(self.read(wanted))
+        return np.concatenate(blocks) if blocks else np.empty((0, len(wanted)))
+
+
+@dataclass(frozen=True)
+class RecordingFormat:
+    """A format of recordings, as it is found by its name.
+
+    Attributes:
+        endings: of its files, lower case: `.csv`.
+        recognises: whether a file is one, from its first 64 KiB at most; never raises.
+        tables: what is in a file. Raises RecordingError where it cannot be read.
+    """
+
+    name: str
+    summary: str
+    endings: tuple[str, ...]
+    recognises: Callable[[bytes], bool]
+    tables: Callable[[Path], Sequence[Table]]

@@ -1,0 +1,149 @@
+"""Rows of a text table as numbers: quickly where all is as expected, cell by cell where not.
+
+A row that is not like the others is refused by line and column; it is never padded, and never moves
+the cells of the others. Memory holds one block, however long the file is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from io import StringIO
+from itertools import islice
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.cells import is_lost, value_of
+from campaign.importing.dialect import Dialect
+from campaign.importing.interface import ROWS, Array, RecordingError
+
+LONGEST = 1 << 20
+"""Most characters of a line; what is longer is no table."""
+FEW = 10
+"""Most problems that are told of a file."""
+
+
+def lines_of(file: TextIO, path: Path) -> Iterator[str]:
+    """Lines of a bounded length. Raises RecordingError for others, and for what is no text."""
+    number = 0
+    try:
+        while line := file.readline(LONGEST):
+            number += 1
+            if len(line) == LONGEST:
+                raise RecordingError(
+                    [Problem(path, number, 1, f"a line of over {LONGEST} characters: no table")]
+                )
+            if "\0" in line:
+                at = line.index("\0") + 1
+                raise RecordingError([Problem(path, number, at, "a zero byte: this is no text")])
+            yield line
+    except UnicodeDecodeError as error:
+        message = f"the text is not {error.encoding}: {error.reason}"
+        raise RecordingError([Problem(path, number + 1, 0, message)]) from None
+
+
+def blocks(
+    path: Path, encoding: str, dialect: Dialect, places: Sequence[int], rows: int | None = None
+) -> Iterator[Array]:
+    """The columns at `places` of a table, shape (k, len(places)); `rows`: no further than these."""
+    with path.open(encoding=encoding) as file:
+        last = None if rows is None else dialect.first - 1 + rows
+        lines = islice(lines_of(file, path), dialect.first - 1, last)
+        number = dialect.first
+        while block := list(islice(lines, ROWS)):
+            values = _quickly(block, dialect, places)
+            if values is None:
+                values = _row_by_row(path, block, number, dialect, places, lines)
+            if len(values):
+                yield values
+            number += len(block)
+
+
+def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> Array | None:
+    """Through numpy; None where any row is not exactly what is expected of it."""
+    text = "".join(lines)
+    separator = None if dialect.separator == " " else dialect.separator
+    if separator is None:
+        cells = sum(map(len, map(str.split, lines)))
+    else:
+        cells = text.count(separator) + len(lines)
+    # Cells that are too many would be dropped; points beside decimal commas may group thousands.
+    grouped = dialect.decimal == "," and "." in text
+    if cells != dialect.width * len(lines) or '"' in text or grouped:
+        return None
+    try:
+        values = np.loadtxt(
+            StringIO(text.replace(",", ".") if dialect.decimal == "," else text),
+            delimiter=separator,
+            usecols=places,
+            comments=None,
+            ndmin=2,
+        )
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() and len(values) == len(lines) else None
+
+
+def _row_by_row(
+    path: Path,
+    lines: Sequence[str],
+    number: int,
+    dialect: Dialect,
+    places: Sequence[int],
+    further: Iterator[str],
+) -> Array:
+    """What `_quickly` did not take: cells that hold no number, and whatever is wrong, placed."""
+    values, problems = [], []
+    for offset, line in enumerate(lines):
+        if not line.strip():
+            continue
+        cells = dialect.split(line)
+        if dialect.comments:
+            cells = cells[: dialect.width]
+        if len(cells) != dialect.width:
+            last = not any(each.strip() for each in lines[offset + 1 :]) and not any(
+                each.strip() for each in further
+            )
+            if last and not any(not is_lost(c) and _is_value(c, dialect) for c in cells):
+                break  # an end mark
+            message = f"{len(cells)} cells where the rows above have {dialect.width}"
+            problems.append(Problem(path, number + offset, 1, message))
+        else:
+            row = []
+            for place in places:
+                try:
+                    row.append(value_of(cells[place], dialect.decimal))
+                except ValueError:
+                    column = _column_of(line, place, dialect)
+                    message = f"{cells[place]!r} is no number, as the rest of its column is"
+                    problems.append(Problem(path, number + offset, column, message))
+                    break
+            values.append(row)
+        if len(problems) >= FEW:
+            break
+    if problems:
+        raise RecordingError(problems)
+    return np.array(values, dtype=np.float64).reshape(-1, len(places))
+
+
+def _is_value(cell: str, dialect: Dialect) -> bool:
+    try:
+        value_of(cell, dialect.decimal)
+    except ValueError:
+        return False
+    return True
+
+
+def _column_of(line: str, place: int, dialect: Dialect) -> int:
+    """Where in a line a cell begins, from 1; of quoted cells about there."""
+    if dialect.separator == " ":
+        rest, at = line, 0
+        for _ in range(place):
+            at += len(rest) - len(rest.lstrip())
+            rest = rest.lstrip()
+            word = rest.split(maxsplit=1)[0]
+            at, rest = at + len(word), rest[len(word) :]
+        return at + len(rest) - len(rest.lstrip()) + 1
+    return sum(len(cell) + 1 for cell in line.split(dialect.separator)[:place]) + 1
