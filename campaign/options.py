@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as attribute
 from typing import Any, Literal, get_args, get_origin
 
@@ -79,6 +79,7 @@ class OptionInfo:
         quantity: the physical quantity it takes, SI inside; None for anything else.
         accepts: what else it takes: `text`, `true or false`, the allowed words, a table's models.
         default: SI; None when there is none.
+        when: the word that chooses the table it belongs to, such as `form = ideal`; "" for always.
     """
 
     name: str
@@ -87,6 +88,7 @@ class OptionInfo:
     default: Any
     required: bool
     meaning: str
+    when: str = ""
 
     @property
     def unit(self) -> str:
@@ -95,11 +97,15 @@ class OptionInfo:
 
 
 def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]:
-    """The options of a class in the order they were declared, with those of the tables in it."""
+    """The options of a class in the order they were declared, with those of the tables in it.
+
+    Where a table is one of several, each one's options follow; `NAME` stands for a key that
+    whoever writes the file may choose.
+    """
     for name, field in options.model_fields.items():
         types = tuple(_leaf_types(field.annotation))
-        quantities = [m for m in (*field.metadata, *types) if isinstance(m, Quantity)]
-        tables = _tables(types)
+        found = (*field.metadata, *types)
+        quantities = [m for m in found if isinstance(m, Quantity)]
         default = field.get_default(call_default_factory=True, validated_data={})
         nested = isinstance(default, BaseModel) or default is PydanticUndefined
         yield OptionInfo(
@@ -110,8 +116,33 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
             required=field.is_required(),
             meaning=" ".join((field.description or "").split()),
         )
-        if len(tables) == 1:
-            yield from describe(tables[0], f"{prefix}{name}.")
+        key = "NAME." if dict in tuple(_origins(field.annotation)) else ""
+        yield from _within(found, f"{prefix}{name}.{key}")
+
+
+def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:
+    """The options of the table that a field takes, or of each that it may take."""
+    tables = {word: table for table in _tables(found) for word in [_told_by(table)]}
+    for choice in found:
+        if isinstance(choice, Choice):
+            chosen = {f"{choice.tag} = {word}": choice.options(word) for word in choice.words()}
+            tables |= {told: table for told, table in chosen.items() if table is not None}
+    infos = {told: list(describe(table, prefix)) for told, table in tables.items()}
+    for told, of_table in infos.items():
+        for info in of_table:
+            everywhere = all(info in others for others in infos.values())
+            if everywhere and told == next(iter(infos)):
+                yield info
+            elif not everywhere and told != f"{info.name.removeprefix(prefix)} = {info.accepts}":
+                yield replace(info, when=", ".join(filter(None, (told, info.when))))
+
+
+def _origins(annotation: Any) -> Iterator[Any]:
+    """The generic types that an annotation is made of."""
+    if (origin := get_origin(annotation)) is not None:
+        yield origin
+        for argument in get_args(annotation):
+            yield from _origins(argument)
 
 
 def _leaf_types(annotation: Any) -> Iterator[Any]:
@@ -165,14 +196,14 @@ def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
 
 
 def _alternatives(tables: list[type[BaseModel]]) -> str:
-    """The word by which each kind of table is told: its first field of one allowed word."""
-    words = []
-    for table in tables:
-        for name, field in table.model_fields.items():
-            allowed = get_args(field.annotation)
-            if get_origin(field.annotation) is Literal and len(allowed) == 1:
-                words.append(f"{name} = {allowed[0]}")
-                break
-        else:
-            words.append(table.__name__)
-    return " | ".join(words)
+    """The words by which each kind of table is told."""
+    return " | ".join(map(_told_by, tables))
+
+
+def _told_by(table: type[BaseModel]) -> str:
+    """The word by which a table is told from others: its first field of one allowed word."""
+    for name, field in table.model_fields.items():
+        allowed = get_args(field.annotation)
+        if get_origin(field.annotation) is Literal and len(allowed) == 1:
+            return f"{name} = {allowed[0]}"
+    return table.__name__

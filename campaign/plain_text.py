@@ -18,7 +18,10 @@ def printable(text: str, keep: str = "") -> str:
     if text.isprintable():
         return text
     strange = {letter for letter in set(text) if not (letter.isprintable() or letter in keep)}
-    return text.translate({ord(letter): _instead(letter) for letter in strange})
+    # A long text that has nothing strange is soon through, and would not be letter by letter.
+    return (
+        text.translate({ord(letter): _instead(letter) for letter in strange}) if strange else text
+    )
 
 
 def on_a_page(text: str) -> str:

@@ -73,5 +73,6 @@ def test_a_table_of_paths_is_listed_with_what_its_values_take():
     shares = found["gear.preload.shares"]
     assert (shares.accepts, shares.default) == ("table of number", {"static_torque": 1.0})
     for table in ("variation.day_to_day", "variation.trial_to_trial"):
-        assert (found[table].accepts, found[f"{table}.relative"].accepts) == ("table", "number")
-        assert found[f"{table}.paths"].accepts == "list of text"
+        within = found[f"{table}.NAME.relative"]
+        assert (found[table].accepts, within.accepts) == ("table", "number")
+        assert found[f"{table}.NAME.paths"].accepts == "list of text"
