@@ -259,8 +259,8 @@ def hands_samples_over_in_time(under_test: BackendUnderTest) -> None:
     """Live: as they are taken, at most 0.2 s of them at a time, but for a hiccup of the host."""
     if not under_test.live:
         return
-    recorder, _ = _executed(under_test)
-    require(recorder.sizes, "nothing was recorded")
+    recorder, ending = _executed(under_test)
+    require(recorder.sizes, f"nothing was recorded: {ending.outcome}, {ending.reason}")
     spans = np.array(recorder.sizes) / under_test.possible.task.sample_rate
     usual = float(np.median(spans))
     require(usual <= LATEST, f"samples come {usual:.3g} s at a time; at most {LATEST:g} s may")
