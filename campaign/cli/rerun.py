@@ -26,6 +26,7 @@ from campaign.cli.session import Session, execute
 from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.comparison import changes, differences
+from campaign.execution.written_order import in_written_order
 from campaign.physics import truth
 from campaign.physics.bench import Bench
 from campaign.physics.engine_version import (
@@ -54,8 +55,12 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     simulated = run.header.backend == SIM
     tree = run.header.backend_options if simulated else {}
     options = kind.options.model_validate(tree, context={"si": True})
-    trial = archived.trial.model_copy(update={"number": 1})  # it is the only one of its run
-    truths = run.header.truth.plants
+    bench = in_written_order(archived.trial.bench, run.header.sources.values())
+    # It is the only one of its run.
+    trial = archived.trial.model_copy(update={"number": 1, "bench": bench})
+    texts = run.header.truth.sources.values()
+    plants = run.header.truth.plants
+    truths = {name: in_written_order(plant, texts) for name, plant in plants.items()}
     backend = open_backend(kind, options, [trial], truths)
     now = datetime.now(UTC)
     stem = f"rerun-{archived.trial.name}-{run.header.protocol_name or 'run'}"
@@ -75,10 +80,10 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
         )
     (again,) = open_run(outcome.archive).trials
     engine = int(run.header.versions.get("engine", FIRST)) if simulated else ENGINE
-    bench = Bench.model_validate(trial.bench, context={"si": True})
+    acted = Bench.model_validate(trial.bench, context={"si": True})
     if trial.truth:
-        bench = truth.simulated(truths[trial.truth], bench)
-    say = _say if engine == ENGINE else partial(_say_change, engine, bench)
+        acted = truth.simulated(truths[trial.truth], acted)
+    say = _say if engine == ENGINE else partial(_say_change, engine, acted)
     same = say(f"{archived.trial.name} of {run.name}", before, again.recording())
     print_line(str(outcome.archive))
     return worst_exit_code([same, ExitCode.ARCHIVE if run.damaged else ExitCode.DONE])

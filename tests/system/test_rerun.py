@@ -16,6 +16,7 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.execution import provenance
 from campaign.execution.comparison import changes, differences
+from campaign.execution.written_order import in_written_order
 from campaign.physics import grid
 from campaign.physics.step_choice import StepChoice
 from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
@@ -155,3 +156,28 @@ def test_older_engines_had_larger_errors_of_dry_friction(engine: int, rate: floa
     assert _error(engine, "load_rate", dry=True) == rate
     assert _error(engine, "friction_torque", dry=True) == torque
     assert _error(engine, "load_rate", dry=False) == 2e-4
+
+
+def test_friction_of_several_interfaces_is_added_in_the_order_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """The archive sorts the bench's tables; the last bits of their sum are those of the file."""
+    protocol = write(tmp_path, SEA.replace('"simulink"', '"platform"'))
+    run_protocol(Request(str(protocol)), tmp_path / "results", workers=1, report=False)
+    (path,) = (tmp_path / "results").glob("*.nxs")
+    order = list(open_run(path).trials[0].trial.bench["friction"])
+    assert order == sorted(order)
+    assert order[0] != "load"
+    capsys.readouterr()
+    assert rerun_trial(path.stem, "1", path.parent) is ExitCode.DONE
+    assert "equal to the bit" in capsys.readouterr().out
+
+
+def test_what_a_file_does_not_have_stays_behind():
+    text = 'name = "a"\n[friction]\nz = 1\na = 2\n'
+    tree = {"friction": {"a": 1, "b": 2, "z": 3}, "name": "a"}
+    ordered = in_written_order(tree, ["no = TOML =", 'name = "other"', text])
+    assert ordered == tree
+    assert list(ordered["friction"]) == ["z", "a", "b"]
+    assert list(ordered) == ["name", "friction"]
+    assert in_written_order(tree, []) is tree
