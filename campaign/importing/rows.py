@@ -16,13 +16,20 @@ import numpy as np
 
 from campaign.errors import Problem
 from campaign.importing.cells import is_lost, value_of
-from campaign.importing.dialect import Dialect
-from campaign.importing.interface import ROWS, Array, RecordingError
+from campaign.importing.dialect import Dialect, encoding_of
+from campaign.importing.interface import HEAD, ROWS, Array, RecordingError
 
 LONGEST = 1 << 20
 """Most characters of a line; what is longer is no table."""
 FEW = 10
 """Most problems that are told of a file."""
+
+
+def encoding_of_file(path: Path) -> str:
+    """A codec that decodes a text file, by its beginning."""
+    with path.open("rb") as raw:
+        head = raw.read(HEAD)
+        return encoding_of(head, whole=not raw.read(1))
 
 
 def lines_of(file: TextIO, path: Path) -> Iterator[str]:

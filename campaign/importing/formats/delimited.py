@@ -10,7 +10,7 @@ from pathlib import Path
 from campaign.errors import Problem
 from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
 from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import blocks, lines_of
+from campaign.importing.rows import blocks, encoding_of_file, lines_of
 
 SAMPLE = 400
 """Lines by which the table is."""
@@ -18,9 +18,7 @@ SAMPLE = 400
 
 def tables(path: Path) -> Sequence[Table]:
     """The one table of a text file. Raises RecordingError."""
-    with path.open("rb") as raw:
-        head = raw.read(HEAD)
-        encoding = encoding_of(head, whole=not raw.read(1))
+    encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
         sample = list(islice(lines_of(file, path), SAMPLE))
     dialect = dialect_of(sample)

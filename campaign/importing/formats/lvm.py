@@ -14,9 +14,8 @@ from pathlib import Path
 
 from campaign.errors import Problem
 from campaign.importing.cells import is_number, value_of
-from campaign.importing.dialect import Dialect, encoding_of, split
+from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import (
-    HEAD,
     Array,
     Clock,
     Column,
@@ -24,7 +23,7 @@ from campaign.importing.interface import (
     RecordingFormat,
     Table,
 )
-from campaign.importing.rows import blocks, lines_of
+from campaign.importing.rows import blocks, encoding_of_file, lines_of
 
 MARK = "LabVIEW Measurement"
 END = "***End_of_Header***"
@@ -43,9 +42,7 @@ class _Block:
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    with path.open("rb") as raw:
-        head = raw.read(HEAD)
-        encoding = encoding_of(head, whole=not raw.read(1))
+    encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
         said, found = _blocks(path, lines_of(file, path))
     _check(path, found)

@@ -16,16 +16,15 @@ import numpy as np
 
 from campaign.errors import Problem
 from campaign.importing.cells import NO_UNIT, is_lost, is_number, is_unit
-from campaign.importing.dialect import Dialect, encoding_of, split
+from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import (
-    HEAD,
     Array,
     Column,
     RecordingError,
     RecordingFormat,
     Table,
 )
-from campaign.importing.rows import blocks, lines_of
+from campaign.importing.rows import blocks, encoding_of_file, lines_of
 
 NAME = "Name"
 SEPARATORS = "\t;,"
@@ -34,9 +33,7 @@ LONGEST_HEADING = 200
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    with path.open("rb") as raw:
-        head = raw.read(HEAD)
-        encoding = encoding_of(head, whole=not raw.read(1))
+    encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
         lines = list(islice(lines_of(file, path), LONGEST_HEADING))
     separator = next((each for each in SEPARATORS if lines[0].startswith(f"{NAME}{each}")), "\t")
