@@ -20,6 +20,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
+from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
+from campaign.axis_kind import Sides
 from campaign.trial import ChannelInfo
 
 COMMAND = "command"
@@ -39,13 +41,6 @@ NORMAL_LOAD = "normal_load"
 TEMPERATURE = "temperature"
 FRICTION_TORQUE = "friction_torque"
 LOAD_RATE = "load_rate"
-
-
-class AxisKind(StrEnum):
-    """How the axis of a bench moves."""
-
-    ROTARY = "rotary"
-    LINEAR = "linear"
 
 
 class Quantity(StrEnum):
@@ -296,13 +291,19 @@ def info(
     """
     what = VOCABULARY[name]
     quantity, label, linear = what.quantity, what.label, what.linear_label
-    if name == COMMAND and mode:
+    if name == COMMAND and mode in COMMANDS:
         quantity, label, linear = COMMANDS[mode]
-    if axis is AxisKind.LINEAR and linear:
+    if axis == AxisKind.LINEAR and linear:
         label = linear
     unit, display_unit = UNITS[axis][quantity]
     measured = what.known_by is not KnownBy.SIMULATOR
     return ChannelInfo(name, unit, label, display_unit, measured, own_rate)
+
+
+def axis_of(name: str, sides: Sides) -> AxisKind:
+    """How the side of a bench moves that a channel is about: the motor's own, or the axis'."""
+    what = VOCABULARY.get(name)
+    return sides.motor if what is not None and what.side is Side.MOTOR else sides.load
 
 
 def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, ...]:

@@ -92,8 +92,11 @@ class OptionInfo:
 
     @property
     def unit(self) -> str:
-        """The unit a reader is shown, or the empty text."""
-        return self.quantity.display if self.quantity else ""
+        """The unit a reader is shown, or the empty text; on a linear axis it may be another."""
+        if self.quantity is None:
+            return ""
+        own, linear = self.quantity, self.quantity.linear
+        return f"{own.display} or {linear.display}" if linear else own.display
 
 
 def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]:

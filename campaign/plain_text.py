@@ -26,6 +26,8 @@ def printable(text: str, keep: str = "") -> str:
 
 def on_a_page(text: str) -> str:
     """`text` as a file may hold it that people open: HTML, SVG, CSV. Lines and spaces stay."""
+    if text.replace("\n", "").replace("\t", "").isprintable():  # as most are, however long
+        return text
     spaces = {letter for letter in set(text) if unicodedata.category(letter) == "Zs"}
     return printable(text, keep="\n\t" + "".join(spaces))
 

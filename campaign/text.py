@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
+from campaign.axis_kind import words_here
+
 MOST_DIGITS = 9
 """that a number with an interval is shown with."""
 _ROUNDING = 1e-12  # share of a number below which its half-width is a rounding error
@@ -138,7 +140,7 @@ QUANTITIES = {
 
 def quantity_words(quantity: str) -> str:
     """`coulomb_torque` as `Coulomb friction Tc`, `breakaway_torque` as `breakaway torque`."""
-    return QUANTITIES.get(quantity, quantity.replace("_", " "))
+    return words_here(QUANTITIES.get(quantity, quantity.replace("_", " ")))
 
 
 _SAID_BY_THE_FIELD = ("friction", "compensation")
@@ -155,4 +157,4 @@ def path_words(path: str) -> str:
         parts = parts[1:]
         if parts[0] in _SAID_BY_THE_FIELD and len(parts) > 2:
             parts = parts[1:]
-    return " ".join(" ".join(parts).replace("_", " ").split())
+    return words_here(" ".join(" ".join(parts).replace("_", " ").split()))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -46,7 +46,8 @@ class Task(Options):
             `command` (N m at the load) through the current loop. Two modes exist only where a bench
             is simulated: `prescribed` moves the load relative to the hull exactly at `command`
             (rad/s), with no motor; `spring` pulls it through a spring whose far end stands at the
-            angle `command` (rad), with no motor.
+            angle `command` (rad), with no motor. `recorded` was done elsewhere, by whatever
+            controller there was: its recording tells all that is known of it.
         spring_stiffness: of mode `spring` (N m/rad).
         disturbance: torque on the load from outside (N m); only where a bench is simulated.
         command: the commanded rate or torque over the trial's own time.
@@ -62,7 +63,7 @@ class Task(Options):
         start_angle: where the load stands relative to the hull when the trial begins (rad).
     """
 
-    mode: Literal["rate", "torque", "prescribed", "spring"]
+    mode: Literal["rate", "torque", "prescribed", "spring", "recorded"]
     command: Signal = Zero()
     spring_stiffness: float = Field(default=0.0, ge=0)
     disturbance: Signal = Zero()
@@ -98,6 +99,9 @@ class Trial(Options):
         windows: parts that its analysis uses, by name; it derives no times from the options.
         truth: SHA-256 of the bench that is simulated in place of `bench`, which nobody who plans or
             analyses the trial is told; empty: it is `bench` itself. See `physics.truth`.
+        recording: where its samples come from, when it was executed elsewhere: files with their
+            SHA-256, rows, columns and what is made of them; see `campaign.importing.described`.
+            Empty for a trial that a backend of its own executes.
     """
 
     number: int = Field(ge=1)
@@ -118,6 +122,7 @@ class Trial(Options):
     can_use: tuple[str, ...] = ()
     windows: tuple[Window, ...] = ()
     truth: str = ""
+    recording: Tree = {}
 
     @property
     def name(self) -> str:
@@ -135,13 +140,15 @@ class Trial(Options):
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of what determines the samples: bench, task, seed, and a truth that there is.
+        """SHA-256 of what determines the samples: bench, task, seed, truth and files, if any.
 
         In canonical JSON.
         """
         what = {"bench": self.bench, "task": self.task.model_dump(mode="json"), "seed": self.seed}
         if self.truth:
             what["truth"] = self.truth
+        if self.recording:
+            what["recording"] = self.recording
         return hashlib.sha256(canonical_json(what).encode()).hexdigest()
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -163,6 +170,9 @@ class TrialRequest:
         requires, can_use: names of the channels, where they are not all that the experiment
             declares; None: a measurement has all of those, and any other role none.
         windows: parts of the recording that the analysis uses, by name; see `Trial`.
+        recording: where the samples of a trial come from that was executed elsewhere; see `Trial`.
+        part: of an offered recording that is this trial (s from its beginning); None: all of it.
+        options: those of the test's that a recording from elsewhere shows to have been others (SI).
     """
 
     task: Task
@@ -173,6 +183,29 @@ class TrialRequest:
     requires: Collection[str] | None = None
     can_use: Collection[str] | None = None
     windows: tuple[Window, ...] = ()
+    recording: Tree = field(default_factory=dict)
+    part: tuple[float, float] | None = None
+    options: Tree = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Offered:
+    """A recording from elsewhere, as an experiment is offered it: it may hold several trials.
+
+    Attributes:
+        duration: of it (s), at `sample_rate` (Hz).
+        channels: names of those that it has, or that can be made of those that it has.
+        conditions: what is known to have been set for it, by name; SI where it has a unit.
+        windows: parts of it that whoever recorded it has named; s from its beginning.
+        read: the samples of some of its channels.
+    """
+
+    duration: float
+    sample_rate: float
+    channels: frozenset[str]
+    conditions: Mapping[str, JsonValue]
+    windows: tuple[Window, ...]
+    read: Callable[[Collection[str]], Recording]
 
 
 @dataclass(frozen=True)

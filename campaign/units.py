@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
+from campaign.axis_kind import AxisKind, Sides, spoken_of, unit_here
 from campaign.unit_grammar import Unit, parse_unit, respelled
 
 
@@ -32,6 +33,9 @@ class Quantity:
     Attributes:
         accepts: what messages and `campaign kinds units` name; any unit of the dimensions will do.
         also: (unit, what it means here): `1/min` is `rpm` where a speed is meant.
+        linear: what stands for it where its side of the gear is linear; None: the same.
+        of_motor: whether it is the motor's, which may be rotary where the axis is linear.
+        through_lead: what stands for it between a rotary motor and a linear axis; None: `linear`.
     """
 
     name: str
@@ -39,9 +43,49 @@ class Quantity:
     display: str
     accepts: tuple[str, ...]
     also: tuple[tuple[str, str], ...] = ()
+    linear: Quantity | None = field(default=None, repr=False)
+    of_motor: bool = False
+    through_lead: Quantity | None = field(default=None, repr=False)
+
+    @property
+    def here(self) -> Quantity:
+        """What this is of the axis that is meant (`axis_kind.speaking_of`)."""
+        return self.of(spoken_of())
+
+    def of(self, sides: Sides) -> Quantity:
+        """What this is of a bench whose axis and motor are of these kinds."""
+        kind = sides.motor if self.of_motor else sides.load
+        if kind is AxisKind.ROTARY:
+            return self
+        if self.through_lead is not None and sides.motor is AxisKind.ROTARY:
+            return self.through_lead
+        return self.linear or self
 
     def parse(self, text: str) -> float:
-        """SI value of `text`; ValueError with a message for the user when it has none."""
+        """SI value of `text`, by the axis that is meant; ValueError with a message for the user."""
+        own = self.here
+        try:
+            return own.parse_own(text)
+        except ValueError as error:
+            raise ValueError(f"{error}{self._of_other_kind(text, own)}") from None
+
+    def _of_other_kind(self, text: str, own: Quantity) -> str:
+        """What to append where the unit would be one if the bench moved the other way."""
+        for other in {self, self.linear, self.through_lead} - {own, None}:
+            try:
+                other.parse_own(text)  # type: ignore[union-attr]
+            except ValueError:
+                continue
+            if self.of_motor:
+                kind = "rotary" if own is self else "linear"
+                return f"; the motor of this bench is {kind} (axis.kind, gear.lead)"
+            return (
+                f"; the axis of this bench is {'rotary' if own is self else 'linear'} (axis.kind)"
+            )
+        return ""
+
+    def parse_own(self, text: str) -> float:
+        """SI value of `text` by this very quantity, whatever the axis."""
         number, unit = split_quantity(text)
         if not unit:
             raise ValueError(f"{text!r} has no unit; expected a {self.name} such as {self.example}")
@@ -103,7 +147,7 @@ class Quantity:
             raise PydanticCustomError(
                 "quantity",
                 "{value} has no unit; write it as text, such as {example}",
-                {"value": value, "example": f'"{value:g} {self.display}"'},
+                {"value": value, "example": f'"{value:g} {self.here.display}"'},
             )
         return value
 
@@ -164,13 +208,60 @@ def factor(unit: str, to: str) -> float:
     return float(one.factor / other.factor)
 
 
+def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
+    """`5 mm/s`: a number (SI) with the unit that a reader is shown, of the axis that is meant.
+
+    `unit` and `display` are those of a rotary axis, such as rad/s and deg/s.
+    """
+    shown = unit_here(display)
+    return f"{convert(value, unit_here(unit), shown):{form}} {shown}"
+
+
+def angle_here(value: float, form: str = ".3g") -> str:
+    """`5 deg`, or `5 mm`, of an angle (rad) or a position (m)."""
+    return in_words(value, "rad", "deg", form)
+
+
+def rate_here(value: float, form: str = ".3g") -> str:
+    """`5 deg/s`, or `5 mm/s`, of a rate (rad/s or m/s)."""
+    return in_words(value, "rad/s", "deg/s", form)
+
+
+def shown_here(value: float, unit: str, display: str) -> float:
+    """A number (SI) in the unit that a reader is shown; see `in_words`."""
+    return float(convert(value, unit_here(unit), unit_here(display)))
+
+
 def _quantity(
-    name: str, si: str, display: str, *others: str, also: tuple[tuple[str, str], ...] = ()
+    name: str,
+    si: str,
+    display: str,
+    *others: str,
+    also: tuple[tuple[str, str], ...] = (),
+    linear: Quantity | None = None,
+    of_motor: bool = False,
 ) -> Quantity:
-    return Quantity(name, si, display, tuple(dict.fromkeys((display, si, *others))), also)
+    accepts = tuple(dict.fromkeys((display, si, *others)))
+    return Quantity(name, si, display, accepts, also, linear, of_motor)
 
 
-ANGLE = _quantity("angle", "rad", "deg", "mrad", "urad", "arcmin", "arcsec")
+POSITION = _quantity("position", "m", "mm", "um", "cm", "in")
+VELOCITY = _quantity("velocity", "m/s", "mm/s", "um/s", "mm/min", "m/min")
+ACCELERATION = _quantity("acceleration", "m/s^2", "mm/s^2")
+FORCE = _quantity("force", "N", "N", "mN", "kN", "lbf")
+FORCE_RATE = _quantity("force rate", "N/s", "N/s", "mN/s")
+MASS = _quantity("mass", "kg", "kg", "g", "lbm")
+FORCE_CONSTANT = _quantity("force constant", "N/A", "N/A", "mN/A")
+LINEAR_BACK_EMF_CONSTANT = _quantity("back-EMF constant", "V s/m", "V s/m", "mV s/mm")
+STIFFNESS = _quantity("stiffness", "N/m", "N/m", "kN/m", "N/mm", "N/um")
+DAMPING = _quantity("damping", "N s/m", "N s/m", "N s/mm")
+VELOCITY_GAIN = _quantity("velocity-to-current gain", "A s/m", "A s/m", "A s/mm")
+VELOCITY_INTEGRAL_GAIN = _quantity("integral velocity-to-current gain", "A/m", "A/m", "A/mm")
+
+PHASE = _quantity("phase", "rad", "deg", "mrad", "urad", "arcmin", "arcsec")
+ANGLE = _quantity("angle", "rad", "deg", "mrad", "urad", "arcmin", "arcsec", linear=POSITION)
+MOTOR_ANGLE = replace(ANGLE, of_motor=True)
+LEAD = _quantity("lead", "m/rev", "mm/rev", "m/rad", "in/rev")
 ANGULAR_RATE = _quantity(
     "angular rate",
     "rad/s",
@@ -180,35 +271,64 @@ ANGULAR_RATE = _quantity(
     "deg/hour",
     "rpm",
     also=(("1/min", "rpm"),),  # as data sheets print a speed
+    linear=VELOCITY,
 )
-ANGULAR_ACCELERATION = _quantity("angular acceleration", "rad/s^2", "deg/s^2", "mrad/s^2")
+ANGULAR_ACCELERATION = _quantity(
+    "angular acceleration", "rad/s^2", "deg/s^2", "mrad/s^2", linear=ACCELERATION
+)
 TIME = _quantity("time", "s", "s", "ms", "us", "min", "hour", "h")
 FREQUENCY = _quantity("frequency", "Hz", "Hz", "mHz", "kHz", "MHz")
-TORQUE = _quantity("torque", "N m", "N m", "mN m", "kN m", "ozf in", "lbf in")
-TORQUE_RATE = _quantity("torque rate", "N m/s", "N m/s", "mN m/s")
+TORQUE = _quantity("torque", "N m", "N m", "mN m", "kN m", "ozf in", "lbf in", linear=FORCE)
+TORQUE_RATE = _quantity("torque rate", "N m/s", "N m/s", "mN m/s", linear=FORCE_RATE)
 CURRENT = _quantity("current", "A", "A", "mA")
 VOLTAGE = _quantity("voltage", "V", "V", "mV")
 RESISTANCE = _quantity("resistance", "ohm", "ohm", "mohm")
 INDUCTANCE = _quantity("inductance", "H", "mH", "uH")
-INERTIA = _quantity("moment of inertia", "kg m^2", "kg m^2", "kg cm^2", "g m^2", "g cm^2")
-TORQUE_CONSTANT = _quantity("torque constant", "N m/A", "N m/A", "mN m/A")
+INERTIA = _quantity(
+    "moment of inertia", "kg m^2", "kg m^2", "kg cm^2", "g m^2", "g cm^2", linear=MASS
+)
+TORQUE_CONSTANT = _quantity(
+    "torque constant", "N m/A", "N m/A", "mN m/A", linear=FORCE_CONSTANT, of_motor=True
+)
 BACK_EMF_CONSTANT = _quantity(
-    "back-EMF constant", "V s/rad", "V s/rad", "mV s/rad", "V/rpm", "V/krpm"
+    "back-EMF constant",
+    "V s/rad",
+    "V s/rad",
+    "mV s/rad",
+    "V/rpm",
+    "V/krpm",
+    linear=LINEAR_BACK_EMF_CONSTANT,
+    of_motor=True,
 )
 ROTATIONAL_STIFFNESS = _quantity(
-    "rotational stiffness", "N m/rad", "N m/rad", "kN m/rad", "N m/mrad", "N m/deg"
+    "rotational stiffness",
+    "N m/rad",
+    "N m/rad",
+    "kN m/rad",
+    "N m/mrad",
+    "N m/deg",
+    linear=STIFFNESS,
 )
 ROTATIONAL_DAMPING = _quantity(
-    "rotational damping", "N m s/rad", "N m s/rad", "mN m s/rad", "N m s/deg"
+    "rotational damping", "N m s/rad", "N m s/rad", "mN m s/rad", "N m s/deg", linear=DAMPING
 )
-RATE_GAIN = _quantity("rate-to-current gain", "A s/rad", "A s/rad", "A s/deg")
+OBSERVER_GAIN = replace(
+    ROTATIONAL_DAMPING,
+    through_lead=_quantity("motor torque per velocity", "N m s/m", "N m s/m", "mN m s/m", "N s"),
+)
+RATE_GAIN = _quantity("rate-to-current gain", "A s/rad", "A s/rad", "A s/deg", linear=VELOCITY_GAIN)
 CURRENT_GAIN = _quantity("current-to-voltage gain", "V/A", "V/A", "mV/A")
 CURRENT_INTEGRAL_GAIN = _quantity("integral current-to-voltage gain", "V/A/s", "V/A/s", "V/(A s)")
-RATE_INTEGRAL_GAIN = _quantity("integral rate-to-current gain", "A/rad", "A/rad", "A/deg")
+RATE_INTEGRAL_GAIN = _quantity(
+    "integral rate-to-current gain", "A/rad", "A/rad", "A/deg", linear=VELOCITY_INTEGRAL_GAIN
+)
 INVERSE_TIME = _quantity("inverse time", "1/s", "1/s")
 LENGTH = _quantity("length", "m", "m", "mm", "cm", "km", "ft")
 
 Angle = Annotated[float, ANGLE]
+MotorAngle = Annotated[float, MOTOR_ANGLE]
+Phase = Annotated[float, PHASE]
+Lead = Annotated[float, LEAD]
 AngularRate = Annotated[float, ANGULAR_RATE]
 AngularAcceleration = Annotated[float, ANGULAR_ACCELERATION]
 Time = Annotated[float, TIME]
@@ -224,6 +344,7 @@ TorqueConstant = Annotated[float, TORQUE_CONSTANT]
 BackEmfConstant = Annotated[float, BACK_EMF_CONSTANT]
 RotationalStiffness = Annotated[float, ROTATIONAL_STIFFNESS]
 RotationalDamping = Annotated[float, ROTATIONAL_DAMPING]
+ObserverGain = Annotated[float, OBSERVER_GAIN]
 RateGain = Annotated[float, RATE_GAIN]
 CurrentGain = Annotated[float, CURRENT_GAIN]
 CurrentIntegralGain = Annotated[float, CURRENT_INTEGRAL_GAIN]

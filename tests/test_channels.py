@@ -12,6 +12,7 @@ import pytest
 from campaign.archive import open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.archive.writing.trial_file import TrialFile
+from campaign.axis_kind import BOTH_ROTARY
 from campaign.backends import sim
 from campaign.backends.replay import BACKEND as REPLAY
 from campaign.backends.replay import ReplayOptions
@@ -47,7 +48,7 @@ def test_the_simulated_bench_announces_what_its_archives_have_always_said() -> N
     known = [(c.name, (c.unit, c.label, c.display_unit, c.measured)) for c in sim.CHANNELS[1:]]
     assert known == list(RECORDED.items())
     for mode, expected in COMMANDED.items():
-        c = sim.COMMANDS[mode]
+        (c,) = sim.announced(["command"], mode, BOTH_ROTARY)
         assert (c.name, c.unit, c.label, c.display_unit, c.measured) == ("command", *expected)
     assert not any(channel.own_rate for channel in sim.CHANNELS)
 

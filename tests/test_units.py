@@ -217,6 +217,13 @@ ONE = (
 FACTORS = {
     **dict.fromkeys(ONE, 1.0),
     **dict.fromkeys(("deg", "deg/s", "deg/s^2"), 0.017453292519943295),
+    # Of a linear axis.
+    **dict.fromkeys(("kg", "N/m", "N s/m", "N/s", "m/s", "m/s^2", "A s/m", "A/m", "N m s/m"), 1.0),
+    **dict.fromkeys(("mm/s", "mm/s^2"), 1e-3),
+    **dict.fromkeys(("um", "um/s"), 1e-6),
+    **dict.fromkeys(("kN", "kN s/m"), 1e3),
+    "N/um": 1e6,
+    "mm/rev": 1.5915494309189533577e-4,
     **dict.fromkeys(("mrad", "mrad/s", "ms", "mH", "mA", "mm", "mHz"), 1e-3),
     "urad": 1e-6,
     "kHz": 1e3,

@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.axis_kind import sides_in, speaking_of
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import residuals, restricted
@@ -22,6 +23,7 @@ from campaign.experiments.interface import (
     bench_of,
     with_named_tables,
 )
+from campaign.experiments.preparing.of_its_axis import of_its_axis
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test
@@ -210,7 +212,8 @@ class Simulation:
         first = finished[0].trial
         data = TestData(name, test.entry.kind, first.options, finished)
         try:
-            findings = experiment.analyse(with_named_tables(data)).findings
+            with speaking_of(sides_in(data.trials[0].trial.bench)):
+                findings = of_its_axis(experiment.analyse(with_named_tables(data))).findings
         except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
             problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
             findings = ()

@@ -17,12 +17,12 @@ from campaign.calibration.targets import (
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.identification.unknowns import Unknown
 from campaign.physics.bench import Bench
+from campaign.physics.known import number_at
 from campaign.protocol import Protocol
 from campaign.protocol.calibration import Calibration, CalibrationOptions, CalibrationParameter
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, find_faults, nearest, shown
 from campaign.protocol.schema import Test
-from campaign.protocol.shapes import shape_at
 from campaign.published.values import Cell, Published
 from campaign.units import Quantity, split_quantity
 
@@ -240,8 +240,8 @@ class _Reader:
         return True
 
     def _quantity(self, path: str) -> Quantity | None:
-        shape = shape_at(Bench, self._bench, tuple(path.split(".")))
-        return shape.quantity if shape is not None else None
+        found = number_at(Bench.model_validate(self._bench, context={"si": True}), path)
+        return None if found is None else found[1]
 
     def _bound(
         self, index: int, side: str, written: str | float, quantity: Quantity | None
@@ -253,7 +253,7 @@ class _Reader:
                         f"{written:g} has no unit; expected a {quantity.name} such as "
                         f"{quantity.example}"
                     )
-                return quantity.parse(written)
+                return quantity.parse_own(written)
             if isinstance(written, str):
                 raise ValueError(f"{shown(written)} is text; this field is a number without a unit")
             return float(written)

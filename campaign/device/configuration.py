@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.limits import margins
 from campaign.trial import Task, Trial
 from campaign.wire.codes import NakCode
@@ -34,11 +35,12 @@ def check_name(name: str) -> None:
         raise Refused(NakCode.UNKNOWN_NAME, name, f"names begin with one of {', '.join(TABLES)}")
 
 
-def make_trial(bench: Bench, parameters: Mapping[str, Value]) -> Trial:
+def make_trial(bench: CompleteBench, parameters: Mapping[str, Value]) -> Trial:
     """The trial that `parameters` describe, on `bench` (what the controller stands before).
 
-    Controller gains and limits are wholly the host's; of the bench itself only what a person can
-    have set to it. Raises Refused.
+    Limits and the gains of each loop that the host sets are wholly the host's, those of a loop that
+    it does not name are the controller's own; of the bench itself only what a person can have set
+    to it. Raises Refused.
     """
     try:
         tree = nest(parameters)
@@ -59,15 +61,23 @@ def make_trial(bench: Bench, parameters: Mapping[str, Value]) -> Trial:
     return Trial(number=1, test=REHEARSAL, kind=REHEARSAL, seed=seed, bench=tree, task=task)
 
 
-def _bench(bench: Bench, tree: Mapping[str, Any], by_person: Mapping[str, Any]) -> Bench:
+def _bench(
+    bench: CompleteBench, tree: Mapping[str, Any], by_person: Mapping[str, Any]
+) -> CompleteBench:
     base = bench.model_dump(mode="json")
+    own = base["controller"]
     for table in ("controller", "limits"):
         if table in tree:
             base[table] = tree[table]
+    if isinstance(
+        base["controller"], Mapping
+    ):  # a host that knows no gains leaves them as they are
+        gains = {loop: own[loop] for loop in ("rate", "current")}
+        base["controller"] = {**gains, **base["controller"]}
     base["compensation"] = {**base["compensation"], **tree.get("compensation", {})}
     base = _merged(base, by_person)
     try:
-        return Bench.model_validate(base, context={"si": True})
+        return complete(Bench.model_validate(base, context={"si": True}))
     except ValidationError as error:
         raise _refused(error, "") from None
 
@@ -81,7 +91,7 @@ def _task(tree: Mapping[str, Any], rehearsal: Mapping[str, Any]) -> Task:
         raise _refused(error, "task.") from None
 
 
-def _check_limits(own: Bench, bench: Bench, task: Task) -> None:
+def _check_limits(own: CompleteBench, bench: CompleteBench, task: Task) -> None:
     for name, bound in own.limits:
         wanted = getattr(bench.limits, name)
         if wanted > bound * (1 + 1e-9):
@@ -89,7 +99,7 @@ def _check_limits(own: Bench, bench: Bench, task: Task) -> None:
             raise Refused(NakCode.OUT_OF_RANGE, f"limits.{name}", text)
     for margin in margins(bench, task):
         if margin.broken:
-            text = f"the {margin.limit} would come to {margin.value:.6g} {margin.unit}"
+            text = f"the {margin.called} would come to {margin.value:.6g} {margin.unit}"
             text += f"; the limit is {margin.bound:.6g}"
             raise Refused(NakCode.LIMIT, f"limits.{margin.limit}", text)
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
-from campaign.backends.sim import CHANNELS, COMMANDS, SimBackend, SimOptions
+from campaign.axis_kind import sides_in
+from campaign.backends.sim import CHANNELS, SimBackend, SimOptions, announced
 from campaign.device.clock import Now, Pace
 from campaign.device.faults import FaultName, FaultSpec
 from campaign.device.log import DeviceLog
@@ -16,7 +17,7 @@ from campaign.device.motion import Motion, Strike
 from campaign.device.producer import Producer
 from campaign.device.ring import Ring
 from campaign.device.temperature import Winding
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.trial import Ending, Outcome, Trial
 from campaign.wire.device import Channel
 from campaign.wire.messages import Record
@@ -40,7 +41,7 @@ class Setup:
         latch_file: where the latch is remembered; None: nowhere, as without lasting memory.
     """
 
-    bench: Bench
+    bench: CompleteBench
     speed: float = 1.0
     faults: Sequence[FaultSpec] = ()
     wake: Callable[[], None] = lambda: None
@@ -105,9 +106,10 @@ class Machine:
     def arm(self, trial: Trial) -> tuple[Channel, ...]:
         """Get ready for `trial`; what it will record."""
         self.drop()
+        names = [channel.name for channel in CHANNELS]
         channels = tuple(
             Channel(info.name, info.unit, info.display_unit, info.label, info.measured)
-            for info in (COMMANDS[trial.task.mode], *CHANNELS[1:])
+            for info in announced(names, trial.task.mode, sides_in(trial.bench))
         )
         producer = Producer(self._backend, trial, self._setup.wake)
         producer.begin()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.trial import MemoryRecorder, Task, Trial
 
 
-def warm_up(bench: Bench) -> None:
+def warm_up(bench: CompleteBench) -> None:
     """Simulate some milliseconds, so that everything is compiled and imported afterwards."""
     rate = bench.controller.sample_rate or 1000.0
     task = Task(mode="rate", duration=2.5 / rate, window=(0.0, 0.0), sample_rate=rate)

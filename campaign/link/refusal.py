@@ -21,8 +21,15 @@ class Refusal:
     a person sets, and it stays that way until a person sets it again.
     """
 
-    def __init__(self, *, base_motion: bool) -> None:
+    def __init__(
+        self,
+        *,
+        base_motion: bool,
+        remedy: str = "`--set backend.motion=emulated` has a rehearsal controller emulate one",
+    ) -> None:
+        """`base_motion`: whether a device moves the hull; `remedy`: how there would be one."""
         self._base_motion = base_motion
+        self._remedy = remedy
         self._plants: dict[str, dict[str, Any]] = {}  # by the name of the bench
         self._trials: dict[str, str] = {}  # the trial that last had it
 
@@ -40,10 +47,7 @@ class Refusal:
         if task.disturbance.shape != "zero":
             return "task.disturbance: only a simulated bench can be pushed from outside"
         if task.base_acceleration.shape != "zero" and not self._base_motion:
-            return (
-                "task.base_acceleration: there is no device that moves the hull; "
-                "`--set backend.motion=emulated` has a rehearsal controller emulate one"
-            )
+            return f"task.base_acceleration: there is no device that moves the hull; {self._remedy}"
         return None
 
     def _of_sweep(self, trial: Trial) -> str | None:

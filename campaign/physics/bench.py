@@ -5,26 +5,31 @@ Symbols are the thesis' (Figure 5.3, Table 5.1, appendix); every number is SI af
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     Field,
     ModelWrapValidatorHandler,
+    SerializerFunctionWrapHandler,
     ValidationInfo,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
+from campaign.axis_kind import AxisKind, Sides, sides_in, speaking_of
 from campaign.options import Options
+from campaign.physics.bench_paths import in_former_spelling, wrong_paths
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
-from campaign.physics.friction_paths import Keys, as_written, invalid
+from campaign.physics.friction.interface import FrictionOptions
+from campaign.physics.friction_paths import invalid
+from campaign.physics.gear import GearOptions
 from campaign.physics.known import KnownOptions, in_one_place, known_in_si
-from campaign.physics.preload import FORMER as FORMER_PRELOAD
-from campaign.physics.preload import PreloadOptions, loading, with_preload, wrong_shares
-from campaign.physics.scatter import FORMER as FORMER_VARIATION
-from campaign.physics.scatter import VariationOptions, acting, wrong_scatter
+from campaign.physics.preload import loading, with_preload
+from campaign.physics.scatter import VariationOptions, acting
+from campaign.physics.sensors import SensorsOptions
 from campaign.units import (
     Angle,
     AngularAcceleration,
@@ -51,8 +56,20 @@ class AxisOptions(Options):
 
     name: str
     """Which axis of the platform this is, e.g. azimuth."""
-    inertia: Inertia = Field(gt=0)
+    kind: Literal["rotary", "linear"] = "rotary"
+    """How it moves. Of a linear axis every angle is a position, every torque a force."""
+    inertia: Inertia | None = Field(default=None, gt=0)
     """J: effective moment of inertia of motor, transmission and load, seen at the load."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A rotary axis is archived as it was before there was another: its trials keep their
+        fingerprints.
+        """
+        tree: dict[str, Any] = dump(self)
+        if self.kind == "rotary":
+            tree.pop("kind", None)
+        return tree
 
 
 class MotorOptions(Options):
@@ -60,21 +77,12 @@ class MotorOptions(Options):
 
     torque_constant: TorqueConstant = Field(gt=0)
     """Kt: motor torque per ampere."""
-    back_emf_constant: BackEmfConstant = Field(ge=0)
+    back_emf_constant: BackEmfConstant | None = Field(default=None, ge=0)
     """Ke: voltage per rate of the motor shaft relative to the hull."""
-    resistance: Resistance = Field(gt=0)
+    resistance: Resistance | None = Field(default=None, gt=0)
     """R: armature resistance."""
-    inductance: Inductance = Field(gt=0)
+    inductance: Inductance | None = Field(default=None, gt=0)
     """L: armature inductance."""
-
-
-class GearOptions(Options):
-    """The gear between motor and load."""
-
-    ratio: float = Field(gt=0)
-    """N: motor rate over load rate."""
-    preload: PreloadOptions | None = None
-    """Its anti-backlash preload; absent: the friction parameters say it all."""
 
 
 class IdealRateController(Options):
@@ -141,14 +149,20 @@ class ParallelCurrentController(Options):
         return self.integral
 
 
+RateController = Annotated[
+    IdealRateController | ParallelRateController, Field(discriminator="form")
+]
+CurrentController = Annotated[
+    IdealCurrentController | ParallelCurrentController, Field(discriminator="form")
+]
+
+
 class ControllerOptions(Options):
     """The nested loops: rate outside, current inside (Figure 5.3)."""
 
-    rate: Annotated[IdealRateController | ParallelRateController, Field(discriminator="form")]
+    rate: RateController | None = None
     """The rate (velocity) PI, fed by the gyro."""
-    current: Annotated[
-        IdealCurrentController | ParallelCurrentController, Field(discriminator="form")
-    ]
+    current: CurrentController | None = None
     """The current PI. It stays continuous when the rate loop is sampled."""
     sample_rate: Frequency | None = Field(default=None, gt=0, le=1e5)
     """Rate at which the rate loop and the compensation run; absent: they are continuous."""
@@ -168,39 +182,6 @@ class ControllerOptions(Options):
         return delay
 
 
-class RateSensor(Options):
-    """A sensor of angular rate, read by the sampled controller."""
-
-    noise: AngularRate = Field(default=0.0, ge=0)
-    """Standard deviation of white noise per sample."""
-    resolution: AngularRate = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
-    delay: Time = Field(default=0.0, ge=0, le=1.0)
-    """Age of a reading, rounded to whole controller samples."""
-
-
-class AngleSensor(Options):
-    """A sensor of angle relative to the hull, read by the sampled controller."""
-
-    noise: Angle = Field(default=0.0, ge=0)
-    """Standard deviation of white noise per sample."""
-    resolution: Angle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
-    delay: Time = Field(default=0.0, ge=0, le=1.0)
-    """Age of a reading, rounded to whole controller samples."""
-
-
-class CurrentSensor(Options):
-    """The sensor of motor current, read by the sampled controller."""
-
-    noise: Current = Field(default=0.0, ge=0)
-    """Standard deviation of white noise per sample."""
-    resolution: Current = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
-    delay: Time = Field(default=0.0, ge=0, le=1.0)
-    """Age of a reading, rounded to whole controller samples."""
-
-
 class AppendageOptions(Options):
     """An elastic part of the load: an inertia on a spring, seen by the gyro only through the load.
 
@@ -213,19 +194,6 @@ class AppendageOptions(Options):
     """Its natural frequency when the load is held still."""
     damping_ratio: float = Field(ge=0, le=2)
     """Its damping ratio when the load is held still."""
-
-
-class SensorsOptions(Options):
-    """What the controller sees. A continuous controller sees everything exactly."""
-
-    gyro: RateSensor = RateSensor()
-    """Inertial rate of the load."""
-    encoder: AngleSensor = AngleSensor()
-    """Angle of the load relative to the hull."""
-    resolver: AngleSensor = AngleSensor()
-    """Angle of the motor shaft relative to the hull (motor side: N times the load's)."""
-    current: CurrentSensor = CurrentSensor()
-    """Motor current."""
 
 
 class LimitsOptions(Options):
@@ -252,7 +220,7 @@ class LimitsOptions(Options):
 
 
 class Bench(Options):
-    """A platform under test."""
+    """A platform under test: what is known of it. `complete` says what a simulation needs more."""
 
     name: str
     """Its name, in the archive and on the page."""
@@ -264,22 +232,22 @@ class Bench(Options):
     """The stabilized axis."""
     appendage: AppendageOptions | None = None
     """An elastic part of the load; absent: it is rigid."""
-    motor: MotorOptions
+    motor: MotorOptions | None = None
     """The servo motor."""
-    gear: GearOptions
+    gear: GearOptions | None = None
     """The gear."""
-    friction: dict[str, FrictionField] = Field(min_length=0, max_length=8)
+    friction: dict[str, FrictionField] = Field(default={}, max_length=8)
     """The true friction, by interface (`load`, `motor` ...); `friction = {}` where unknown."""
     variation: VariationOptions | None = None
     """How the friction of a simulated bench scatters; absent: it is always the same."""
-    controller: ControllerOptions
+    controller: ControllerOptions | None = None
     """The loops."""
     sensors: SensorsOptions = SensorsOptions()
     """The sensors."""
     compensation: dict[str, CompensationField] = {}
     """Compensation methods tuned for this bench, by the name that a test uses."""
-    limits: LimitsOptions
-    """The limits."""
+    limits: LimitsOptions | None = None
+    """The limits; without them nothing may be moved."""
 
     @model_validator(mode="before")
     @classmethod
@@ -305,6 +273,8 @@ class Bench(Options):
         controller = info.data.get("controller")
         if controller is None or controller.sample_rate is not None:
             return sensors
+        if controller.rate is None or controller.current is None:
+            return sensors  # nobody says that it is continuous
         flaws = [
             f"{sensor}.{name}"
             for sensor in SensorsOptions.model_fields
@@ -321,34 +291,56 @@ class Bench(Options):
     @model_validator(mode="after")
     def _leave_friction(self) -> Bench:
         """A preload below its nominal one must not take more friction away than there is."""
-        with_preload(self.friction, self.gear.ratio, self.gear.preload)
+        if self.gear is not None:
+            with_preload(self.friction, self.gear.ratio, self.gear.preload)
+            return self
+        for name, each in self.friction.items():
+            if "motor" in (each.side, each.velocity):
+                raise ValueError(f"'friction.{name}' is of the motor's side: add gear.ratio")
         return self
 
     @model_validator(mode="wrap")
     @classmethod
     def _paths_lead_somewhere(
-        cls, tree: Any, handler: ModelWrapValidatorHandler[Bench], info: ValidationInfo
-    ) -> Bench:
+        cls, tree: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
+    ) -> Self:
         """Scatter, preload and what is known name what is there; all else would silently not be.
 
         In the archive of a program that did not look, it was not: it is left out.
         """
-        bench = handler(tree)
+        with speaking_of(sides_in(tree)):
+            bench = handler(tree)
         archived = isinstance(info.context, Mapping) and info.context.get("si")
-        wrong = list(_wrong_paths(bench, tree))
-        if wrong and archived and _in_former_spelling(tree):
+        preload = None if bench.gear is None else bench.gear.preload
+        wrong = list(wrong_paths(tree, bench.friction, bench.variation, preload))
+        if bench.gear is not None and bench.gear.lead is not None and not bench.is_linear:
+            message = "a lead turns revolutions into travel, and the axis is rotary (axis.kind)"
+            wrong.append((("gear", "lead"), message))
+        if wrong and archived and in_former_spelling(tree):
             return bench.with_friction(bench.friction)
         if wrong:
             raise invalid(wrong)
         # What is archived is SI, and an experiment's own bench may lack what is known of the whole.
         return bench if archived else bench.model_copy(update={"known": known_in_si(bench)})
 
-    def with_friction(self, friction: Mapping[str, Any]) -> Bench:
+    @property
+    def is_linear(self) -> bool:
+        """Whether its axis travels instead of turning."""
+        return self.axis.kind == AxisKind.LINEAR.value
+
+    @property
+    def sides(self) -> Sides:
+        """How its axis and its motor move."""
+        load = AxisKind(self.axis.kind)
+        driven = self.gear is not None and self.gear.lead is not None
+        return Sides(load, AxisKind.ROTARY if driven else load)
+
+    def with_friction(self, friction: Mapping[str, Any]) -> Self:
         """This bench with other friction, and what scatter and preload say of that alone."""
         update: dict[str, Any] = {"friction": dict(friction)}
         if self.variation is not None:
             update["variation"] = acting(self.variation, friction)
-        if self.gear.preload is not None:
+        if self.gear is not None and self.gear.preload is not None:
             preload = loading(self.gear.preload, friction)
             update["gear"] = self.gear.model_copy(update={"preload": preload})
         return self.model_copy(update=update)
@@ -361,35 +353,14 @@ class Bench(Options):
         known = self.known.values.get(path)
         return None if known is None else known.standard_deviation
 
+    def at_load(self, friction: FrictionOptions) -> tuple[float, float]:
+        """What one N m of an interface counts at the load, and its rate per load relative rate."""
+        # Where no gear is known nothing is of the motor's side, and no ratio is asked for.
+        return friction.at_load(1.0 if self.gear is None else self.gear.ratio)
+
     @property
-    def torque_per_current(self) -> float:
-        """N Kt: torque at the load per ampere (N m/A)."""
+    def torque_per_current(self) -> float | None:
+        """N Kt: torque at the load per ampere (N m/A); None where gear or motor are not known."""
+        if self.gear is None or self.motor is None:
+            return None
         return self.gear.ratio * self.motor.torque_constant
-
-
-_VARIATION: Keys = ("variation",)
-_PRELOAD: Keys = ("gear", "preload")
-
-
-def _wrong_paths(bench: Bench, tree: Any) -> Iterator[tuple[Keys, str]]:
-    """Where in `tree`, as written, a path leads nowhere on `bench`, and the message."""
-    if bench.variation is not None:
-        raw = _at(tree, _VARIATION)
-        for wrong in wrong_scatter(bench.variation, bench.friction):
-            yield (*_VARIATION, *as_written(raw, wrong.keys, FORMER_VARIATION)), wrong.message
-    if bench.gear.preload is not None:
-        raw = _at(tree, _PRELOAD)
-        for wrong in wrong_shares(bench.gear.preload, bench.friction):
-            yield (*_PRELOAD, *as_written(raw, wrong.keys, FORMER_PRELOAD)), wrong.message
-
-
-def _in_former_spelling(tree: Any) -> bool:
-    written = {*_at(tree, _VARIATION), *_at(tree, _PRELOAD)}
-    return bool(written & {*FORMER_VARIATION, *FORMER_PRELOAD})
-
-
-def _at(tree: Any, keys: Keys) -> Mapping[str, Any]:
-    """The table at `keys`; an empty one when there is none."""
-    for key in keys:
-        tree = tree.get(key) if isinstance(tree, Mapping) else None
-    return tree if isinstance(tree, Mapping) else {}

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from campaign.axis_kind import speaking_of, unit_here, words_here
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete, control_rate, lacking
 from campaign.physics.friction import friction_models
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
@@ -62,10 +64,11 @@ class _Scale:
 
     def __call__(self, subject: str, value: float, against: float, unit: str, display: str) -> Fact:
         share = value / against
+        subject, unit, display = words_here(subject), unit_here(unit), unit_here(display)
         if share <= self.fine:
             return Fact(subject, value, against, unit, display, "fine", "")
         word = self.words[0] if share <= self.usable else self.words[1]
-        return Fact(subject, value, against, unit, display, word, self.advice)
+        return Fact(subject, value, against, unit, display, word, words_here(self.advice))
 
 
 _COARSE = ("coarse", "too coarse")
@@ -119,10 +122,12 @@ _CURRENT_LOOP = _Scale(
 def facts_of(bench: Bench) -> tuple[Fact, ...]:
     """All that can be told of this bench, on its day; what it does not have is left out."""
     today = of_its_day(bench)
-    return (*_sensors(today), *_presliding(today), *_torques(today), *_bandwidths(bench))
+    with speaking_of(bench.sides):
+        found = (*_sensors(today), *_presliding(today), *_torques(today))
+        return found if lacking(bench) else (*found, *_bandwidths(complete(bench)))
 
 
-def current_bandwidth(bench: Bench) -> float:
+def current_bandwidth(bench: CompleteBench) -> float:
     """Frequency (rad/s) at which i / i* falls by 3 dB with the motor held still.
 
     (Kpc s + Kic) / (L s^2 + (R + Kpc) s + Kic), from |i / i*|^2 = 1/2, quadratic in omega^2.
@@ -140,31 +145,31 @@ def current_bandwidth(bench: Bench) -> float:
 def rate_steps(bench: Bench) -> dict[str, float]:
     """The rate at the load (rad/s) that one count of encoder or resolver looks like in one sample.
 
-    Behind the low-pass of the relative rate. Empty for a controller that sees everything exactly.
+    Behind the low-pass of the relative rate. Empty for a controller that sees everything exactly,
+    and without the resolver where nobody says what gear it sits behind.
     """
     gains, sensors = bench.controller, bench.sensors
-    if gains.sample_rate is None:
+    if gains is None or gains.sample_rate is None:
         return {}
     low_pass = gains.relative_rate_filter
     passed = -math.expm1(-1.0 / (gains.sample_rate * low_pass)) if low_pass > 0 else 1.0
-    counts = {
-        "encoder": sensors.encoder.resolution,
-        "resolver": sensors.resolver.resolution / bench.gear.ratio,
-    }
+    counts = {"encoder": sensors.encoder.resolution}
+    if bench.gear is not None:
+        counts["resolver"] = sensors.resolver.resolution / bench.gear.ratio
     return {name: passed * gains.sample_rate * count for name, count in counts.items() if count > 0}
 
 
 def _sensors(bench: Bench) -> Iterator[Fact]:
     gyro, current, limits = bench.sensors.gyro, bench.sensors.current, bench.limits
     slowest = min(_values(bench, "stribeck_velocity"), default=None)
-    if gyro.resolution > 0:
+    if limits is not None and gyro.resolution > 0:
         subject = "one count of the gyro against the rate limit"
         yield _READING(subject, gyro.resolution, limits.rate, "rad/s", "deg/s")
-    if current.resolution > 0:
+    if limits is not None and current.resolution > 0:
         subject = "one count of the current sensor against the current limit"
         yield _READING(subject, current.resolution, limits.current, "A", "A")
-    rate = bench.controller.sample_rate
-    if rate is not None and bench.sensors.encoder.resolution > 0:
+    rate = control_rate(bench)
+    if limits is not None and rate is not None and bench.sensors.encoder.resolution > 0:
         step = rate_of_one_count(bench, rate, rate)
         subject = "one count of the encoder over limits.rate_time against the rate limit"
         yield _RATE_STEP(subject, step, limits.rate, "rad/s", "deg/s")
@@ -199,18 +204,22 @@ def _presliding(bench: Bench) -> Iterator[Fact]:
 
 def _torques(bench: Bench) -> Iterator[Fact]:
     static = worst_friction(bench, SLOW)
-    if static <= 0:
-        return
     limits, per_ampere = bench.limits, bench.torque_per_current
+    if static <= 0 or limits is None:
+        return
     yield _TORQUE("static friction against the torque limit", static, limits.torque, "N m", "N m")
+    if per_ampere is None:
+        return
     subject = "static friction against the torque at the current limit"
     yield _TORQUE(subject, static, per_ampere * limits.current, "N m", "N m")
+    if bench.controller is None or bench.controller.rate is None:
+        return
     error = static / (per_ampere * bench.controller.rate.proportional)
     subject = "rate error at which the proportional gain alone breaks away, against the rate limit"
     yield _AUTHORITY(subject, error, limits.rate, "rad/s", "deg/s")
 
 
-def _bandwidths(bench: Bench) -> Iterator[Fact]:
+def _bandwidths(bench: CompleteBench) -> Iterator[Fact]:
     """The rate loop's crossover against what has to be faster than it; sliding, uncompensated."""
     loop = dict(loops_of(bench, "none", "rate"))["sliding"]
     crossovers = loop.crossovers if isinstance(loop, LoopMargins) else ()

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.physics.alike import alike, side_by_side
-from campaign.physics.bench import Bench
 from campaign.physics.blocks import Dry, Elements, by_lane, zeros
+from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import DryFriction, FrictionOptions
 from campaign.physics.loop import Array, at_load, viscous_at_load
@@ -71,7 +71,9 @@ class Interface:
     dry: DryInterface | None
 
     @classmethod
-    def of(cls, options: FrictionOptions, gain: float, bench: Bench, solved: bool) -> Interface:
+    def of(
+        cls, options: FrictionOptions, gain: float, bench: CompleteBench, solved: bool
+    ) -> Interface:
         """`solved`: by the engine, if the model is dry; else its step function says all."""
         model = friction_models()[options.model]  # type: ignore[attr-defined]
         torque, rate = at_load(options, bench)

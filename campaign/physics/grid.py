@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from campaign.physics import step_choice
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.physics.step_choice import StepChoice
 from campaign.signals import MultiSine, Sine
 from campaign.trial import Task
@@ -36,7 +36,7 @@ class Grid:
     because: str = ""
 
 
-def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Grid:
+def make_grid(bench: CompleteBench, task: Task, longest_step: float | None = None) -> Grid:
     """Steps that divide both the recording's and the controller's sample time.
 
     `longest_step` (s) is what the trial needs (`step_choice`) when None. Raises ValueError when the
@@ -77,7 +77,7 @@ def make_grid(bench: Bench, task: Task, longest_step: float | None = None) -> Gr
     return Grid(step, per_control * round(per_record), per_control, samples, because)
 
 
-def _choice(bench: Bench, task: Task) -> StepChoice:
+def _choice(bench: CompleteBench, task: Task) -> StepChoice:
     choice = step_choice.longest_step(bench, task)
     if choice.refused is not None:
         raise ValueError(

@@ -13,6 +13,7 @@ from typing import Any, Literal, Self, get_args
 
 from pydantic import BaseModel, Field, model_validator
 
+from campaign.axis_kind import BOTH_ROTARY
 from campaign.options import Options
 from campaign.physics.friction_paths import Keys, invalid
 from campaign.units import Quantity, split_quantity
@@ -92,18 +93,21 @@ def number_at(bench: BaseModel, path: str) -> tuple[float, Quantity | None] | No
     """The number at a dotted path of a bench (SI) and its quantity; None where there is none."""
     here: Any = bench
     quantity: Quantity | None = None
+    sides = getattr(bench, "sides", BOTH_ROTARY)
     for key in path.split("."):
         if isinstance(here, Mapping) and key in here:
             here = here[key]
         elif isinstance(here, BaseModel) and key in type(here).model_fields:
             field = type(here).model_fields[key]
+            if getattr(here, "side", "") == "motor":
+                sides = sides.at_motor
             quantity = next(_quantities((*field.metadata, field.annotation)), None)
             here = getattr(here, key)
         else:
             return None
     if isinstance(here, bool) or not isinstance(here, int | float):
         return None
-    return float(here), quantity
+    return float(here), quantity and quantity.of(sides)
 
 
 def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:
@@ -213,4 +217,4 @@ def _number(written: Number, value: float, quantity: Quantity | None, *, relativ
         return abs(value) * share / 100.0
     if quantity is None:
         raise ValueError(f"'{written}' is text, and the value is a number without a unit")
-    return quantity.parse(written)
+    return quantity.parse_own(written)

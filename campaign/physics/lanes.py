@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from campaign.physics.base_motion import base_rate
-from campaign.physics.bench import AngleSensor, Bench, CurrentSensor, RateSensor
 from campaign.physics.blocks import (
     Controller,
     Elements,
@@ -20,6 +19,7 @@ from campaign.physics.blocks import (
     zeros,
 )
 from campaign.physics.compensation.interface import Compensator
+from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import jumps
 from campaign.physics.friction_elements import (
     Interface,
@@ -67,8 +67,8 @@ class Lane:
         inputs: those that act on the loop, in the order of their signals.
     """
 
-    bench: Bench
-    stated: Bench
+    bench: CompleteBench
+    stated: CompleteBench
     task: Task
     seed: int
     grid: Grid
@@ -84,11 +84,11 @@ class Lane:
     @classmethod
     def of(
         cls,
-        bench: Bench,
+        bench: CompleteBench,
         task: Task,
         seed: int,
         longest_step: float | None = None,
-        stated: Bench | None = None,
+        stated: CompleteBench | None = None,
     ) -> Lane:
         """Raises ValueError when the task's rates do not fit the bench's.
 
@@ -131,7 +131,7 @@ class Lane:
     def structure(self) -> Hashable:
         """Trials with equal structures can be simulated together."""
         grid, mode = self.grid, "plant" if self.grid.per_control else self.task.mode
-        sensors = [(sensor.noise > 0.0, sensor.delay) for sensor in _sensors(self.bench)]
+        sensors = [(sensor.noise > 0.0, sensor.delay) for sensor in self.bench.sensors.in_order]
         block = self.compensator.linear
         sampled = (
             grid.per_control and self.task.mode,
@@ -216,7 +216,9 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
     )
 
 
-def _loop(bench: Bench, task: Task, compensator: Compensator, grid: Grid, stated: Bench) -> Loop:
+def _loop(
+    bench: CompleteBench, task: Task, compensator: Compensator, grid: Grid, stated: CompleteBench
+) -> Loop:
     match task.mode:
         case "spring":
             return make_spring(bench, task.spring_stiffness)
@@ -317,15 +319,9 @@ def _filled_up(array: Array, shape: tuple[int, int]) -> Array:
     return np.pad(array, [(0, most - have) for most, have in zip(shape, array.shape, strict=True)])
 
 
-def _sensors(bench: Bench) -> tuple[RateSensor, AngleSensor, AngleSensor, CurrentSensor]:
-    """In the order of `rows.SENSORS`."""
-    sensors = bench.sensors
-    return sensors.gyro, sensors.encoder, sensors.resolver, sensors.current
-
-
 def _sigmas(lane: Lane) -> Array:
     """Standard deviations of the sensors that are noisy."""
-    return np.array([sensor.noise for sensor in _sensors(lane.bench) if sensor.noise > 0.0])
+    return np.array([sensor.noise for sensor in lane.bench.sensors.in_order if sensor.noise > 0.0])
 
 
 def _controller(lanes: Sequence[Lane]) -> Controller:
@@ -333,14 +329,14 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
     per_control, gains = first.grid.per_control, first.bench.controller
     period = _period(first)
     delay_steps = math.ceil(gains.delay / first.grid.step - 1e-9)
-    sensors = _sensors(first.bench)
+    sensors = first.bench.sensors.in_order
     noisy = np.cumsum([sensor.noise > 0.0 for sensor in sensors]) - 1
     blocks = [_discrete_block(lane) for lane in lanes]
 
     def each(value: Callable[[Lane], Any]) -> Array:
         return by_lane([value(lane) for lane in lanes])
 
-    resolution = each(lambda lane: [sensor.resolution for sensor in _sensors(lane.bench)])
+    resolution = each(lambda lane: [sensor.resolution for sensor in lane.bench.sensors.in_order])
     return Controller(
         every=per_control,
         closes_rate_loop=first.task.mode == "rate",

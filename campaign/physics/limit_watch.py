@@ -33,8 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, words_here
 from campaign.physics.bench import LimitsOptions
-from campaign.units import convert
+from campaign.units import in_words
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,10 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Watched:
-    """A limit that is watched in motion, and the channel that it is watched in."""
+    """A limit that is watched in motion, and the channel that it is watched in.
+
+    Units are those of a rotary axis.
+    """
 
     limit: str
     channel: str
@@ -97,8 +101,21 @@ class LimitWatch:
         unwatched: limits whose channel is not recorded.
     """
 
-    def __init__(self, limits: LimitsOptions, sample_rate: float, channels: Sequence[str]) -> None:
-        """`channels`: names, in the order of the blocks; `sample_rate` of the recording (Hz)."""
+    def __init__(
+        self,
+        limits: LimitsOptions,
+        sample_rate: float,
+        channels: Sequence[str],
+        sides: Sides = BOTH_ROTARY,
+    ) -> None:
+        """A watch over one trial.
+
+        Args:
+            sample_rate: of the recording (Hz).
+            channels: names, in the order of the blocks.
+            sides: how the bench moves, for the words of a violation.
+        """
+        self._sides = sides
         rows = {name: row for row, name in enumerate(channels)}
         self._watched = [
             (each, rows[each.channel], float(getattr(limits, each.limit)))
@@ -162,13 +179,17 @@ class LimitWatch:
     def _violation(
         self, watched: Watched, index: int, value: float, bound: float, time: float
     ) -> Violation:
-        shown, limit = (convert(x, watched.unit, watched.display) for x in (value, bound))
+        with speaking_of(self._sides):
+            text = self._text(watched, value, bound, time)
+        sample = self._seen + index
+        return Violation(sample, index, watched.limit, watched.channel, value, bound, text)
+
+    def _text(self, watched: Watched, value: float, bound: float, time: float) -> str:
+        shown, limit = (in_words(x, watched.unit, watched.display, ".6g") for x in (value, bound))
         mean = ""
         if watched.limit == "rate" and self._count > 1:
             mean = f" (mean of {self._count / self._sample_rate * 1e3:.4g} ms)"
-        text = (
-            f"{watched.channel} reached {shown:.6g} {watched.display}{mean} at {time:.4g} s; "
-            f"the {watched.limit} limit is {limit:.6g} {watched.display}"
+        return (
+            f"{watched.channel} reached {shown}{mean} at {time:.4g} s; "
+            f"the {words_here(watched.limit)} limit is {limit}"
         )
-        sample = self._seen + index
-        return Violation(sample, index, watched.limit, watched.channel, value, bound, text)

@@ -15,7 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.axis_kind import speaking_of, unit_here
 from campaign.physics.bench import Bench
+from campaign.physics.complete import lacking, limits_of
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.trial import Task
 
@@ -32,6 +34,9 @@ POINTS_OF_A_LINE = 1001
 """at which a polyline is looked at besides its knots."""
 SPEEDS = 121
 """at which friction is looked at."""
+
+
+_CALLED = {("angle", "m"): "position", ("torque", "N"): "force"}
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,11 @@ class Margin:
     def fraction(self) -> float:
         """Share of the limit that is used; above 1 it is broken."""
         return self.value / self.bound
+
+    @property
+    def called(self) -> str:
+        """The limit in words: a linear axis has a position and a force, under the same names."""
+        return _CALLED.get((self.limit, self.unit), self.limit)
 
     @property
     def broken(self) -> bool:
@@ -77,25 +87,55 @@ def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
 
     In torque mode and behind a spring the motion is not predicted, because friction decides it: the
     angle counts as the start angle (or how far the spring's end goes) and the rate as zero, and
-    only the trial itself can tell.
+    only the trial itself can tell. Torque and current are left out where the bench does not say
+    what they follow from: `unpredicted` names them. Raises IncompleteBenchError without limits.
     """
-    extremes = motion(task)
+    limits, extremes = limits_of(bench), motion(task)
     torque = _drive_torque(bench, task, extremes)
-    current = 0.0 if task.mode in ("prescribed", "spring") else torque / bench.torque_per_current
-    limits = bench.limits
+    current = _current(bench, task, torque)
     acceleration = max(extremes.load_acceleration, extremes.hull_acceleration)
-    return (
-        Margin("angle", extremes.angle, limits.angle, "rad"),
-        Margin("rate", extremes.rate, limits.rate, "rad/s"),
-        Margin("acceleration", acceleration, limits.acceleration, "rad/s^2"),
-        Margin("torque", torque, limits.torque, "N m"),
-        Margin("current", current, limits.current, "A"),
-        Margin("duration", task.duration, limits.duration, "s"),
+    units = units_of(bench)
+    found: tuple[tuple[Limit, float | None, float, str], ...] = (
+        ("angle", extremes.angle, limits.angle, units["rad"]),
+        ("rate", extremes.rate, limits.rate, units["rad/s"]),
+        ("acceleration", acceleration, limits.acceleration, units["rad/s^2"]),
+        ("torque", torque, limits.torque, units["N m"]),
+        ("current", current, limits.current, "A"),
+        ("duration", task.duration, limits.duration, "s"),
+    )
+    return tuple(
+        Margin(limit, value, bound, unit)
+        for limit, value, bound, unit in found
+        if value is not None
     )
 
 
-def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float:
-    """Largest torque (N m) that motor or spring has to give at the load."""
+def units_of(bench: Bench) -> dict[str, str]:
+    """Units (SI) of the bench's axis, by those of a rotary one."""
+    with speaking_of(bench.sides):
+        return {unit: unit_here(unit) for unit in ("rad", "rad/s", "rad/s^2", "N m")}
+
+
+def unpredicted(bench: Bench, task: Task) -> dict[Limit, tuple[str, ...]]:
+    """Limits that `margins` cannot tell of a task, with the fields that the bench lacks for it."""
+    if task.mode in ("prescribed", "spring"):
+        return {}
+    torque = lacking(bench, ("axis.inertia",)) if task.mode == "rate" else ()
+    current = (*torque, *lacking(bench, ("motor.torque_constant", "gear.ratio")))
+    found: dict[Limit, tuple[str, ...]] = {"torque": torque, "current": current}
+    return {limit: paths for limit, paths in found.items() if paths}
+
+
+def _current(bench: Bench, task: Task, torque: float | None) -> float | None:
+    """Largest motor current (A); None where nobody can say."""
+    if task.mode in ("prescribed", "spring"):
+        return 0.0
+    per_ampere = bench.torque_per_current
+    return None if torque is None or per_ampere is None else torque / per_ampere
+
+
+def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float | None:
+    """Largest torque (N m) that motor or spring has to give at the load; None: nobody can say."""
     match task.mode:
         case "prescribed":  # the motion is given; nothing drives it
             return 0.0
@@ -103,6 +143,8 @@ def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float:
             return task.spring_stiffness * _stretch(task)
         case "torque":
             return _largest(task.command, task.duration)
+    if bench.axis.inertia is None:
+        return None
     rigid = bench.axis.inertia * extremes.load_acceleration + worst_friction(bench, extremes.rate)
     return rigid + _largest(task.disturbance, task.duration)
 
@@ -151,7 +193,7 @@ def worst_friction(bench: Bench, rate: float) -> float:
     total = 0.0
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
-        ratio, rate_ratio = friction.at_load(bench.gear.ratio)
+        ratio, rate_ratio = bench.at_load(friction)
         speed = rate * rate_ratio
         speeds = np.concatenate([-shares, shares]) * speed
         viscous = model.viscous(friction)

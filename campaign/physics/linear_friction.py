@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from campaign.physics.bench import Bench
 from campaign.physics.compensation.interface import Compensator
+from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel, FrictionOptions, Presliding
 from campaign.physics.loop import at_load, viscous_at_load
@@ -43,7 +43,7 @@ class FrictionPath:
     motor_side: bool = False
 
 
-def bench_friction(bench: Bench, regime: Regime) -> FrictionPath:
+def bench_friction(bench: CompleteBench, regime: Regime) -> FrictionPath:
     """All friction of the bench itself, summed. Raises NoLoopError."""
     if regime == "stuck" and not bench.friction:
         raise NoLoopError("the bench has no friction to be stuck in")
@@ -59,7 +59,7 @@ def bench_friction(bench: Bench, regime: Regime) -> FrictionPath:
 
 
 def compensation_friction(
-    bench: Bench, compensator: Compensator, regime: Regime
+    bench: CompleteBench, compensator: Compensator, regime: Regime
 ) -> tuple[FrictionPath, ...]:
     """The friction models that compensation runs, with its gains. Raises NoLoopError."""
     return tuple(
@@ -69,7 +69,9 @@ def compensation_friction(
     )
 
 
-def _path(options: FrictionOptions, bench: Bench, own: Presliding, gain: float) -> FrictionPath:
+def _path(
+    options: FrictionOptions, bench: CompleteBench, own: Presliding, gain: float
+) -> FrictionPath:
     torque, rate = at_load(options, bench)
     scale = gain * torque * rate
     return FrictionPath(

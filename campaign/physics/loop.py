@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from campaign.physics.bench import AppendageOptions, Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import Compensator, LinearBlock
+from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionOptions
 from campaign.physics.rows import (
@@ -63,7 +64,7 @@ class Loop:
     linear_compensation: tuple[Array, Array]
 
 
-def make_compensator(bench: Bench, name: str) -> Compensator:
+def make_compensator(bench: CompleteBench, name: str) -> Compensator:
     """The compensation that a test asked for by name, built for this bench."""
     if name == "none":
         return Compensator()
@@ -74,7 +75,7 @@ def make_compensator(bench: Bench, name: str) -> Compensator:
 
 def at_load(friction: FrictionOptions, bench: Bench) -> tuple[float, float]:
     """What one N m of this interface counts at the load, and its rate per load relative rate."""
-    return friction.at_load(bench.gear.ratio)
+    return bench.at_load(friction)
 
 
 def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
@@ -85,10 +86,10 @@ def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
 
 
 def make_loop(
-    bench: Bench,
+    bench: CompleteBench,
     mode: Literal["rate", "torque"],
     compensator: Compensator,
-    stated: Bench | None = None,
+    stated: CompleteBench | None = None,
 ) -> Loop:
     """The loop with a continuous controller, closed on the rate or open for a torque command.
 
@@ -140,7 +141,7 @@ def make_loop(
     return Loop(a, b, filter_state if filtered else RATE, (torque_x, torque_u))
 
 
-def make_spring(bench: Bench, stiffness: float) -> Loop:
+def make_spring(bench: CompleteBench, stiffness: float) -> Loop:
     """The load without its motor, pulled through a spring; DRIVE is the far end's angle (rad)."""
     order = _plant_order(bench)
     a, b = _plant(bench, order)
@@ -152,7 +153,7 @@ def make_spring(bench: Bench, stiffness: float) -> Loop:
     return Loop(a, b, RATE, (np.zeros(order), np.zeros(INPUTS)))
 
 
-def make_plant(bench: Bench) -> Loop:
+def make_plant(bench: CompleteBench) -> Loop:
     """The axis with its current loop; DRIVE is the commanded current that a controller holds."""
     order = _plant_order(bench)
     a, b = _plant(bench, order)
@@ -162,11 +163,11 @@ def make_plant(bench: Bench) -> Loop:
     return Loop(a, b, RATE, (np.zeros(order), np.zeros(INPUTS)))
 
 
-def _plant_order(bench: Bench) -> int:
+def _plant_order(bench: CompleteBench) -> int:
     return PLANT_STATES if bench.appendage is None else PLANT_STATES + 2
 
 
-def _plant(bench: Bench, size: int) -> tuple[Array, Array]:
+def _plant(bench: CompleteBench, size: int) -> tuple[Array, Array]:
     a, b = np.zeros((size, size)), np.zeros((size, INPUTS))
     inertia, motor = bench.axis.inertia, bench.motor
     if bench.appendage is not None:
@@ -199,7 +200,7 @@ def _add_appendage(a: Array, appendage: AppendageOptions, body: float) -> None:
 
 
 def _close_current_loop(
-    a: Array, b: Array, bench: Bench, command_x: Array, command_u: Array
+    a: Array, b: Array, bench: CompleteBench, command_x: Array, command_u: Array
 ) -> None:
     gains, inductance = bench.controller.current, bench.motor.inductance
     error_x, error_u = command_x.copy(), command_u

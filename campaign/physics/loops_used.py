@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, IncompleteBenchError, complete, lacking
 from campaign.physics.linear_friction import (
     REGIMES,
     NoLoopError,
@@ -42,8 +42,8 @@ class LoopUse:
 def loops_used(items: Iterable[tuple[int, Task, Bench]]) -> tuple[LoopUse, ...]:
     """The worst loop of each compensation, mode and regime among trials, the worst first.
 
-    `items`: number, task and bench of each trial. Regimes in which there is no linear loop, and
-    trials without a motor, are left out.
+    `items`: number, task and bench of each trial. Regimes in which there is no linear loop, trials
+    without a motor, and benches that lack what a loop needs are left out.
     """
     by_bench: dict[Hashable, tuple[Bench, tuple[LoopUse, ...]]] = {}
     by_values: dict[Hashable, tuple[LoopUse, ...]] = {}
@@ -63,8 +63,21 @@ def loops_used(items: Iterable[tuple[int, Task, Bench]]) -> tuple[LoopUse, ...]:
     return tuple(sorted(worst.values(), key=_rank))
 
 
-def loops_of(bench: Bench, compensation: str, mode: Mode) -> Iterator[tuple[Regime, Any]]:
+def loops_of(
+    bench: Bench, compensation: str, mode: Mode
+) -> Iterator[tuple[Regime, LoopMargins | NoLoopError]]:
     """Each regime with its LoopMargins, or with the NoLoopError that says why there is none."""
+    try:
+        bench = complete(bench, "a loop's margin")
+    except IncompleteBenchError as error:
+        yield from ((regime, NoLoopError(str(error))) for regime in REGIMES)
+        return
+    yield from _loops(bench, compensation, mode)
+
+
+def _loops(
+    bench: CompleteBench, compensation: str, mode: Mode
+) -> Iterator[tuple[Regime, LoopMargins | NoLoopError]]:
     for regime in REGIMES:
         try:
             with np.errstate(all="ignore"):
@@ -86,6 +99,9 @@ def _known(
     compensation: str,
     mode: Mode,
 ) -> tuple[LoopUse, ...]:
+    if lacking(bench):
+        return ()
+    bench = complete(bench)
     key = _values(bench, compensation, mode)
     if key not in known:
         known[key] = tuple(
@@ -96,7 +112,7 @@ def _known(
     return known[key]
 
 
-def _values(bench: Bench, compensation: str, mode: Mode) -> Hashable:
+def _values(bench: CompleteBench, compensation: str, mode: Mode) -> Hashable:
     """All that the loops depend on, and nothing of what only the size of a motion depends on."""
     bench = of_its_day(bench)
     compensator = make_compensator(bench, compensation)

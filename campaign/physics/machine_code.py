@@ -21,8 +21,8 @@ from typing import Any
 from llvmlite import binding
 from numba.core import event
 
-from campaign.physics.bench import Bench
 from campaign.physics.compiled import cache_folder, is_kept_for_good
+from campaign.physics.complete import CompleteBench
 from campaign.physics.lanes import Lane, together
 from campaign.physics.simulate import simulate_together
 from campaign.physics.vector import LANES
@@ -62,7 +62,7 @@ def folder() -> Path | None:
     return kept if kept is not None and is_kept_for_good(kept) else None
 
 
-def parts(width: int, benches: Sequence[Bench]) -> Iterator[Part]:
+def parts(width: int, benches: Sequence[CompleteBench]) -> Iterator[Part]:
     """What simulating `benches` needs, for one trial (`width` 1) or for LANES side by side."""
     side_by_side = "one trial" if width == 1 else f"{width} trials side by side"
     empty = benches[0].with_friction({})
@@ -121,20 +121,20 @@ def _note() -> Path | None:
     return kept / f"all-made-{hashlib.sha256(what.encode()).hexdigest()[:16]}"
 
 
-def _make_ready(bench: Bench, width: int) -> None:
+def _make_ready(bench: CompleteBench, width: int) -> None:
     """Trials of a bench in every mode, with every compensation."""
     for mode in ("rate", "prescribed"):
         for compensation in ("none", *bench.compensation):
             together([Lane.of(bench, _some_task(bench, mode, compensation), 0)], width)
 
 
-def _simulate(bench: Bench, mode: str, width: int) -> None:
+def _simulate(bench: CompleteBench, mode: str, width: int) -> None:
     """Some milliseconds of a bench without friction, so that nothing else is compiled."""
     for _ in simulate_together([Lane.of(bench, _some_task(bench, mode), 0)] * width):
         pass
 
 
-def _some_task(bench: Bench, mode: str, compensation: str = "none") -> Task:
+def _some_task(bench: CompleteBench, mode: str, compensation: str = "none") -> Task:
     rate = bench.controller.sample_rate or 1000.0
     return Task(
         mode=mode,

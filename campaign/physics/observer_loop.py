@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.signals import Array
 
 Complex = NDArray[Any]
@@ -28,30 +28,34 @@ Complex = NDArray[Any]
 TWO_PI = 2.0 * np.pi
 
 
-def corner_frequency(bench: Bench, gain: float, inertia: float | None = None) -> float:
+def corner_frequency(bench: CompleteBench, gain: float, inertia: float | None = None) -> float:
     """N K0 / (2 pi J') in Hz, of the gain K0 (N m s/rad at the motor)."""
     return bench.gear.ratio * gain / (TWO_PI * (inertia or bench.axis.inertia))
 
 
-def gain_for(bench: Bench, corner: float, inertia: float | None = None) -> float:
+def gain_for(bench: CompleteBench, corner: float, inertia: float | None = None) -> float:
     """The gain K0 (N m s/rad at the motor) with this corner frequency (Hz)."""
     return TWO_PI * corner * (inertia or bench.axis.inertia) / bench.gear.ratio
 
 
-def rejection(bench: Bench, corner: float, inertia: float | None, frequency: Array) -> Complex:
+def rejection(
+    bench: CompleteBench, corner: float, inertia: float | None, frequency: Array
+) -> Complex:
     """Rejection w / Td (rad/s per N m) at `frequency` (Hz), shape (n,); corner 0: no observer."""
     s = 2j * np.pi * frequency
     return np.asarray(1.0 / (bench.axis.inertia * s + _controller(bench, corner, inertia, s)))
 
 
-def noise_coupling(bench: Bench, corner: float, inertia: float | None, frequency: Array) -> Complex:
+def noise_coupling(
+    bench: CompleteBench, corner: float, inertia: float | None, frequency: Array
+) -> Complex:
     """Noise coupling w / n at `frequency` (Hz), shape (n,)."""
     s = 2j * np.pi * frequency
     controller = _controller(bench, corner, inertia, s)
     return np.asarray(-controller * rejection(bench, corner, inertia, frequency))
 
 
-def noise_rate(bench: Bench, corner: float, inertia: float | None) -> float:
+def noise_rate(bench: CompleteBench, corner: float, inertia: float | None) -> float:
     """Standard deviation (rad/s) of the load's rate that the gyro's noise causes.
 
     The integral of |w/n|^2 over the noise's spectrum: white from sample to sample, and held in
@@ -69,7 +73,7 @@ def noise_rate(bench: Bench, corner: float, inertia: float | None) -> float:
     return float(np.sqrt(np.trapezoid(power, frequency)))
 
 
-def _controller(bench: Bench, corner: float, inertia: float | None, s: Any) -> Any:
+def _controller(bench: CompleteBench, corner: float, inertia: float | None, s: Any) -> Any:
     """C(s), N m at the load per rad/s of gyro rate."""
     rate = bench.controller.rate
     g = bench.torque_per_current * (rate.proportional + rate.integral_gain / s)

@@ -22,8 +22,8 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.physics.bench import Bench
 from campaign.physics.compensation.interface import Compensator, LinearBlock
+from campaign.physics.complete import CompleteBench
 from campaign.physics.linear_friction import (
     FrictionPath,
     NoLoopError,
@@ -69,7 +69,7 @@ class OpenLoop:
         return self.a - np.outer(self.b, self.c)
 
 
-def open_loop(bench: Bench, compensation: str, mode: Mode, regime: Regime) -> OpenLoop:
+def open_loop(bench: CompleteBench, compensation: str, mode: Mode, regime: Regime) -> OpenLoop:
     """The loop on the bench's day. Raises NoLoopError where there is no linear one."""
     bench = of_its_day(bench)
     compensator = make_compensator(bench, compensation)
@@ -83,7 +83,7 @@ def open_loop(bench: Bench, compensation: str, mode: Mode, regime: Regime) -> Op
 
 
 def _continuous(
-    bench: Bench,
+    bench: CompleteBench,
     compensator: Compensator,
     friction: FrictionPath,
     models: tuple[FrictionPath, ...],
@@ -132,7 +132,7 @@ class _Sampled:
 
     def __init__(
         self,
-        bench: Bench,
+        bench: CompleteBench,
         block: LinearBlock | None,
         friction: FrictionPath,
         models: tuple[FrictionPath, ...],

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from campaign.axis_kind import unit_here
 from campaign.options import Options
 from campaign.physics.friction_paths import (
     INTERFACE,
@@ -166,9 +167,10 @@ def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) 
     def more(parameter: str, value: float) -> float:
         raised = value + added.get(parameter, 0.0)
         if raised <= 0 < value:
+            unit = unit_here("N m")
             raise ValueError(
-                f"a preload of {torque:g} N m leaves friction.{name} with a {parameter} of "
-                f"{raised:.4g} N m; raise preload.torque or lower its share"
+                f"a preload of {torque:g} {unit} leaves friction.{name} with a {parameter} of "
+                f"{raised:.4g} {unit}; raise preload.torque or lower its share"
             )
         return raised
 

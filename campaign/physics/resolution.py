@@ -24,8 +24,9 @@ from __future__ import annotations
 import math
 
 from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate, limits_of
 from campaign.physics.limit_watch import judged_samples
-from campaign.physics.limits import Margin
+from campaign.physics.limits import Margin, units_of
 from campaign.trial import Task
 
 CLOSE = 0.5
@@ -34,18 +35,19 @@ CLOSE = 0.5
 
 def resolution_margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     """What one count of the sensors comes to beside the limits watched in motion."""
-    control_rate = bench.controller.sample_rate
-    if control_rate is None or task.mode in ("prescribed", "spring"):
+    rate_of_control = control_rate(bench)
+    if rate_of_control is None or task.mode in ("prescribed", "spring"):
         return ()
-    sensors, limits = bench.sensors, bench.limits
+    sensors, limits = bench.sensors, limits_of(bench)
     current = sensors.current.resolution
-    torque = current * bench.torque_per_current
+    torque = current * (bench.torque_per_current or 0.0)  # of no resolution nothing is told
     encoder = sensors.encoder.resolution
-    rate = rate_of_one_count(bench, task.sample_rate, control_rate)
+    rate = rate_of_one_count(bench, task.sample_rate, rate_of_control)
+    units = units_of(bench)
     found = (
-        Margin("angle", encoder, limits.angle, "rad", "encoder"),
-        Margin("rate", rate, limits.rate, "rad/s", "encoder"),
-        Margin("torque", torque, limits.torque, "N m", "current sensor"),
+        Margin("angle", encoder, limits.angle, units["rad"], "encoder"),
+        Margin("rate", rate, limits.rate, units["rad/s"], "encoder"),
+        Margin("torque", torque, limits.torque, units["N m"], "current sensor"),
         Margin("current", current, limits.current, "A", "current sensor"),
     )
     return tuple(margin for margin in found if margin.value > 0)
@@ -56,9 +58,9 @@ def rate_of_one_count(bench: Bench, sample_rate: float, control_rate: float) -> 
 
     `sample_rate` of the recording and `control_rate` in Hz; the mean is over the judging time.
     """
-    low_pass = bench.controller.relative_rate_filter
+    low_pass = 0.0 if bench.controller is None else bench.controller.relative_rate_filter
     pole = math.exp(-1.0 / (control_rate * low_pass)) if low_pass > 0 else 0.0
     every = max(1, round(control_rate / sample_rate))
-    count = judged_samples(bench.limits, sample_rate)
+    count = judged_samples(limits_of(bench), sample_rate)
     share = (1 - pole) * (1 - pole ** (count * every)) / (1 - pole**every)
     return bench.sensors.encoder.resolution * control_rate / count * share

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from campaign.physics.bench import Bench
 from campaign.physics.blocks import zeros
+from campaign.physics.complete import CompleteBench
 from campaign.physics.engine import advance_block, advance_one
 from campaign.physics.grid import Grid, make_grid
 from campaign.physics.lanes import Lane, Lanes, together
@@ -30,7 +30,7 @@ BLOCK_STEPS, BLOCK_SAMPLES = 16_000, 2_000
 
 
 def simulate(
-    bench: Bench, task: Task, seed: int, longest_step: float | None = None
+    bench: CompleteBench, task: Task, seed: int, longest_step: float | None = None
 ) -> Iterator[tuple[Array, Array]]:
     """Blocks of (time (n,), outputs (8, n) with rows as `rows.OUTPUTS`) until the task ends."""
     for time, (out,) in simulate_together([Lane.of(bench, task, seed, longest_step)]):

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.physics.loop_margins import STANDING, in_time
 from campaign.physics.open_loop import open_loop
 
 
-def growth_rate(bench: Bench, compensation: str) -> float:
+def growth_rate(bench: CompleteBench, compensation: str) -> float:
     """Real part (1/s) of the fastest growing mode of the rate loop; negative when it is stable."""
     loop = open_loop(bench, compensation, "rate", "sliding")
     poles = in_time(np.linalg.eigvals(loop.closed), loop.period)

@@ -22,7 +22,7 @@ def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
     dry, viscous = np.zeros_like(rate), np.zeros_like(rate)
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
-        torque, rate_ratio = friction.at_load(bench.gear.ratio)
+        torque, rate_ratio = bench.at_load(friction)
         speed = rate * rate_ratio
         linear = model.viscous(friction) * speed
         viscous += torque * linear

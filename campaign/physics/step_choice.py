@@ -63,8 +63,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.physics.base_motion import base_rate
-from campaign.physics.bench import Bench
 from campaign.physics.compensation.interface import Compensator
+from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import friction_models, is_dry, jumps
 from campaign.physics.friction.interface import FrictionOptions, Presliding
 from campaign.physics.loop import at_load, make_compensator, make_loop
@@ -133,7 +133,7 @@ class _Contact:
     torque: float
 
 
-def longest_step(bench: Bench, task: Task) -> StepChoice:
+def longest_step(bench: CompleteBench, task: Task) -> StepChoice:
     """The longest step of the ladder that a trial is right with.
 
     bench: with the friction of the trial, as `variation.as_it_is` gives it. Friction models that do
@@ -154,7 +154,7 @@ def longest_step(bench: Bench, task: Task) -> StepChoice:
     return StepChoice(finest, least.step, least.because, refused)
 
 
-def _limits(bench: Bench, task: Task) -> Iterator[_Limit]:
+def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
     continuous = bench.controller.sample_rate is None and task.mode in ("rate", "torque")
     compensator = make_compensator(bench, task.compensation) if continuous else Compensator()
     models = [(f"compensation.{task.compensation}", each) for each, _ in compensator.friction]
@@ -205,7 +205,7 @@ def _limits(bench: Bench, task: Task) -> Iterator[_Limit]:
     yield _Limit(RINGING * ringing, f"ringing on the bristles of {stiffest}")
 
 
-def _contacts(friction: list[tuple[str, FrictionOptions]], bench: Bench) -> list[_Contact]:
+def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench) -> list[_Contact]:
     found = []
     for place, options in friction:
         bristles = _bristles(options)
@@ -233,7 +233,7 @@ def _bristles(options: FrictionOptions) -> Presliding | None:
     return stuck if stuck is not None and stuck.stiffness > 0.0 else None
 
 
-def stuck_poles(bench: Bench, task: Task, compensator: Compensator) -> Poles:
+def stuck_poles(bench: CompleteBench, task: Task, compensator: Compensator) -> Poles:
     """Poles (1/s) of the loop at rest, plant and compensation stuck on their bristles."""
     loop = make_loop(bench, "rate" if task.mode == "rate" else "torque", compensator)
     a, low_pass = loop.a.copy(), bench.controller.relative_rate_filter

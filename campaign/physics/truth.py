@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete
 from campaign.trial import Tree, canonical_json
 
 Keys = tuple[str | int, ...]
@@ -28,18 +29,20 @@ def plant_of(truth: Bench) -> Tree:
     return truth.model_dump(mode="json", exclude={*SOFTWARE, "known"})
 
 
-def simulated(plant: Tree, stated: Bench) -> Bench:
+def simulated(plant: Tree, stated: Bench) -> CompleteBench:
     """The bench that is simulated: the plant of a truth under the software of `stated`.
 
     Raises ValueError when they do not go together.
     """
-    if plant["gear"]["ratio"] != stated.gear.ratio:  # type: ignore[index,call-overload]
+    software = stated.model_dump(mode="json", include=set(SOFTWARE))
+    truth = Bench.model_validate({**plant, **software}, context={"si": True})
+    if truth.gear and stated.gear and truth.gear.ratio != stated.gear.ratio:
         raise ValueError(
-            f"the gear ratio of the truth is {plant['gear']['ratio']:g}, the stated one "  # type: ignore[index,call-overload]
+            f"the gear ratio of the truth is {truth.gear.ratio:g}, the stated one "
             f"{stated.gear.ratio:g}; teeth are counted: write the same in both"
         )
-    software = stated.model_dump(mode="json", include=set(SOFTWARE))
-    return Bench.model_validate({**plant, **software}, context={"si": True})
+    complete(stated)  # its inertia and torque constant are what software reckons with
+    return complete(truth)
 
 
 def digest(plant: Tree) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,13 +18,14 @@ from campaign.physics.friction_paths import changeable, matched
 from campaign.physics.preload import changed, with_preload
 from campaign.physics.scatter import CLASSIC, TORQUES, Line
 
+_Bench = TypeVar("_Bench", bound=Bench)
 SMALLEST_FACTOR = 0.05
 """However wide the scatter, some friction is left."""
 _DAY, _TRIAL = 2, 3
 """What tells the streams of named draws from each other, and from the first two there were."""
 
 
-def as_it_is(bench: Bench, seed: int) -> Bench:
+def as_it_is(bench: _Bench, seed: int) -> _Bench:
     """`bench` with the friction of its day, its preload and the trial with this `seed`."""
     bench = of_its_day(bench)
     variation = bench.variation
@@ -33,7 +35,7 @@ def as_it_is(bench: Bench, seed: int) -> Bench:
     return _scaled(bench, draws)
 
 
-def of_its_day(bench: Bench) -> Bench:
+def of_its_day(bench: _Bench) -> _Bench:
     """`bench` with the friction of its day and its preload: what its trials scatter around."""
     bench = preloaded(bench)
     variation = bench.variation
@@ -44,8 +46,10 @@ def of_its_day(bench: Bench) -> Bench:
     return _scaled(bench, draws)
 
 
-def preloaded(bench: Bench) -> Bench:
+def preloaded(bench: _Bench) -> _Bench:
     """`bench` with the friction that its preload makes of the nominal one."""
+    if bench.gear is None:
+        return bench
     friction = with_preload(bench.friction, bench.gear.ratio, bench.gear.preload)
     return bench.model_copy(update={"friction": friction})
 
@@ -79,7 +83,7 @@ def _number(name: str) -> int:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:16], "big")
 
 
-def _scaled(bench: Bench, draws: Iterable[tuple[Line, float]]) -> Bench:
+def _scaled(bench: _Bench, draws: Iterable[tuple[Line, float]]) -> _Bench:
     """`bench` with what each line names times 1 plus its share of its draw, line after line."""
     declared = {name: changeable(options) for name, options in bench.friction.items()}
     friction = dict(bench.friction)

@@ -12,6 +12,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import fingerprint
 from campaign.physics.known import FORMER as FORMER_KNOWN
 from campaign.protocol.positions import Positions
+from campaign.protocol.problems import find_faults
 
 _HEADER = re.compile(r"^[ \t]*\[[ \t]*known[ \t]*[\].]", re.M)
 """Of the table `known`, or of one within it."""
@@ -30,10 +31,10 @@ def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
 
     try:
         changed = _edited(text, entries)
-        bench = Bench.model_validate(tomllib.loads(changed))
+        bench = _bench(changed)
         stated = fingerprint(bench).model_dump(mode="json")
         changed = _edited(changed, {"fingerprint": stated})
-        again = Bench.model_validate(tomllib.loads(changed))
+        again = _bench(changed)
     except (TOMLKitError, LookupError, ValueError, TypeError, AttributeError) as error:
         raise UsageError(
             f"{name}: its keys are written in a form that cannot be edited; write [known] as a "
@@ -42,6 +43,16 @@ def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
     if again.known.fingerprint != fingerprint(bench):
         raise UsageError(f"{name}: its fingerprint cannot be written; write it by hand: {stated}")
     return changed
+
+
+def _bench(text: str) -> Bench:
+    """The bench that a text says. Raises ValueError when it says none."""
+    tree = tomllib.loads(text)
+    tree.pop("schema", None)  # of the file, and nothing of the bench
+    found = find_faults(Bench, tree)
+    if isinstance(found, list):
+        raise ValueError("; ".join(message for _, _, message in found))
+    return found
 
 
 def _edited(text: str, entries: Mapping[str, Any]) -> str:

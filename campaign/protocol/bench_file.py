@@ -7,6 +7,7 @@ from pathlib import Path
 
 from campaign.errors import ProtocolError, UsageError
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, IncompleteBenchError, complete
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
 from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.problems import validate
@@ -20,6 +21,14 @@ def load_bench(written: str) -> Bench:
     Raises UsageError when there is none, ProtocolError with everything that is wrong with it.
     """
     return checked(bench_source(written))
+
+
+def simulable(written: str) -> CompleteBench:
+    """The same, of a bench that can be simulated. Raises UsageError naming all that it lacks."""
+    try:
+        return complete(load_bench(written))
+    except IncompleteBenchError as error:
+        raise UsageError(f"{written}: {error}") from None
 
 
 def bench_source(written: str) -> Source:

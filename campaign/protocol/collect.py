@@ -28,7 +28,7 @@ from campaign.protocol.schema import PROTOCOL_SCHEMA, ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
-SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration"}
+SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration", "columns"}
 TABLES = frozenset({"faults", "rest", "check"})
 """Top-level tables, whose keys can be set one by one."""
 

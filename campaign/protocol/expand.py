@@ -8,14 +8,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from campaign.axis_kind import each_speaking_of, sides_in, speaking_of, words_here
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
+from campaign.physics.complete import IncompleteBenchError
 from campaign.physics.truth import digest, is_setting, settings, simulated, value_at, with_settings
 from campaign.protocol import memory
 from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
-from campaign.protocol.points import Point, PointError, points_of
+from campaign.protocol.points import Point, PointError, incomplete, points_of
 from campaign.protocol.schema import ExperimentKind, Test
 from campaign.protocol.stages import PlannedStage, most_of, planned_stages
 from campaign.protocol.told import told_point
@@ -135,7 +137,8 @@ def _no_stages(places: Sequence[_Place]) -> str:
 def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
     """The stages that may follow at a point. Raises PointError."""
     try:
-        return list(planned_stages(test, point, seed))
+        with speaking_of(point.bench.sides):
+            return list(planned_stages(test, point, seed))
     except (ValueError, ArithmeticError) as error:
         raise _refused(test, point, error) from None
 
@@ -145,15 +148,20 @@ def _warnings(test: Test, point: Point) -> list[str]:
     if test.experiment.warnings is None:
         return []
     try:
-        return list(test.experiment.warnings(point.options, point.bench))
+        with speaking_of(point.bench.sides):
+            warned = test.experiment.warnings(point.options, point.bench)
+            return [words_here(text) for text in warned]
     except (ValueError, ArithmeticError) as error:
         raise _refused(test, point, error) from None
 
 
 def _refused(test: Test, point: Point, error: Exception) -> PointError:
     """An experiment's word against options and bench of a point."""
+    if isinstance(error, IncompleteBenchError):
+        return incomplete(test, error)
     where = f" at {point.label}" if point.values else ""
-    message = f"test '{test.entry.name}'{where}: {first_line(error)}"
+    with speaking_of(point.bench.sides):
+        message = f"test '{test.entry.name}'{where}: {words_here(first_line(error))}"
     return PointError([test.origin.problem((), "value", message)])
 
 
@@ -162,7 +170,8 @@ def _requests(
 ) -> Iterator[tuple[TrialRequest, Bench, Tree, str]]:
     """What the experiment asks for at a point, with bench and truth, checked as only a plan can."""
     try:
-        for request in test.experiment.trials(point.options, point.bench):
+        asked = test.experiment.trials(point.options, point.bench)
+        for request in each_speaking_of(point.bench.sides, asked):
             bench, tree = _bench_for(request, point, own_benches)
             name, names = request.task.compensation, ["none", *bench.compensation]
             if name not in names:
@@ -245,28 +254,29 @@ def _trial(
     request = place.request
     requires, can_use = channels_of(test.experiment, request)
     swept = {**place.point.values, **request.point}
+    with speaking_of(sides_in(place.bench_tree)):
+        note = words_here(request.note)
+        told = told_point(test.experiment.options, test.options, request.point)
     return Trial.model_construct(
         number=number,
         test=test.entry.name,
         kind=test.entry.kind,
         role=request.role,
         point=swept,
-        told={
-            **place.point.told,
-            **told_point(test.experiment.options, test.options, request.point),
-        },
-        options=place.point.options_tree,
+        told={**place.point.told, **told},
+        options={**place.point.options_tree, **request.options},
         repeat=place.repeat,
         seed=place_hash(seed, place.point.values, place.index, place.repeat),
         bench=place.bench_tree,
         task=request.task,
-        note=request.note,
+        note=note,
         setup=setup,
         set_by_operator=set_by_hand,
         requires=requires,
         can_use=can_use,
         windows=request.windows,
         truth=place.truth,
+        recording=request.recording,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
+from campaign.axis_kind import sides_in, speaking_of, words_here
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.loops_used import loops_used
@@ -120,19 +121,22 @@ def _trial(
     the test's seed, the point, the stage, and its index among what the stage asks for.
     """
     requires, can_use = channels_of(experiment, request)
+    with speaking_of(sides_in(planned.bench)):
+        note = words_here(request.note)
+        told = told_point(experiment.options, {}, request.point)
     return Trial.model_construct(  # as in a plan: what there is to check of it, `_check` does
         number=number,
         test=planned.test,
         kind=planned.kind,
         role=request.role,
         point={**stage.point, **request.point},
-        told={**planned.told, **told_point(experiment.options, {}, request.point)},
+        told={**planned.told, **told},
         options=planned.options,
         seed=place_hash("stage", stage.seed, stage.point, stage.number, index),
         bench=planned.bench,
         truth=planned.truth,
         task=request.task,
-        note=request.note,
+        note=note,
         setup=planned.setup,
         set_by_operator=planned.set_by_operator,
         requires=requires,
@@ -156,7 +160,7 @@ def _broken(trial: Trial, bench: Bench) -> Iterator[str]:
     for margin in (*margins(bench, trial.task), *resolution_margins(bench, trial.task)):
         if margin.broken:
             value, bound = in_display_units(margin)
-            what = one_count(margin) if margin.sensor else f"{margin.limit} up to {value}"
+            what = one_count(margin) if margin.sensor else f"{margin.called} up to {value}"
             yield f"{what}, limit {bound}"
 
 

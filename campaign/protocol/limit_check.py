@@ -12,7 +12,14 @@ from campaign.units import convert
 
 NAMED_TRIALS = 3
 """of each test and limit; the rest is counted."""
-DISPLAY = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+DISPLAY = {
+    "rad": "deg",
+    "rad/s": "deg/s",
+    "rad/s^2": "deg/s^2",
+    "m": "mm",
+    "m/s": "mm/s",
+    "m/s^2": "mm/s^2",
+}
 
 
 REMEDIES = {
@@ -53,8 +60,8 @@ def in_display_units(margin: Margin) -> tuple[str, str]:
 def one_count(margin: Margin) -> str:
     """What a single count of a sensor reads as, in words."""
     value, _ = in_display_units(margin)
-    a = "an" if margin.limit == "angle" else "a"
-    return f"one count of the {margin.sensor} reads as {a} {margin.limit} of {value}"
+    a = "an" if margin.called == "angle" else "a"
+    return f"one count of the {margin.sensor} reads as {a} {margin.called} of {value}"
 
 
 def _line(plan: Plan, test: str, uses: Sequence[LimitUse]) -> str:
@@ -68,7 +75,7 @@ def _line(plan: Plan, test: str, uses: Sequence[LimitUse]) -> str:
         what = f"{one_count(worst.margin)}, limit {bound}; {REMEDIES[limit]}"
         names = [plan.trials[use.trial - 1].name for use in named]
         return f"  {test}: {what}: {', '.join(names)}{more}"
-    return f"  {test}: {limit} up to {value}, limit {bound}: {', '.join(names)}{more}"
+    return f"  {test}: {worst.margin.called} up to {value}, limit {bound}: {', '.join(names)}{more}"
 
 
 def _label(plan: Plan, use: LimitUse, test: str) -> str:

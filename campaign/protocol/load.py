@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from campaign.axis_kind import sides_in, speaking_of
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
@@ -108,6 +109,8 @@ def load_protocol(
         policy=Policy(faults=top.faults, rest=top.rest),
         check=check,
         truth_sources=loader.truths.texts,
+        columns=top.columns,
+        origin=origin,
     )
 
 
@@ -202,8 +205,9 @@ class _Loader:
             folder = bench.file.parent
             self._report(*cell_problems(valid.known, bench.tree, bench_origin, folder))
         options = self._attached(draft, experiment, options)
-        axes = self._axes(draft, experiment, options, known)
-        self._options(draft, experiment, options, axes)
+        with speaking_of(sides_in(tree)):
+            axes = self._axes(draft, experiment, options, known)
+            self._options(draft, experiment, options, axes)
         if isinstance(entry, list) or known is None or tree is None or bench is None:
             return None
         truth = None
@@ -214,7 +218,8 @@ class _Loader:
         )
         self._compensation(test, known)
         if not is_large(axes, entry.repeat):
-            self._report(*value_problems(test))
+            with speaking_of(sides_in(tree)):
+                self._report(*value_problems(test))
         self._operator(test)
         return test
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from campaign.errors import LimitError
 from campaign.physics.bench import Bench
+from campaign.physics.complete import complete
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import LoopUse, loops_of
 from campaign.protocol.plan import Plan, PlannedTest
@@ -85,8 +86,11 @@ def _use(plan: Plan, test: PlannedTest, use: LoopUse) -> str:
 
 def _hints(plan: Plan, use: LoopUse) -> Iterator[str]:
     """Whether the rate controller's gain looks like one in A s/deg."""
-    bench = Bench.model_validate(plan.trials[use.trial - 1].bench, context={"si": True})
+    # A loop that is known is that of a bench of which all is known.
+    bench = complete(Bench.model_validate(plan.trials[use.trial - 1].bench, context={"si": True}))
     rate = bench.controller.rate
+    if bench.is_linear:
+        return  # nobody measures travel in radians
     lower = rate.model_copy(update={"proportional": rate.proportional / PER_RADIAN})
     controller = bench.controller.model_copy(update={"rate": lower})
     changed = bench.model_copy(update={"controller": controller})

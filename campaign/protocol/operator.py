@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from campaign.axis_kind import sides_in
 from campaign.errors import Problem
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -85,7 +86,7 @@ def _value_text(path: str, options: type[Options], point: Point) -> str:
             f"'{path}' is {shown(value)}; name a single value" + _slip(path, point)
         )
     shape = shape_at(model, tree, keys)
-    quantity = shape.quantity if shape is not None else None
+    quantity = shape.quantity.of(sides_in(point.bench_tree)) if shape and shape.quantity else None
     if quantity is not None and isinstance(value, int | float):
         return f"{convert(value, quantity.si, quantity.display):.6g} {quantity.display}"
     if isinstance(value, float):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.errors import Problem, ProtocolError, UsageError
+from campaign.physics.complete import IncompleteBenchError
 from campaign.physics.limits import Margin, margins
 from campaign.physics.loops_used import LoopUse, loops_used
 from campaign.physics.resolution import CLOSE, resolution_margins
@@ -26,8 +27,9 @@ from campaign.protocol.expand import (
     seed_of,
     size_problem,
 )
+from campaign.protocol.lacking import not_predicted
 from campaign.protocol.matrix import LARGEST_PLAN, count_points
-from campaign.protocol.points import PointError, points_of
+from campaign.protocol.points import PointError, incomplete, points_of
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import Protocol, Test
 from campaign.protocol.stages import PlannedStage, most_of
@@ -192,9 +194,15 @@ def make_plan(
     if problems := _too_many(chosen, expansions, allow_large):
         raise ProtocolError(problems)
     for test, expanded in zip(chosen, expansions, strict=True):
-        own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
+        try:
+            own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
+        except IncompleteBenchError as error:
+            problems += incomplete(test, error).problems
+            continue
         planned.append(_planned(test, expanded, own, master))
         uses += own
+    if problems:
+        raise ProtocolError(list(dict.fromkeys(problems)))
     trials = [trial for expanded in expansions for trial in expanded.trials]
     trials.sort(key=lambda trial: trial.number)  # checks stand among the trials of other tests
     normalised: Tree = {"tests": [_normalised(t, master) for t in protocol.tests]}
@@ -279,6 +287,8 @@ def _size_of_stages(plan: Plan) -> int:
 def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
     known: dict[tuple[int, Task], tuple[Margin, ...]] = {}
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
+        if trial.recording:  # it has been executed, and broke what it broke
+            continue
         key = (id(bench), trial.task)
         if key not in known:
             known[key] = (*margins(bench, trial.task), *resolution_margins(bench, trial.task))
@@ -311,13 +321,14 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         loops=loops_used(
             (trial.number, trial.task, bench)
             for trial, bench in zip(expanded.trials, expanded.benches, strict=True)
+            if not trial.recording
         ),
         seeks_instability=test.experiment.seeks_instability,
         duration=sum(trial.task.duration for trial in expanded.trials),
         coarse=coarse,
         chosen=first.chosen,
         stages=expanded.stages,
-        warnings=expanded.warnings,
+        warnings=(*expanded.warnings, *not_predicted(expanded)),
     )
 
 

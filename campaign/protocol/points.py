@@ -8,9 +8,11 @@ from typing import Any
 
 from pydantic import JsonValue, ValidationError
 
+from campaign.axis_kind import sides_in, speaking_of, words_here
 from campaign.errors import Problem
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import IncompleteBenchError
 from campaign.protocol.files import Patched
 from campaign.protocol.matrix import Axis, points
 from campaign.protocol.positions import Keys
@@ -26,6 +28,12 @@ class PointError(Exception):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
         super().__init__("; ".join(str(problem) for problem in problems))
+
+
+def incomplete(test: Test, error: IncompleteBenchError) -> PointError:
+    """What a test needs of its bench and the bench does not say."""
+    message = f"test '{test.entry.name}' ({test.entry.kind}): {error}"
+    return PointError([test.origin.problem(("bench",), "value", message)])
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,8 @@ class _Cache:
                 tree = replaced(tree, axis.keys, axis.value(index))
             patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
             origin = Patched(self.test.origin, patches)
-            valid = validate(self.test.experiment.options, tree, origin)
+            with speaking_of(sides_in(self.test.bench)):
+                valid = validate(self.test.experiment.options, tree, origin)
             if isinstance(valid, list):
                 raise PointError(valid)
             self.known_options[key] = (valid, valid.model_dump(mode="json"))
@@ -100,10 +109,15 @@ class _Cache:
         fit = self.test.experiment.fit
         if fit is None:
             return options, tree, {}
+        bench = self.bench(indices)[0]
         try:
-            chosen = fit(options, self.bench(indices)[0])
+            with speaking_of(bench.sides):
+                chosen = fit(options, bench)
+        except IncompleteBenchError as error:
+            raise incomplete(self.test, error) from None
         except (ValueError, ArithmeticError) as error:
-            message = f"test '{self.test.entry.name}': {error}"
+            with speaking_of(bench.sides):
+                message = f"test '{self.test.entry.name}': {words_here(str(error))}"
             raise PointError([self.test.origin.problem((), "value", message)]) from None
         if not chosen:
             return options, tree, {}
@@ -113,7 +127,8 @@ class _Cache:
             fitted = options.model_copy(update=values)
             # Who asks later which options were written must not be told of these.
             fitted.__pydantic_fields_set__.difference_update(values)
-            reasons = {name: choice.reason for name, choice in chosen.items()}
+            with speaking_of(bench.sides):
+                reasons = {name: words_here(choice.reason) for name, choice in chosen.items()}
             self.known_fits[key] = fitted, fitted.model_dump(mode="json"), reasons
         return self.known_fits[key]
 

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from campaign.axis_kind import sides_in, speaking_of, spoken_of, words_here
 from campaign.errors import Problem
 from campaign.protocol.files import Origin
 from campaign.protocol.positions import Aim, Keys
@@ -35,15 +36,18 @@ def find_faults(
     model: type[Model], tree: Mapping[str, Any], also: Collection[str] = ()
 ) -> Model | list[Fault]:
     """`tree` as a `model`, or where it is wrong, before anybody knows where it came from."""
-    faults = list(_loose_values(model, tree))
-    try:
-        valid = model.model_validate(dict(tree))
-    except ValidationError as error:
-        details = error.errors(include_url=False)
-        faults += (_fault(model, tree, one, also) for one in details)
-    else:
-        if not faults:
-            return valid
+    # A bench says itself how it moves; options are read with the one of their test in mind.
+    sides = sides_in(tree) if "axis" in model.model_fields else spoken_of()
+    with speaking_of(sides):
+        faults = list(_loose_values(model, tree))
+        try:
+            valid = model.model_validate(dict(tree))
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+            faults += (_fault(model, tree, one, also) for one in details)
+        else:
+            if not faults:
+                return valid
     return _once_per_place(faults)
 
 
@@ -161,13 +165,14 @@ def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
         return f"{here} is not allowed here; {allowed(names)}{nearest(value, names)}"
     if kind in _COMPARED:
         limit, words = _COMPARED[kind]
-        quantity = shape.quantity if shape is not None else None
+        quantity = shape.quantity.here if shape is not None and shape.quantity else None
         unit = f" {quantity.si}" if quantity else ""
         return f"{here}{unit} is out of range; it must be {words} {context[limit]:g}{unit}"
     if kind in _WANTED:
         wanted = _WANTED[kind]
         if shape is not None and shape.quantity and "number" in wanted:
-            wanted = f"{_a(shape.quantity.name)} as text, such as {shape.quantity.example}"
+            quantity = shape.quantity.here
+            wanted = f"{_a(quantity.name)} as text, such as {quantity.example}"
         if wanted == "a list" and isinstance(value, Mapping):
             return f"{here} is not a list; write [[{detail['loc'][-1]}]] for each of its tables"
         return f"{here} is not {wanted}"
@@ -179,8 +184,9 @@ def _expected(shape: Shape | None) -> str:
     if shape is None:
         return ""
     if shape.quantity is not None:
-        return f": {_a(shape.quantity.name)} such as {shape.quantity.example}; {shape.meaning}"
-    return f": {shape.meaning}" if shape.meaning else ""
+        quantity, meaning = shape.quantity.here, words_here(shape.meaning)
+        return f": {_a(quantity.name)} such as {quantity.example}; {meaning}"
+    return f": {words_here(shape.meaning)}" if shape.meaning else ""
 
 
 def _literals(expected: str) -> list[str]:

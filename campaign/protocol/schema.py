@@ -21,7 +21,7 @@ from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
-from campaign.trial import Most, Tree, TrialRequest
+from campaign.trial import Most, Offered, Tree, TrialRequest
 
 PROTOCOL_SCHEMA = 2
 BENCH_SCHEMA = 3
@@ -83,6 +83,12 @@ class ExperimentKind(typing.Protocol):
     @property
     def stages(self) -> Sequence[StageKind]: ...
 
+    @property
+    def recorded(self) -> Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None: ...
+
+    @property
+    def windows(self) -> tuple[str, ...]: ...
+
 
 class OperatorEntry(Options):
     """One `[[test.operator]]`: what a person must do to the bench."""
@@ -132,6 +138,8 @@ class TestEntry(Options):
     """Of everything random in the test; drawn and recorded when absent."""
     operator: tuple[OperatorEntry, ...] = ()
     """What a person must have done to the bench, each under `[[test.operator]]`."""
+    recording: tuple[dict[str, Any], ...] = ()
+    """Files that were recorded elsewhere, in place of trials: `campaign import`."""
 
 
 class ProtocolFile(Options):
@@ -159,6 +167,8 @@ class ProtocolFile(Options):
     """Pauses in which the bench cools down."""
     check: CheckEntry | None = None
     """A trial that is repeated to see that the bench is still the same."""
+    columns: dict[str, dict[str, Any]] = {}
+    """What the columns of files from elsewhere are, by a name of your own: `campaign import`."""
     test: tuple[dict[str, Any], ...] = ()
     """The tests, each under `[[test]]`."""
 
@@ -218,6 +228,7 @@ class Protocol:
         calibration: what may be fitted, None when the protocol does not say.
         policy, check: of this file; those of included protocols do not apply.
         truth_sources: verbatim text of every truth, by its name as written; not among `sources`.
+        columns: of files from elsewhere, as written in this file; `origin` is where that stands.
     """
 
     path: Path
@@ -234,6 +245,8 @@ class Protocol:
     policy: Policy = field(default_factory=Policy)
     check: Check | None = None
     truth_sources: Mapping[str, str] = field(default_factory=dict)
+    columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    origin: Origin | None = None
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

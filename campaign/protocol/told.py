@@ -37,7 +37,7 @@ def told_point(
     for name, value in point.items():
         found = next(_like(options, name), None)
         if found is not None and isinstance(value, float):
-            field, quantity = found
+            field, quantity = found[0], found[1].here
             unit = next(_units(written.get(field), quantity), quantity.display)
             shown = convert(value, quantity.si, unit)
             told[name] = f"{shown:.{DIGITS}g} {unit}"

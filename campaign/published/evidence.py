@@ -59,12 +59,15 @@ def evidence_of(
     """What a test on `bench` brings; None when nobody knows the bench.
 
     A table may ask whether a number is from a simulation or from hardware: here that is whether
-    the bench's controller is continuous, or sampled as a real one is. Where the samples themselves
-    come from is the `source`.
+    the bench's controller is continuous, or sampled as a real one is; of a bench that says nothing
+    of its controller nobody knows. Where the samples themselves come from is the `source`.
     """
     if bench is None:
         return Evidence(test, reproduces, findings, source=source, provenance=provenance)
-    domain = "simulation" if bench.controller.sample_rate is None else "hardware"
+    conditions: dict[str, Value] = {}
+    if bench.controller is not None:
+        sampled = bench.controller.sample_rate is not None
+        conditions["domain"] = "hardware" if sampled else "simulation"
     known = bench.known
     return Evidence(
         test,
@@ -73,7 +76,7 @@ def evidence_of(
         known.given,
         known.fitted,
         known.seen,
-        {"domain": domain},
+        conditions,
         _named(known.document, (*known.given, *known.fitted, *known.seen)),
         source=source,
         provenance=provenance,

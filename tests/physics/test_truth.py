@@ -10,6 +10,7 @@ import pytest
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, MOTOR_CURRENT
 from campaign.physics.bench import Bench
+from campaign.physics.complete import complete
 from campaign.physics.lanes import Lane
 from campaign.physics.truth import digest, has, plant_of, settings, simulated, with_settings
 from campaign.signals import Polyline
@@ -123,7 +124,8 @@ def test_controller_compensation_and_limits_are_the_stated_ones() -> None:
 
     stated = bench()
     both = simulated(plant_of(bench(other)), stated)
-    assert both == stated.model_copy(update={"known": both.known})  # which is said of the stated
+    # What is known is said of the stated one.
+    assert both == complete(stated.model_copy(update={"known": both.known}))
 
 
 def test_teeth_are_counted() -> None:

@@ -55,6 +55,16 @@ def test_parts_of_the_page(tmp_path: Path) -> None:
     assert trial.setup == ("Preload the spring to 50 N m", "Remove the transport lock")
 
 
+def test_a_linear_bench_of_the_page(tmp_path: Path) -> None:
+    (block,) = blocks("toml linear")
+    shipped = (SHIPPED / "benches" / "linear.toml").read_text(encoding="utf-8")
+    rest = shipped[shipped.index("[friction.load]") :]
+    path = tmp_path / "linear.toml"
+    path.write_text(f'name = "linear"\n{block}\n{rest}', encoding="utf-8")
+    bench, own = load_bench(str(path)), load_bench("linear")
+    assert bench.model_copy(update={"description": own.description}) == own
+
+
 def test_scatter_and_preload_of_the_page(tmp_path: Path) -> None:
     (block,) = blocks("toml bench")
     simulink = (SHIPPED / "benches" / "simulink.toml").read_text()

@@ -18,7 +18,7 @@ from campaign.physics.compensation.interface import (
     Compensator,
     LinearBlock,
 )
-from campaign.units import Inertia, RotationalDamping
+from campaign.units import Inertia, ObserverGain
 
 
 class ObserverOptions(Options):
@@ -26,7 +26,7 @@ class ObserverOptions(Options):
 
     method: Literal["observer"]
     """Single-state disturbance observer."""
-    gain: RotationalDamping = Field(gt=0)
+    gain: ObserverGain = Field(gt=0)
     """K0: motor-side torque per rate error; N K0 / J is the corner frequency (rad/s)."""
     inertia: Inertia | None = Field(default=None, gt=0)
     """J': the inertia that the observer assumes; the bench's own when absent."""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 from pydantic.fields import FieldInfo
 
+from campaign.axis_kind import speaking_of, spoken_of
 from campaign.options import Options
-from campaign.units import TORQUE, Angle, Quantity
+from campaign.units import TORQUE, Phase, Quantity
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,8 @@ class Ripple(Options):
     amplitude: float = Field(default=0.0, ge=0, lt=1)
     """Share of the torque."""
     periods: float = Field(default=1.0, gt=0, le=10_000)
-    """Periods per revolution of the load."""
-    phase: Angle = 0.0
+    """Periods per revolution of the load; per 2 pi metres of a linear one."""
+    phase: Phase = 0.0
     """Phase at zero angle, of the load's angle times periods."""
 
 
@@ -40,6 +41,23 @@ class FrictionOptions(Options):
     """Whether the preload of the anti-backlash gear acts on this interface."""
     ripple: Ripple = Ripple()
     """How the torque varies with the angle of the load."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_its_side(cls, tree: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Between a rotary motor and a linear load, each side has units of its own."""
+        sides = spoken_of()
+        if sides.load is sides.motor or not isinstance(tree, Mapping):
+            return handler(tree)
+        own, rate = (tree.get(name, "load") for name in ("side", "velocity"))
+        with speaking_of(sides.at_motor if own == "motor" else sides):
+            options = handler(tree)
+        if own != rate:
+            raise ValueError(
+                f"side is '{own}' and velocity '{rate}': with gear.lead the two have different "
+                "units, N m and m/s; write the same for both"
+            )
+        return options
 
     def at_load(self, ratio: float) -> tuple[float, float]:
         """What one N m of it counts at the load behind a gear `ratio`, and its rate per load rate.

@@ -1,0 +1,45 @@
+"""Whether what a bench says of scatter and preload leads to friction that it has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from campaign.physics.friction_paths import Keys, as_written
+from campaign.physics.preload import FORMER as FORMER_PRELOAD
+from campaign.physics.preload import PreloadOptions, wrong_shares
+from campaign.physics.scatter import FORMER as FORMER_VARIATION
+from campaign.physics.scatter import VariationOptions, wrong_scatter
+
+_VARIATION: Keys = ("variation",)
+_PRELOAD: Keys = ("gear", "preload")
+
+
+def wrong_paths(
+    tree: Any,
+    friction: Mapping[str, Any],
+    variation: VariationOptions | None,
+    preload: PreloadOptions | None,
+) -> Iterator[tuple[Keys, str]]:
+    """Where in a bench's `tree`, as written, a path leads to no friction, and the message."""
+    if variation is not None:
+        raw = _at(tree, _VARIATION)
+        for wrong in wrong_scatter(variation, friction):
+            yield (*_VARIATION, *as_written(raw, wrong.keys, FORMER_VARIATION)), wrong.message
+    if preload is not None:
+        raw = _at(tree, _PRELOAD)
+        for wrong in wrong_shares(preload, friction):
+            yield (*_PRELOAD, *as_written(raw, wrong.keys, FORMER_PRELOAD)), wrong.message
+
+
+def in_former_spelling(tree: Any) -> bool:
+    """Whether scatter or preload are written as they were before there were paths."""
+    written = {*_at(tree, _VARIATION), *_at(tree, _PRELOAD)}
+    return bool(written & {*FORMER_VARIATION, *FORMER_PRELOAD})
+
+
+def _at(tree: Any, keys: Keys) -> Mapping[str, Any]:
+    """The table at `keys`; an empty one when there is none."""
+    for key in keys:
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return tree if isinstance(tree, Mapping) else {}

@@ -1,0 +1,61 @@
+"""The gear between motor and load, as the bench's file describes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    model_serializer,
+    model_validator,
+)
+
+from campaign.options import Options
+from campaign.physics.friction_paths import invalid
+from campaign.physics.preload import PreloadOptions
+from campaign.units import LEAD, Lead
+
+
+class GearOptions(Options):
+    """The gear between motor and load."""
+
+    ratio: float = Field(gt=0)
+    """N: motor rate over load rate."""
+    lead: Lead | None = Field(default=None, gt=0)
+    """Travel of a linear load per revolution of a rotary motor, in place of the ratio; absent: the
+    motor moves as the load does."""
+    preload: PreloadOptions | None = None
+    """Its anti-backlash preload; absent: the friction parameters say it all."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _ratio_of_lead(cls, tree: Any, info: ValidationInfo) -> Any:
+        """With a lead N = 2 pi / lead, in radians of the motor per metre of the load."""
+        if not isinstance(tree, Mapping) or tree.get("lead") is None:
+            return tree
+        archived = isinstance(info.context, Mapping) and info.context.get("si")
+        if "ratio" in tree and not archived:  # an archived one is from the lead, and it may change
+            raise invalid([(("ratio",), "'ratio' follows from 'lead'; remove one of the two")])
+        return {**tree, "ratio": _ratio(tree["lead"])}
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without a lead it is archived as before there was one: fingerprints stay."""
+        tree: dict[str, Any] = dump(self)
+        if self.lead is None:
+            tree.pop("lead", None)
+        return tree
+
+
+def _ratio(lead: Any) -> float:
+    """Of a lead as written or in SI; of one that is none, which its own field complains of, 1."""
+    try:
+        travel = LEAD.parse(lead) if isinstance(lead, str) else float(lead)
+    except (TypeError, ValueError):
+        return 1.0
+    # m/rev, so that a file's 10 mm/rev is 0.01 in the archive.
+    return 2.0 * math.pi / travel if travel > 0 and math.isfinite(travel) else 1.0
