@@ -30,6 +30,24 @@ LOST = frozenset(
 )
 """Cells of a column of numbers that hold none, in lower case; infinity was never measured."""
 NO_UNIT = frozenset({"", "-", "–", "1", "none", "(none)", "[-]", "(-)", "unitless", "n/a"})
+UNIT_WORDS = {
+    "volt": "V",
+    "volts": "V",
+    "ampere": "A",
+    "amperes": "A",
+    "amp": "A",
+    "amps": "A",
+    "second": "s",
+    "seconds": "s",
+    "newton": "N",
+    "u/min": "rpm",
+    "umdr/min": "rpm",
+    "min-1": "1/min",
+    "%": "percent",
+    "inc": "count",
+    "ticks": "count",
+}
+"""Units as instruments write them, in lower case, in the spelling of the program's grammar."""
 _BRACKETED = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
 
 
@@ -56,13 +74,16 @@ def value_of(cell: str, decimal: str) -> float:
         raise ValueError(cell)
     if decimal == ",":
         cell = cell.replace(".", "").replace(",", ".")
-    return float(cell.replace("d", "e").replace("D", "e"))
+    value = float(cell.replace("d", "e").replace("D", "e"))
+    if value in (float("inf"), -float("inf")):
+        raise ValueError(cell)  # a number beyond all numbers
+    return value
 
 
 def is_unit(cell: str) -> bool:
     """Whether a cell may stand in a row of units, where an empty one may, too."""
     bare = without_brackets(cell)
-    if bare.lower() in NO_UNIT or bare in ("%", "‰"):
+    if bare.lower() in NO_UNIT or bare.lower() in UNIT_WORDS or bare == "‰":
         return True
     try:
         parse_unit(bare)

@@ -8,27 +8,21 @@ rows into numbers is the file's, and a second one that does as well is a doubt f
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice, takewhile
+from itertools import islice
 from typing import NamedTuple
 
-from campaign.importing.cells import (
-    is_lost,
-    is_number,
-    is_unit,
-    name_and_unit,
-    plain,
-    without_brackets,
-)
+from campaign.importing.cells import is_lost, is_number, plain
+from campaign.importing.heading import heading
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 ENDS = 20
 """Rows at the end of a sample by which a way of reading is judged first."""
-HEADINGS = 3
-"""Most rows of a heading that belong to columns: names, units, and one more."""
-_KEYED = re.compile(r"\s*(?:[#%*/]+\s*)?([^:=\t;,]{1,60}?)\s*[:=\t;,]\s*(.+?)[\s;,]*")
+_LONGEST_KEY = 60
+_ENDS_KEY = ":=\t;,"
+_AROUND = " \t;,"
+"""Characters that end a key, and those around a value."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +75,10 @@ def split(line: str, separator: str) -> list[str]:
         return line.split()
     if '"' in line:
         line = line.strip("\r\n")
-        return [plain(cell) for cell in next(csv.reader([line], delimiter=separator), [])]
+        try:
+            return [plain(cell) for cell in next(csv.reader([line], delimiter=separator), [])]
+        except csv.Error:  # a quote that never ends, or no quote at all
+            return [plain(cell) for cell in line.split(separator)]
     return [plain(cell) for cell in line.rstrip("\r\n").split(separator)]
 
 
@@ -150,47 +147,21 @@ def _read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, 
     columns = width
     if columns > 1 and all(cells[-1] == "" for _, cells in body if len(cells) == width):
         columns -= 1  # every row ends with a separator
-    names, units, used = _heading(above, columns)
+    names, units, used = heading([cells for _, cells in above], columns)
     said = _said(lines[place] for place, _ in above[: len(above) - used])
     kept = tuple(numeric[:columns])
     found = Dialect(separator, decimal, first + 1, width, names, units, kept, said)
     return _Fit(sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
 
 
-def _heading(
-    above: Sequence[tuple[int, list[str]]], columns: int
-) -> tuple[tuple[str, ...], tuple[str, ...], int]:
-    """Names, units, and how many rows above the table they take."""
-    near = list(
-        takewhile(lambda each: len(each[1]) in (columns, columns + 1), reversed(above[-HEADINGS:]))
-    )
-    rows = [cells for _, cells in reversed(near) if any(cells)]
-    # Of comments only the last can be a heading; those above it are sentences.
-    commented = [k for k, cells in enumerate(rows) if cells[0][:1] in ("#", "%")]
-    rows = rows[commented[-1] :] if commented else rows
-    rows = [[cells[0].lstrip("#% "), *cells[1:]] for cells in rows]
-    rows = [cells[:columns] if cells[0] else cells[1 : columns + 1] for cells in rows]
-    while rows and any(map(_is_any_number, rows[0])):
-        rows.pop(0)  # a key and its value
-    named = next((k for k, cells in enumerate(rows) if not all(map(is_unit, cells))), None)
-    if named is None:
-        # A single row of what may all be units is a row of names: t, A, V.
-        return (tuple(rows[-1]), ("",) * columns, 1) if len(rows) == 1 else ((), ("",) * columns, 0)
-    split_up = [name_and_unit(cell) for cell in rows[named]]
-    names, units = (tuple(each) for each in zip(*split_up, strict=True))
-    for cells in rows[named + 1 :]:
-        if all(map(is_unit, cells)):
-            below = (without_brackets(cell) for cell in cells)
-            units = tuple(own or other for own, other in zip(units, below, strict=True))
-    return names, units, len(rows) - named
-
-
 def _said(lines: Iterable[str]) -> dict[str, str]:
     said: dict[str, str] = {}
     for line in lines:
-        found = _KEYED.fullmatch(plain(line))
-        if found:
-            said.setdefault(found[1].strip(), found[2].strip())
+        text = plain(line).lstrip("#%*/").lstrip()
+        end = next((k for k, sign in enumerate(text[: _LONGEST_KEY + 1]) if sign in _ENDS_KEY), 0)
+        key, value = text[:end].strip(), text[end + 1 :].strip(_AROUND)
+        if key and value:
+            said.setdefault(key, value)
     return said
 
 
@@ -198,10 +169,6 @@ def _looks_like_row(cells: Sequence[str], width: int, decimal: str) -> bool:
     """Whether a line above the table has so many numbers that it is a row of it, and no heading."""
     numbers = sum(is_number(cell, decimal) for cell in cells)
     return len(cells) > 1 and 2 * numbers >= max(len(cells), width)
-
-
-def _is_any_number(cell: str) -> bool:
-    return is_number(cell, ".") or is_number(cell, ",")
 
 
 def _has_number(cells: Sequence[str], decimal: str) -> bool:

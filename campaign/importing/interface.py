@@ -5,6 +5,7 @@ Nothing is converted here and nothing is guessed: a unit is text, a number what 
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,23 @@ class RecordingError(UsageError):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
+
+
+def check_regular(path: Path) -> None:
+    """Raise RecordingError for what is no regular file; nothing is opened.
+
+    Pipes and devices have no end, and a pipe that nobody writes to would be waited for.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        told = getattr(error, "strerror", None) or str(error)
+        raise RecordingError([Problem(path, 0, 0, f"it cannot be opened: {told}")]) from None
+    if stat.S_ISDIR(mode):
+        raise RecordingError([Problem(path, 0, 0, "it cannot be opened: it is a folder")])
+    if not stat.S_ISREG(mode):
+        message = "it cannot be opened: it is a pipe, a device or the like, and no regular file"
+        raise RecordingError([Problem(path, 0, 0, message)])
 
 
 @dataclass(frozen=True)

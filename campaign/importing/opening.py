@@ -7,7 +7,7 @@ from pathlib import Path
 
 from campaign.errors import Problem
 from campaign.importing.formats import recording_formats
-from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
+from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table, check_regular
 
 TEXT = "text"
 """What any text may be; all other formats are asked before."""
@@ -18,6 +18,7 @@ def format_of(path: Path) -> RecordingFormat:
 
     Raises RecordingError when it is in no format that there is, or cannot be opened.
     """
+    check_regular(path)
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)

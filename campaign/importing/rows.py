@@ -21,6 +21,10 @@ from campaign.importing.interface import HEAD, ROWS, Array, RecordingError
 
 LONGEST = 1 << 20
 """Most characters of a line; what is longer is no table."""
+WHOLE = 1 << 23
+"""Characters of a block, after which it ends: the lines of wide tables are long."""
+SAMPLE = 1 << 21
+"""Most characters by which a file is judged."""
 FEW = 10
 """Most problems that are told of a file."""
 
@@ -51,6 +55,22 @@ def lines_of(file: TextIO, path: Path) -> Iterator[str]:
         raise RecordingError([Problem(path, number + 1, 0, message)]) from None
 
 
+def beginning(file: TextIO, path: Path, count: int) -> list[str]:
+    """The first lines of a file, fewer where they are long. Raises RecordingError as `lines_of`."""
+    return _up_to(lines_of(file, path), count, SAMPLE)
+
+
+def _up_to(lines: Iterator[str], count: int, size: int) -> list[str]:
+    """The next lines, `count` of them at most, and no further one once they have that size."""
+    found: list[str] = []
+    for line in islice(lines, count):
+        found.append(line)
+        size -= len(line)
+        if size <= 0:
+            break
+    return found
+
+
 def blocks(
     path: Path, encoding: str, dialect: Dialect, places: Sequence[int], rows: int | None = None
 ) -> Iterator[Array]:
@@ -59,7 +79,7 @@ def blocks(
         last = None if rows is None else dialect.first - 1 + rows
         lines = islice(lines_of(file, path), dialect.first - 1, last)
         number = dialect.first
-        while block := list(islice(lines, ROWS)):
+        while block := _up_to(lines, ROWS, WHOLE):
             values = _quickly(block, dialect, places)
             if values is None:
                 values = _row_by_row(path, block, number, dialect, places, lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import h5py
@@ -31,6 +32,8 @@ LVM = (
     "X_Value\ttorque\tangle\tComment\n"
     "0,000\t2,5\t2\t\n0,001\t2,6\t3\t\n"
 )
+
+RIGOL = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-1.0e-03,2.0e-04\n0,1.5,2,\n1,1.6,3,\n"
 
 TWINCAT = (
     "Name\tScope Project\nFile\tC:\\x.tcscopex\n"
@@ -95,6 +98,39 @@ def text(content: str, encoding: str = "utf-8") -> Callable[[Path], None]:
     return lambda path: path.write_text(content, encoding=encoding, newline="") and None
 
 
+def parquet(path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet as library
+
+    library.write_table(pa.table({"t": TIME, "w": RATE, "tau": TORQUE}), path)
+
+
+def tdms(path: Path) -> None:
+    import nptdms
+
+    waveform = {"wf_increment": 0.01, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("rig", "w", RATE, waveform)])
+
+
+def workbook(path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(["t [s]", "w [rad/s]"])
+    for row in zip(TIME.tolist(), RATE.tolist(), strict=True):
+        book.active.append(row)
+    book.save(path)
+
+
+def mdf(path: Path) -> None:
+    import asammdf
+
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(RATE, TIME, name="w", unit="rad/s")])
+        file.save(path)
+
+
 MADE: dict[str, Callable[[Path], None]] = {
     "plain.csv": text(CSV),
     "german.csv": text(GERMAN, "cp1252"),
@@ -107,5 +143,13 @@ MADE: dict[str, Callable[[Path], None]] = {
     "simulink.mat": simulink,
     "v73.mat": mat73,
     "plain.h5": hdf5,
+    "NewFile1.csv": text(RIGOL),
 }
 """How each file is made, by its name."""
+LIBRARIES = {"a.parquet": "pyarrow", "a.tdms": "nptdms", "a.xlsx": "openpyxl", "a.mf4": "asammdf"}
+"""Of files that an optional library makes and reads, which."""
+MADE |= {
+    name: how
+    for name, how in zip(LIBRARIES, (parquet, tdms, workbook, mdf), strict=True)
+    if find_spec(LIBRARIES[name])
+}

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import scipy.io
 
+from campaign.importing.formats import hdf5, tdms
 from campaign.importing.interface import Clock, RecordingError, Table
 from campaign.importing.opening import open_recordings
-from tests.importing.files import LVM, MADE, RATE, TIME, TORQUE, TWINCAT, N, mat
+from tests.importing.files import LVM, MADE, RATE, RIGOL, TIME, TORQUE, TWINCAT, N, mat
 
 
 def made(folder: Path, name: str) -> Path:
@@ -70,6 +71,24 @@ def test_channels_with_times_of_their_own_are_apart(tmp_path):
     assert headings(angle) == [("time", "s"), ("angle", "deg")]
     assert torque.whole().tolist() == [[0, 1], [0.1, 3]]
     assert angle.whole().tolist() == [[0.5, 2], [0.6, 4]]
+
+
+# Oscilloscopes
+
+
+def test_a_scope_that_counts_samples_states_their_clock(tmp_path):
+    path = tmp_path / "NewFile1.csv"
+    path.write_text(RIGOL)
+    (table,) = opened(path, "rigol")
+    assert table.clock == Clock(2e-4, -1e-3)
+    assert headings(table) == [("X", ""), ("CH1", "Volt"), ("CH2", "Volt")]
+    assert table.whole().tolist() == [[0, 1.5, 2], [1, 1.6, 3]]
+    path.write_text(RIGOL.replace("2.0e-04", ""))
+    with pytest.raises(RecordingError, match=r"NewFile1.csv:2:1: below Start and Increment"):
+        opened(path, "rigol")
+    path.write_text(RIGOL.split("\n0,")[0] + "\n")
+    with pytest.raises(RecordingError, match="no row of numbers"):
+        opened(path, "rigol")
 
 
 # TwinCAT
@@ -158,10 +177,13 @@ def test_structures_of_simulink_have_their_time(tmp_path):
 
 def test_version_7_3_is_read_in_parts(tmp_path, monkeypatch):
     monkeypatch.setattr("campaign.importing.arrays.ROWS", 7)
-    (table,) = opened(made(tmp_path, "v73.mat"), "hdf5")
+    path = made(tmp_path, "v73.mat")
+    (here,) = hdf5.tables(path)  # as the other process has it
+    assert max(len(block) for block in here.read([0, 3])) == 7
+    (table,) = opened(path, "hdf5")
     assert [name for name, _ in headings(table)] == ["both(:,1)", "both(:,2)", "t", "rec.tau"]
-    assert max(len(block) for block in table.read([0, 3])) == 7
-    np.testing.assert_array_equal(table.whole(), np.column_stack([RATE, TORQUE, TIME, TORQUE]))
+    for whole in (table.whole(), here.whole()):
+        np.testing.assert_array_equal(whole, np.column_stack([RATE, TORQUE, TIME, TORQUE]))
     assert table.said["name"] == "rig"
 
 
@@ -223,6 +245,9 @@ def test_channels_of_tdms_have_the_clock_of_their_waveform(tmp_path, monkeypatch
                 nptdms.ChannelObject("rig", "half", TORQUE, {"wf_increment": 0.01}),
             ]
         )
+    here = tdms.tables(path)[0]  # as the other process has it
+    assert max(len(block) for block in here.read([0])) == 7
+    np.testing.assert_array_equal(here.whole(), np.column_stack([RATE, TORQUE]))
     clocked, other = opened(path, "tdms")
     assert headings(clocked) == [("w", "rad/s"), ("tau", "N m")]
     assert (clocked.clock, clocked.rows) == (Clock(0.01, 0.5), N)

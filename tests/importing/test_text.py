@@ -51,6 +51,16 @@ def test_the_encoding_is_found(path, codec):
     assert found.whole()[:, 1].tolist() == [1.5, 2.5, 3.5]
 
 
+AMPLIFIER = (
+    "Sampling time interval(ms),0.667,\nTime,Analog 1,Analog 2\n"
+    "ms,Servo motor speed,Torque\n0,1,2\n1,2,3\n2,3,4\n"
+)
+LOGGER = (
+    'Interval,0.1,Interval,0.1\nChannel name,"Force",Channel name,"RMV"\n'
+    'Unit,"N",Unit,"V"\n0,1,0,2\n1,2,1,3\n'
+)
+
+
 @pytest.mark.parametrize(
     ("content", "names", "units", "last"),
     [
@@ -63,6 +73,12 @@ def test_the_encoding_is_found(path, codec):
         ("t\ta\n0\t1\n1\t2\nEOF\n", ["t", "a"], ["", ""], [1, 2]),
         ('"t","a, b"\n"0","1"\n"1","2"\n', ["t", "a, b"], ["", ""], [1, 2]),
         ("t;a\n0;1D-3\n1;2D+01\n", ["t", "a"], ["", ""], [1, 20]),
+        (AMPLIFIER, ["Time", "Servo motor speed", "Torque"], ["ms", "", ""], [2, 3, 4]),
+        (LOGGER, ["time", "Force", "time", "RMV"], ["", "N", "", "V"], [1, 2, 1, 3]),
+        ("x-axis,1,2\nsecond,Volt,Volt\n0,1,2\n1,2,3\n", ["x-axis", "1", "2"],
+         ["second", "Volt", "Volt"], [1, 2, 3]),
+        ("Sample Interval,1e-3\nVertical Units,V,A\n\nTIME,CH1,CH2\n0,1,2\n1,2,3\n",
+         ["TIME", "CH1", "CH2"], ["", "V", "A"], [1, 2, 3]),
     ],
 )  # fmt: skip
 def test_habits_of_other_programs(path, content, names, units, last):

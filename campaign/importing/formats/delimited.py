@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 from campaign.errors import Problem
 from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
 from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import blocks, encoding_of_file, lines_of
+from campaign.importing.rows import beginning, blocks, encoding_of_file
 
 SAMPLE = 400
 """Lines by which the table is."""
@@ -20,7 +19,7 @@ def tables(path: Path) -> Sequence[Table]:
     """The one table of a text file. Raises RecordingError."""
     encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
-        sample = list(islice(lines_of(file, path), SAMPLE))
+        sample = beginning(file, path, SAMPLE)
     dialect = dialect_of(sample)
     if dialect is None:
         separators = ", ".join(SEPARATORS.values())

@@ -16,6 +16,7 @@ import numpy as np
 from campaign.errors import Problem
 from campaign.importing.arrays import WIDEST, Named, tables_of
 from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table
+from campaign.importing.streaming import tables_streamed
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 MOST = 10_000
@@ -32,7 +33,8 @@ OPAQUE = (
 )
 
 
-def _tables(path: Path) -> Sequence[Table]:
+def tables(path: Path) -> Sequence[Table]:
+    """What is in a file, in the process that asks; a broken one can end it."""
     import h5py
 
     arrays: list[Named] = []
@@ -142,5 +144,5 @@ FORMAT = RecordingFormat(
     "HDF5, and MAT files of version 7.3",
     (".h5", ".hdf5", ".hdf", ".mat", ".nxs"),
     lambda head: head.startswith(MAGIC) or head[512 : 512 + len(MAGIC)] == MAGIC,
-    _tables,
+    partial(tables_streamed, __name__),
 )

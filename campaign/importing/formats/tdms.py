@@ -23,11 +23,13 @@ from campaign.importing.interface import (
     RecordingFormat,
     Table,
 )
+from campaign.importing.streaming import tables_streamed
 
 MAGIC = b"TDSm"
 
 
-def _tables(path: Path) -> Sequence[Table]:
+def tables(path: Path) -> Sequence[Table]:
+    """What is in a file, in the process that asks."""
     try:
         from nptdms import TdmsFile
     except ImportError:
@@ -94,5 +96,9 @@ def _broken(path: Path, error: Exception) -> RecordingError:
 
 
 FORMAT = RecordingFormat(
-    "tdms", "TDMS of NI, by npTDMS", (".tdms",), lambda head: head.startswith(MAGIC), _tables
+    "tdms",
+    "TDMS of NI, by npTDMS",
+    (".tdms",),
+    lambda head: head.startswith(MAGIC),
+    partial(tables_streamed, __name__),
 )

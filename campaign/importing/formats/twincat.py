@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from campaign.importing.interface import (
     RecordingFormat,
     Table,
 )
-from campaign.importing.rows import blocks, encoding_of_file, lines_of
+from campaign.importing.rows import beginning, blocks, encoding_of_file
 
 NAME = "Name"
 SEPARATORS = "\t;,"
@@ -35,7 +34,7 @@ LONGEST_HEADING = 200
 def _tables(path: Path) -> Sequence[Table]:
     encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
-        lines = list(islice(lines_of(file, path), LONGEST_HEADING))
+        lines = beginning(file, path, LONGEST_HEADING)
     separator = next((each for each in SEPARATORS if lines[0].startswith(f"{NAME}{each}")), "\t")
     rows = [split(line, separator) for line in lines]
     headed = next((k for k, cells in enumerate(rows) if k and cells[0] == NAME), None)

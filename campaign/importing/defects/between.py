@@ -1,0 +1,215 @@
+"""What is wrong between an angle and its rate: factor, sign, delay.
+
+They are held against each other over stretches of time, by how far each says that the axis moved:
+from sample to sample a quantised angle has no derivative, over a stretch it has a difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.importing.defects.defect import Array, Defect, Severity, step_size
+
+_LIKE = 0.98
+"""The share from which on a factor between a rate and its angle is one."""
+_UNEXPLAINED = 0.1
+"""How far a factor may be from 1 before it needs an explanation: filters and noise cost some."""
+
+DEG = 180 / math.pi
+FACTORS = (
+    (DEG, "the rate is in deg/s, the angle in rad"),
+    (1 / DEG, "the rate is in rad/s, the angle in deg"),
+    (30 / math.pi, "the rate is in rpm, the angle in rad"),
+    (1 / 6, "the rate is in rpm, the angle in deg"),
+    (60.0, "the rate is in rpm, the angle in turns"),
+    (2 * math.pi, "the rate is in rad/s, the angle in turns"),
+    (1 / (2 * math.pi), "the rate is in turns per s, the angle in rad"),
+    (360.0, "the rate is in deg/s, the angle in turns"),
+    (1 / 360.0, "the rate is in turns per s, the angle in deg"),
+    (1000.0, "time is in ms, or the rate in thousandths of the angle's unit"),
+    (1e-3, "the angle is in thousandths of the rate's unit"),
+)
+"""Usual factors between a rate and the derivative of its angle, and what each would mean."""
+
+
+@dataclass(frozen=True)
+class Slope:
+    """A rate over the derivative of its angle.
+
+    Attributes:
+        factor: with its sign.
+        explained: share of variance.
+        error: standard error, as a share of the factor.
+        travel: of the angle in all, in its smallest steps; inf where it has none.
+    """
+
+    factor: float
+    explained: float
+    error: float
+    travel: float
+
+
+def slope(time: Array, angle: Array, rate: Array) -> Slope | None:
+    """The factor between a rate and the derivative of an angle, all shape (n,).
+
+    The stretches are as long as makes both agree best. None where too little moves.
+    """
+    n = len(time)
+    if n < 20:
+        return None
+    known = np.isfinite(angle) & np.isfinite(rate) & np.isfinite(time)
+    filled = np.where(known, rate, 0.0)
+    gone = np.concatenate([[0.0], np.cumsum(0.5 * (filled[1:] + filled[:-1]) * np.diff(time))])
+    lost = np.cumsum(~known)
+    least = step_size(angle)
+    best: Slope | None = None
+    wide = 2
+    while wide <= n // 8:
+        places = np.arange(0, n - wide, max(1, wide // 2))
+        whole = known[places] & (lost[places + wide] == lost[places])
+        places = places[whole]
+        moved, told = (each[places + wide] - each[places] for each in (angle, gone))
+        found = _fit(moved, told, least)
+        if found is not None and (best is None or found.explained > best.explained):
+            best = found
+        wide *= 2
+    return best
+
+
+def _fit(moved: Array, told: Array, least: float) -> Slope | None:
+    clear = np.abs(moved) > 3 * least
+    own, other = float(moved @ moved), float(told @ told)
+    if clear.sum() < 8 or own <= 0 or other <= 0:
+        return None
+    both = float(moved @ told)
+    explained = both**2 / (own * other)
+    factor = math.copysign(math.sqrt(other / own), both)
+    # Stretches overlap by half; those that hardly moved weigh nothing.
+    independent = max(2.0, 0.5 * float(clear.sum()))
+    error = math.sqrt(max(1 - explained, 0.0) / max(explained, 1e-9) / independent)
+    travel = float(np.abs(moved[clear]).sum()) / least if least else math.inf
+    return Slope(factor, explained, error, travel)
+
+
+def of_rate(
+    time: Array,
+    angle: Array,
+    rate: Array,
+    names: tuple[str, str] = ("angle", "rate"),
+    gear: float | None = None,
+) -> Iterator[Defect]:
+    """How a rate disagrees with its angle, shapes (n,): factor, sign, delay.
+
+    Args:
+        names: of the two channels.
+        gear: a ratio that may stand between them.
+    """
+    rows = (0, len(time) - 1)
+    found = slope(time, angle, rate)
+    if found is None or found.travel < 30:
+        return
+    one, two = names
+    if found.explained < 0.5:
+        what = (
+            f"{two} is not the derivative of {one}: it explains {100 * found.explained:.2g} % of "
+            "how far that moved"
+        )
+        yield Defect("unrelated", (two, one), what, rows, found.explained, Severity.NOTED)
+        return
+    if found.factor < 0 and found.explained > 0.9:
+        what = (
+            f"{two} has the opposite sign of the derivative of {one} (factor {found.factor:.4g}, "
+            f"R² {found.explained:.3f})"
+        )
+        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE, "swap_sign")
+    yield from _factor(found, names, rows, gear)
+    if found.explained > 0.9:
+        yield from delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
+
+
+def candidates(factor: float, error: float = 0.0, gear: float | None = None) -> list[str]:
+    """What a factor other than 1 may mean, in words; any whole ratio may be a gear."""
+    tolerance = max(0.003, 3 * error)
+    size = abs(factor)
+    means = [meaning for value, meaning in FACTORS if abs(size / value - 1) <= tolerance]
+    for ratio in (size, 1 / size):
+        if gear is not None and abs(ratio / gear - 1) <= tolerance:
+            means.append(f"they are on the two sides of the gear of {gear:g}")
+        elif round(ratio) >= 2 and abs(ratio / round(ratio) - 1) <= tolerance:
+            means.append(f"they are on the two sides of a gear of {round(ratio)}")
+    return means
+
+
+def _factor(
+    found: Slope, names: tuple[str, str], rows: tuple[int, int], gear: float | None
+) -> Iterator[Defect]:
+    one, two = names
+    size = abs(found.factor)
+    off = abs(size - 1)
+    if found.explained < _LIKE or off <= max(0.03, 4 * found.error):
+        return
+    told = f"{two} is {size:.5g} times the derivative of {one} (R² {found.explained:.4f})"
+    means = candidates(found.factor, found.error, gear)
+    if len(means) == 1:
+        what = f"{told}: {means[0]}"
+        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE, "scale")
+    elif means:
+        what = f"{told}: either {', or '.join(means)}"
+        yield Defect("factor", (two, one), what, rows, size, Severity.REFUSED)
+    elif off > _UNEXPLAINED:
+        severe = found.travel > 100 and not 0.5 < size < 2
+        severity = Severity.REFUSED if severe else Severity.NOTED
+        yield Defect("factor", (two, one), f"{told}, for no usual reason", rows, size, severity)
+
+
+def delay(
+    time: Array, angle: Array, rate: Array, names: tuple[str, str] = ("angle", "rate")
+) -> Iterator[Defect]:
+    """By how much a rate comes after the derivative of its angle, s, from half a step on."""
+    known = np.isfinite(angle) & np.isfinite(rate)
+    n = len(time)
+    most = min(200, n // 8)
+    if not known.all() or most < 3:
+        return
+    step = float(time[-1] - time[0]) / (n - 1)
+    if step <= 0:
+        return
+    derivative = np.gradient(angle, step)[most : n - most]
+    derivative = derivative - derivative.mean()
+    width = len(derivative)
+    products = _correlation(rate, derivative)
+    sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (rate, rate**2))
+    mean = (sums[width:] - sums[:-width]) / width
+    spread = np.maximum((squares[width:] - squares[:-width]) / width - mean**2, 1e-300)
+    likeness = products / width / np.sqrt(spread) / max(float(derivative.std()), 1e-300)
+    peak = int(np.argmax(likeness))
+    at_rest = float(likeness[most])
+    if not 0 < peak < 2 * most or likeness[peak] < 0.8:
+        return
+    # At least a tenth of what does not agree must be due to the delay.
+    if 1 - likeness[peak] ** 2 > 0.9 * (1 - at_rest**2):
+        return
+    before, top, after = likeness[peak - 1 : peak + 2]
+    bend = before - 2 * top + after
+    lag = (peak - most + (0.5 * (before - after) / bend if bend < 0 else 0.0)) * step
+    if abs(lag) < 0.5 * step:
+        return
+    one, two = names
+    where = "after" if lag > 0 else "before"
+    what = (
+        f"{two} comes {1000 * abs(lag):.3g} ms {where} the derivative of {one} "
+        f"({abs(lag) / step:.2g} samples): a delay or a filter"
+    )
+    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), Severity.NOTED, "shift")
+
+
+def _correlation(values: Array, part: Array) -> Array:
+    """Sum of products of `part` with `values` from each place on that it fits in."""
+    size = 1 << (len(values) - 1).bit_length()
+    spectrum = np.fft.rfft(values, size) * np.conj(np.fft.rfft(part, size))
+    found: Array = np.fft.irfft(spectrum, size)[: len(values) - len(part) + 1]
+    return found

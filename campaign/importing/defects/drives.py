@@ -1,0 +1,199 @@
+"""What is wrong with a torque, a force or a current: clipping, a swapped sign, one signal twice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from campaign.importing.defects.defect import (
+    Array,
+    Defect,
+    Severity,
+    rows_in_words,
+    runs,
+    step_size,
+    usual_step,
+)
+
+SAME = 0.999
+"""Share of a channel's variance that another explains when both are one signal."""
+
+
+def of_drive(name: str, values: Array, command: Array | None = None) -> Iterator[Defect]:
+    """Where a torque, a force or a current is clipped: it stands at its extreme while more was due.
+
+    Args:
+        command: what was asked of the same quantity, in the same unit; a plateau of it explains
+            one of the channel, and a command beyond it proves the clipping.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 100 or np.ptp(known) == 0:
+        return
+    peak = float(np.abs(known).max())
+    usual = usual_step(values)
+    for extreme in (float(known.max()), float(known.min())):
+        at = values == extreme
+        share = float(at.mean())
+        if abs(extreme) < 0.5 * peak or share < 0.005:
+            continue
+        long = [(first, last) for first, last in runs(at) if last - first >= 4]
+        if command is not None:
+            long = [each for each in long if not _asked(values, command, each, usual)]
+        elif _repeats(values):
+            long = [each for each in long if _cut(values, each)]
+        rows = sum(last - first + 1 for first, last in long)
+        if rows < 0.005 * len(values):
+            continue
+        beyond = command is not None and any(
+            np.abs(command[first : last + 1]).max() > 1.02 * abs(extreme) + usual
+            for first, last in long
+        )
+        why = ", where the command went beyond" if beyond else ""
+        what = (
+            f"{name} stands at its extreme {extreme:.6g} for {100 * rows / len(values):.3g} % of "
+            f"the samples, first in {rows_in_words(*long[0])}{why}"
+        )
+        severity = Severity.REFUSED if beyond else Severity.REPAIRABLE
+        ends = (long[0][0], long[-1][1])
+        yield Defect("clipping", (name,), what, ends, extreme, severity, "" if beyond else "lose")
+
+
+def _asked(values: Array, command: Array, stretch: tuple[int, int], usual: float) -> bool:
+    """Whether a plateau is one of the command, to which the channel has come."""
+    first, last = stretch
+    asked = command[first : last + 1]
+    level = values[first]
+    return bool(
+        np.ptp(asked) <= usual and abs(float(asked[0]) - level) <= 0.02 * abs(level) + usual
+    )
+
+
+def _repeats(values: Array) -> bool:
+    """Whether samples beside the extremes have the value of their neighbour, too.
+
+    Noise hardly ever does: then a plateau is one by its being there.
+    """
+    same = np.diff(values) == 0
+    at = (values == np.nanmax(values)) | (values == np.nanmin(values))
+    elsewhere = ~at[1:] & ~at[:-1]
+    return bool(same[elsewhere].sum() > 0.02 * elsewhere.sum())
+
+
+def _cut(values: Array, stretch: tuple[int, int]) -> bool:
+    """Whether a channel runs into a plateau instead of settling at it, and leaves it likewise."""
+    first, last = stretch
+    before, after = values[max(0, first - 4) : first + 1], values[last : last + 5]
+    if len(before) < 4 or len(after) < 4:
+        return False
+    # Settling halves what is left with every few samples; what is cut comes with its full slope.
+    entering, leaving = np.abs(np.diff(before)), np.abs(np.diff(after))
+    return bool(
+        entering[-1] > 0.25 * entering.max() > 0
+        and leaving[0] > 0.25 * leaving.max() > 0
+        and np.all(np.diff(before) * np.sign(values[first]) > 0)
+        and np.all(np.diff(after) * np.sign(values[first]) < 0)
+    )
+
+
+def of_drive_sign(
+    time: Array, angle: Array | None, rate: Array, torque: Array, names: tuple[str, str]
+) -> Iterator[Defect]:
+    """A drive that takes energy out of a motion, and a mass that accelerates against it.
+
+    Braking alone proves nothing: where most of the torque is the inertia's, a late rate turns what
+    is stored into what seems to be lost. A mass has its sign, however late the rate is.
+
+    Args:
+        angle: shape (n,); where it does not come back, gravity may have driven.
+        names: of torque and rate.
+    """
+    known = np.isfinite(rate) & np.isfinite(torque)
+    if known.sum() < 100 or (angle is not None and _hardly_moves(angle)):
+        return
+    power = torque[known] * rate[known]
+    whole = float(np.abs(power).sum())
+    # Power that only scatters cancels down to one over the root of how many samples it has.
+    if whole <= 0 or float(power.sum()) > -0.2 * whole:
+        return
+    mass = _mass_sign(time, rate, torque)
+    if mass > 0:
+        return
+    back = _turns(rate[known]) and angle is not None and _comes_back(angle[known])
+    torque_name, rate_name = names
+    share = float(power.sum()) / whole
+    what = (
+        f"{torque_name} brakes the motion of {rate_name} ({100 * share:.0f} % of the exchanged "
+        "power), as friction would and no drive: its sign, or that of the rate, is swapped"
+    )
+    proven = back and mass < 0
+    if not proven:
+        what += "; or something else drove, such as gravity or the hull"
+    severity = Severity.REPAIRABLE if proven else Severity.NOTED
+    yield Defect("sign", names, what, (0, len(time) - 1), share, severity, "swap_sign")
+
+
+def _mass_sign(time: Array, rate: Array, torque: Array) -> int:
+    """The sign of the mass that torque and rate tell of; 0 where they tell of none.
+
+    Impulse = mass * change of rate + friction, over stretches of some samples.
+    """
+    wide = max(4, min(32, len(time) // 100))
+    known = np.isfinite(rate) & np.isfinite(torque)
+    steps = np.diff(time)
+    impulse, moved, rubbed = (
+        np.concatenate([[0.0], np.cumsum(0.5 * (each[1:] + each[:-1]) * steps)])
+        for each in (np.where(known, x, 0.0) for x in (torque, rate, np.sign(rate)))
+    )
+    places = np.arange(0, len(time) - wide, wide)
+    places = places[known[places] & known[places + wide]]
+    if len(places) < 12:
+        return 0
+    told = impulse[places + wide] - impulse[places]
+    terms = np.column_stack(
+        [each[places + wide] - each[places] for each in (rate, moved, rubbed, time)]
+    )
+    scale = np.abs(terms).max(axis=0)
+    if scale[0] == 0:
+        return 0
+    terms /= np.where(scale > 0, scale, 1.0)
+    found, *_ = np.linalg.lstsq(terms, told, rcond=1e-9)
+    left = told - terms @ found
+    inverse = np.linalg.pinv(terms.T @ terms)[0, 0]
+    error = math.sqrt(max(float(left @ left) / len(told) * float(inverse), 0.0))
+    return int(np.sign(found[0])) if abs(found[0]) > 6 * error else 0
+
+
+def _hardly_moves(angle: Array) -> bool:
+    """Whether a rate that was made of this angle would be its steps more than its motion."""
+    known = angle[np.isfinite(angle)]
+    return not len(known) or float(np.ptp(known)) < 20 * step_size(angle)
+
+
+def _turns(rate: Array) -> bool:
+    """Whether it moves both ways, each at least a tenth of the time it moves."""
+    moving = np.abs(rate) > 0.1 * float(np.abs(rate).max())
+    ahead = float((rate[moving] > 0).mean()) if moving.any() else 0.0
+    return 0.1 < ahead < 0.9
+
+
+def _comes_back(angle: Array) -> bool:
+    known = angle[np.isfinite(angle)]
+    return len(known) > 1 and abs(float(known[-1] - known[0])) < 0.2 * float(np.ptp(known))
+
+
+def of_twins(names: tuple[str, str], one: Array, two: Array) -> Iterator[Defect]:
+    """Whether two channels, shapes (n,), are one signal: two = factor one + offset."""
+    known = np.isfinite(one) & np.isfinite(two)
+    if known.sum() < 20 or np.ptp(one[known]) == 0 or np.ptp(two[known]) == 0:
+        return
+    alike = float(np.corrcoef(one[known], two[known])[0, 1])
+    if not math.isfinite(alike) or alike**2 < SAME:
+        return
+    factor, offset = (float(x) for x in np.polyfit(one[known], two[known], 1))
+    what = (
+        f"{names[1]} is {factor:.5g} times {names[0]} {'+' if offset >= 0 else '-'} "
+        f"{abs(offset):.3g} (R² {alike**2:.5f}): one signal, not two measurements"
+    )
+    yield Defect("twice", names, what, (0, len(one) - 1), factor, Severity.NOTED)

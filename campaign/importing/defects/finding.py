@@ -1,0 +1,152 @@
+"""Everything that is wrong with a recording, by what its channels mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    FRICTION_TORQUE,
+    GYRO_RATE,
+    JOINT_TORQUE,
+    LOAD_RATE,
+    MOTOR_ANGLE,
+    MOTOR_CURRENT,
+    MOTOR_RATE,
+    REFERENCE,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
+from campaign.importing.defects.between import of_rate
+from campaign.importing.defects.clock import drift_between, of_time
+from campaign.importing.defects.defect import Array, Defect, Severity
+from campaign.importing.defects.drives import of_drive, of_drive_sign, of_twins
+from campaign.importing.defects.rates import frozen, slower
+from campaign.importing.defects.samples import of_channel
+
+ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
+DRIVES = (DRIVE_TORQUE, JOINT_TORQUE, MOTOR_CURRENT)
+ASKED = (COMMAND, REFERENCE)
+"""Channels that nobody measures: they may stand still and jump as they like."""
+TOLD = (*ASKED, FRICTION_TORQUE, LOAD_RATE)
+_DERIVATIVES = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE))
+LARGEST = 1e100
+"""What no number of a recording is beyond, in any unit."""
+_ORDER = {Severity.REFUSED: 0, Severity.REPAIRABLE: 1, Severity.NOTED: 2}
+
+
+def find(
+    time: Array,
+    channels: Mapping[str, Array],
+    *,
+    rate: float | None = None,
+    gear: float | None = None,
+    command: str | None = None,
+    other_clock: Array | None = None,
+) -> tuple[Defect, ...]:
+    """What is wrong with a recording, the worst first.
+
+    Args:
+        time: shape (n,), s.
+        channels: by their name in the vocabulary, each shape (n,), in one system of units.
+        rate: what the clock's is said to be, Hz.
+        gear: ratio of motor to load, where it is known.
+        command: which channel the command is the target of, such as `drive_torque`.
+        other_clock: a second one that stamped the same samples, shape (n,), s.
+    """
+    found = [*_absurd({"time": time, **channels})]
+    if any(not each.channels for each in found):
+        return tuple(found)
+    channels = {
+        name: np.where(np.isinf(values), np.nan, values)  # infinity was never measured
+        for name, values in channels.items()
+        if not any(name in each.channels for each in found)
+    }
+    found += of_time(time, rate)
+    if other_clock is not None:
+        found += drift_between(time, other_clock)
+    sound = {}
+    # What follows a command that is drawn by lines is drawn by lines, too.
+    drawn = {
+        (each.kind, each.size)
+        for name in ASKED
+        if name in channels
+        for each in slower(name, channels[name])
+    }
+    for name, values in channels.items():
+        own = list(of_channel(name, values, angle=name in ANGLES))
+        if name not in ASKED:
+            own += [each for each in slower(name, values) if (each.kind, each.size) not in drawn]
+        found += own
+        scale = next((each.size for each in own if each.kind == "wraparound"), None)
+        sound[name] = values if scale is None else np.unwrap(values, period=scale)
+    found += frozen({name: v for name, v in sound.items() if name not in TOLD})
+    for name in DRIVES:
+        if name in sound:
+            asked = sound.get(COMMAND) if command == name else None
+            found += of_drive(name, sound[name], asked)
+    if np.isfinite(time).all() and len(time) > 1 and np.all(np.diff(time) >= 0):
+        found += _between(time, sound, gear)
+    return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))
+
+
+def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
+    """Numbers whose squares would be none: nobody measured them, and nothing follows from them."""
+    for name, values in series.items():
+        beyond = np.flatnonzero(np.isfinite(values) & (np.abs(values) > LARGEST))
+        if len(beyond):
+            first, last = int(beyond[0]), int(beyond[-1])
+            what = f"{name} is {values[first]:.3g} in row {first + 1}: no measurement is that large"
+            about = () if name == "time" else (name,)
+            size = float(values[first])
+            yield Defect("absurd", about, what, (first, last), size, Severity.REFUSED)
+
+
+def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> list[Defect]:
+    found: list[Defect] = []
+    for angle, rate in _DERIVATIVES:
+        if angle in channels and rate in channels:
+            names = (angle, rate)
+            found += of_rate(time, channels[angle], channels[rate], names, gear)
+    if gear is not None:
+        found += _across_the_gear(time, channels, gear)
+    drive = next((name for name in (DRIVE_TORQUE, MOTOR_CURRENT) if name in channels), None)
+    moving = _motion(time, channels)
+    if drive is not None and moving is not None:
+        name, there, moves = moving
+        found += of_drive_sign(time, there, moves, channels[drive], (drive, name))
+    for pair in combinations([name for name in DRIVES if name in channels], 2):
+        found += of_twins(pair, channels[pair[0]], channels[pair[1]])
+    return found
+
+
+def _across_the_gear(time: Array, channels: Mapping[str, Array], gear: float) -> Iterator[Defect]:
+    """A rate against the angle on the other side, where it has none on its own."""
+    across = (
+        (RELATIVE_ANGLE, RELATIVE_RATE, MOTOR_ANGLE, MOTOR_RATE, gear),
+        (MOTOR_ANGLE, MOTOR_RATE, RELATIVE_ANGLE, RELATIVE_RATE, 1.0 / gear),
+    )
+    for angle, own_rate, own_angle, rate, ratio in across:
+        alone = own_rate not in channels and own_angle not in channels
+        if alone and angle in channels and rate in channels:
+            names = (f"{ratio:g} times {angle}", rate)
+            for each in of_rate(time, ratio * channels[angle], channels[rate], names):
+                yield replace(each, channels=(rate, angle))
+
+
+def _motion(time: Array, channels: Mapping[str, Array]) -> tuple[str, Array | None, Array] | None:
+    """What a drive's torque is held against: name of the rate, its angle, the rate itself."""
+    for angle, rate in _DERIVATIVES:
+        if rate in channels:
+            return rate, channels.get(angle), channels[rate]
+    for angle, _ in _DERIVATIVES:
+        if angle in channels and len(time) > 2 and time[-1] > time[0]:
+            there = channels[angle]
+            step = float(time[-1] - time[0]) / (len(time) - 1)
+            return f"the derivative of {angle}", there, np.gradient(there, step)
+    return (GYRO_RATE, None, channels[GYRO_RATE]) if GYRO_RATE in channels else None

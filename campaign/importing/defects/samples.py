@@ -1,0 +1,181 @@
+"""What is wrong with a channel by itself: lost samples, dropouts, clipping, wraparound, steps.
+
+Standing still is no defect, however long: what only a motion would show is judged by how a channel
+enters and leaves the stretch in question.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from campaign.importing.defects.defect import (
+    MOST,
+    Array,
+    Defect,
+    Severity,
+    counted,
+    rows_in_words,
+    runs,
+    step_size,
+    usual_step,
+)
+
+SPANS = (2 * math.pi, 360.0, 1.0, *(float(2**n) for n in range(8, 33)))
+"""Where angles begin anew: a turn, in the units that it is told in."""
+_LONGEST_DROPOUT = 0.05
+"""Share of a recording; what is zero for longer has another reason."""
+_SPIKE = 5.0
+"""Spans of nearly all samples by which a single one may be off its neighbours."""
+_ABRUPT = 8.0
+"""Usual steps, beyond which a step is none that the motion before it would lead to."""
+
+
+def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Defect]:
+    """What is wrong with a channel's samples, shape (n,), in any unit; NaN is a lost sample.
+
+    Args:
+        angle: whether it may turn past the end of its scale.
+    """
+    known = np.isfinite(values)
+    rows = (0, max(len(values) - 1, 0))
+    if not known.any():
+        what = f"{name} holds no number at all"
+        yield Defect("lost", (name,), what, rows, float(len(values)), Severity.REFUSED)
+        return
+    lost = np.flatnonzero(~known)
+    if len(lost):
+        ends = (int(lost[0]), int(lost[-1]))
+        what = f"{name} lacks {counted(len(lost), 'sample')}, the first in row {lost[0] + 1}"
+        yield Defect("lost", (name,), what, ends, float(len(lost)), Severity.NOTED)
+    if len(values) < 2:
+        return
+    level = values[known][0]
+    if np.all(values[known] == level):
+        what = f"{name} is {level:g} throughout"
+        yield Defect("constant", (name,), what, rows, float(level), Severity.NOTED)
+        return
+    yield from _quantised(name, values)
+    turns = list(_wraparound(name, values)) if angle else []
+    yield from turns
+    if not turns:
+        yield from _zeros(name, values)
+        yield from _spikes(name, values)
+    yield from _limit_of_integers(name, values)
+
+
+def _quantised(name: str, values: Array) -> Iterator[Defect]:
+    step = step_size(values)
+    span = float(np.ptp(values[np.isfinite(values)]))
+    if step > 1e-6 * span:
+        what = f"{name} comes in steps of {step:.6g}, {span / step + 1:.0f} of them in its range"
+        yield Defect("quantisation", (name,), what, (0, len(values) - 1), step, Severity.NOTED)
+
+
+def _wraparound(name: str, values: Array) -> Iterator[Defect]:
+    """Jumps by nearly a whole scale, which end where the motion would have led."""
+    steps = np.diff(values)
+    size = np.abs(steps)
+    span = float(np.ptp(values[np.isfinite(values)]))
+    for scale in SPANS:
+        jumps = np.flatnonzero(size > 0.5 * scale)
+        if not len(jumps) or span > scale * (1 + 1e-3) or span < 0.8 * scale:
+            continue
+        others = np.delete(size, jumps)
+        others = others[np.isfinite(others)]
+        usual = float(np.quantile(others, 0.99)) if len(others) else 0.0
+        left = scale - size[jumps]
+        if len(jumps) < 0.2 * len(values) and np.all(np.abs(left) <= max(5 * usual, 0.02 * scale)):
+            what = (
+                f"{name} begins anew {counted(len(jumps), 'time')} at a scale of {scale:.6g}, "
+                f"the first behind row {jumps[0] + 1}"
+            )
+            where = (int(jumps[0]), int(jumps[-1]) + 1)
+            yield Defect("wraparound", (name,), what, where, scale, Severity.REPAIRABLE, "unwrap")
+            return
+
+
+def _zeros(name: str, values: Array) -> Iterator[Defect]:
+    """Zeros that a channel jumps to, and from there back to where it would be."""
+    zero = values == 0
+    if not zero.any() or zero.mean() > _LONGEST_DROPOUT:
+        return
+    found = [(first, last) for first, last in runs(zero) if first > 0 and last < len(values) - 1]
+    if not found:
+        return
+    inside = zero.copy()
+    inside[1:] |= zero[:-1]
+    usual = usual_step(np.where(inside, np.nan, values))
+    firsts, lasts = (np.array(each) for each in zip(*found, strict=True))
+    before, after = values[firsts - 1], values[lasts + 1]
+    lengths = lasts - firsts + 1
+    # Where the motion can have led in that time.
+    reach = usual * (lengths + 1)
+    abrupt = np.minimum(np.abs(before), np.abs(after)) > _ABRUPT * usual
+    back = (np.abs(after - before) <= np.maximum(reach, 0.3 * np.abs(before))) & (
+        np.sign(before) == np.sign(after)
+    )
+    yield from dropouts(
+        name, list(zip(firsts[abrupt & back], lasts[abrupt & back], strict=True)), "is zero"
+    )
+
+
+def _spikes(name: str, values: Array) -> Iterator[Defect]:
+    """Single samples that no motion leads to or away from, far beyond all the others."""
+    known = values[np.isfinite(values)]
+    low, high = np.quantile(known, (0.01, 0.99))
+    span = max(float(high - low), usual_step(values))
+    if len(known) < 100 or span == 0:
+        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(values[1:-1] - 0.5 * values[:-2] - 0.5 * values[2:])
+        found = off > _SPIKE * span
+        found &= np.abs(values[2:] - values[:-2]) < 0.1 * off
+    rows = np.flatnonzero(found) + 1
+    if len(rows):
+        what = (
+            f"{name} has {counted(len(rows), 'single sample')} far beyond all others, the first in "
+            f"row {rows[0] + 1}: {values[rows[0]]:.4g}, where most lie between {low:.4g} and "
+            f"{high:.4g}"
+        )
+        ends = (int(rows[0]), int(rows[-1]))
+        yield Defect("spike", (name,), what, ends, float(len(rows)), Severity.REPAIRABLE, "lose")
+
+
+def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Defect]:
+    """A defect for each stretch, or one for many."""
+    stretches = [(int(first), int(last)) for first, last in found]
+    for first, last in stretches[:MOST]:
+        samples = last - first + 1
+        where = rows_in_words(first, last)
+        what = f"{name} {does} in the middle of motion, {where} ({counted(samples, 'sample')})"
+        yield Defect(
+            "dropout", (name,), what, (first, last), float(samples), Severity.REPAIRABLE, "lose"
+        )
+    rest = stretches[MOST:]
+    if rest:
+        samples = sum(last - first + 1 for first, last in rest)
+        what = f"{name} {does} in {counted(len(rest), 'further stretch').replace('chs', 'ches')}"
+        ends = (rest[0][0], rest[-1][1])
+        yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE, "lose")
+
+
+def _limit_of_integers(name: str, values: Array) -> Iterator[Defect]:
+    """Runs at -2^n or 2^n - 1 of whole numbers: the number that held it was full."""
+    whole = values[np.isfinite(values)]
+    if not np.array_equal(whole, np.round(whole)):
+        return
+    for bits in (7, 8, 11, 12, 13, 15, 16, 23, 24, 31, 32):
+        for limit in (-float(2**bits), float(2**bits - 1)):
+            at = values == limit
+            if limit not in (whole.min(), whole.max()) or at.sum() < 5:
+                continue
+            longest = max(runs(at), key=lambda each: each[1] - each[0])
+            if longest[1] - longest[0] >= 4:
+                what = (
+                    f"{name} stands at {limit:.0f}, where whole numbers of some bits end, in "
+                    f"{counted(int(at.sum()), 'sample')}"
+                )
+                yield Defect("clipping", (name,), what, longest, limit, Severity.REPAIRABLE, "lose")

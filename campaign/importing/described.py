@@ -1,0 +1,143 @@
+"""Where the samples of a trial come from that was executed elsewhere: all of it, in a tree.
+
+It is made from a mapping when a plan is made, stands in the trial (`Trial.recording`), and is all
+that is needed to read the samples, today and when a run is resumed: nothing is looked up again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from campaign.errors import Problem
+from campaign.importing.interface import RecordingError, check_regular
+from campaign.options import Options
+from campaign.trial import ChannelInfo
+
+_CHUNK = 1 << 20  # bytes at a time
+
+
+class FileUsed(Options):
+    """A file as it was when the plan was made."""
+
+    name: str
+    """As the mapping writes it."""
+    path: str
+    """Where it lay."""
+    sha256: str
+    """Of its bytes."""
+    size: int
+    """Bytes."""
+
+
+class Cells(Options):
+    """One column of one table of one file, each by its place from 0."""
+
+    file: int
+    table: int
+    column: int
+    name: str = ""
+    """As the file has it."""
+
+
+class ClockUsed(Options):
+    """How rows are told by their times: row k is at start + k / sample_rate, or as `cells` say."""
+
+    cells: Cells | None = None
+    """A column of times."""
+    factor: float = 1.0
+    """From that column's unit to s."""
+    step: float | None = None
+    """Of a clock that the file or the mapping states (s)."""
+    start: float = 0.0
+    """Time of row 0 by such a clock (s)."""
+
+
+class Made(Options):
+    """A channel: factor * (column - offset), read `shift` samples later; or from another channel.
+
+    A channel of the vocabulary is `how` = column, copy or derivative; where it is made from another
+    channel, that one stands before it.
+    """
+
+    name: str
+    unit: str
+    label: str
+    display_unit: str
+    how: Literal["column", "copy", "derivative"] = "column"
+    cells: Cells | None = None
+    """Of a column."""
+    source: str = ""
+    """Of a copy or a derivative: the other channel."""
+    factor: float = 1.0
+    """From the column's unit to `unit`, with its sign and what it is multiplied by."""
+    offset: float = 0.0
+    """In the column's unit."""
+    shift: int = 0
+    """Samples by which the column is late."""
+    period: float | None = None
+    """Of a scale that begins anew and was made continuous, in `unit`."""
+    relative_uncertainty: float | None = None
+    """Of `factor` (1 sigma), as far as the mapping says."""
+    filter: str = ""
+    """What was done to it before it was recorded, in words."""
+    own_rate: float | None = None
+    """How often it is new (Hz), where it comes from a slower clock and is held."""
+    clock: ClockUsed | None = None
+    """That slower clock."""
+
+    @property
+    def info(self) -> ChannelInfo:
+        """What is announced of it."""
+        return ChannelInfo(
+            self.name, self.unit, self.label, self.display_unit, own_rate=self.own_rate
+        )
+
+
+class Described(Options):
+    """A recording that a trial is served from.
+
+    The trial's time is 0 at its first row, and its samples are at k / sample_rate.
+    """
+
+    files: tuple[FileUsed, ...] = Field(min_length=1)
+    table: tuple[int, int]
+    """File and table whose rows are the trial's samples."""
+    first: int
+    """Its first row, from 0."""
+    rows: int
+    """How many."""
+    clock: ClockUsed
+    sample_rate: float
+    """Of the trial (Hz)."""
+    samples: int
+    """Of the trial; more than `rows` where gaps were marked."""
+    skip: int = 0
+    """Samples at the beginning that only serve channels which are put back by less."""
+    repairs: tuple[str, ...] = ()
+    """What is done to the times."""
+    channels: tuple[Made, ...]
+    remarks: tuple[str, ...] = ()
+    """What was done, and what was seen, in sentences."""
+
+    def made(self, name: str) -> Made | None:
+        """The channel of that name."""
+        return next((each for each in self.channels if each.name == name), None)
+
+
+def file_used(path: Path, name: str) -> FileUsed:
+    """A file with its digest. Raises RecordingError when it cannot be read."""
+    check_regular(path)
+    digest, size = hashlib.sha256(), 0
+    try:
+        with path.open("rb") as file:
+            while chunk := file.read(_CHUNK):
+                digest.update(chunk)
+                size += len(chunk)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise RecordingError([Problem(path, 0, 0, f"it cannot be read: {why}")]) from None
+    return FileUsed(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

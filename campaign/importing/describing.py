@@ -1,0 +1,369 @@
+"""From an entry of a mapping to what its files hold: trials, each described with its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from campaign.importing.checked import WRAPAROUND, defects_of, remedy
+from campaign.importing.cutting import (
+    NEEDED,
+    SHORTEST,
+    CutError,
+    Stretch,
+    by_trigger,
+    by_value,
+)
+from campaign.importing.defects import Severity
+from campaign.importing.defects.defect import counted
+from campaign.importing.described import Cells, ClockUsed, Described, FileUsed, Made, file_used
+from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
+from campaign.importing.interface import Array
+from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
+from campaign.importing.mapping import (
+    ChannelColumn,
+    ColumnPlace,
+    Layout,
+    RecordingEntry,
+    TimeColumn,
+)
+from campaign.importing.opened import AmbiguousError, OpenedFiles
+from campaign.importing.reader import clock_times
+from campaign.unit_grammar import parse_unit
+
+Key = tuple[str | int, ...]
+TIMELESS = "nothing tells when its rows were sampled; give the columns a 'time'"
+
+
+class MappingError(ValueError):
+    """What of a mapping does not go with its files.
+
+    Attributes:
+        keys: of `[[test.recording]]` or of `[columns.NAME]`, where it stands.
+        of_columns: which of the two.
+    """
+
+    def __init__(self, message: str, keys: Key = (), *, of_columns: bool = False) -> None:
+        self.keys = keys
+        self.of_columns = of_columns
+        super().__init__(message)
+
+
+class DefectError(MappingError):
+    """A defect of a recording that nobody has accepted.
+
+    Attributes:
+        kind: of the defect, as in `clipping`.
+    """
+
+    def __init__(self, message: str, keys: Key, kind: str, *, of_columns: bool) -> None:
+        super().__init__(message, keys, of_columns=of_columns)
+        self.kind = kind
+
+
+def describe(
+    entry: RecordingEntry,
+    layout: Layout,
+    paths: Sequence[Path],
+    names: Sequence[str],
+    rig: RigFacts,
+    wanted: Collection[str],
+) -> tuple[OpenedFiles, tuple[tuple[Described, Stretch], ...]]:
+    """The trials that an entry's files hold; the files are left open.
+
+    Args:
+        paths, names: of the files, and as the mapping writes them.
+        wanted: channels that are made of others where no column is one.
+
+    Raises RecordingError for the files, MappingError for what does not go with them.
+    """
+    opened = OpenedFiles(paths)
+    used = tuple(file_used(*both) for both in zip(paths, names, strict=True))
+    found = _Finding(opened, entry, layout, rig, frozenset(wanted), used)
+    try:
+        return opened, tuple(found.trials())
+    except BaseException:
+        opened.__exit__()
+        raise
+
+
+@dataclass(frozen=True)
+class _Finding:
+    opened: OpenedFiles
+    entry: RecordingEntry
+    layout: Layout
+    rig: RigFacts
+    wanted: frozenset[str]
+    used: tuple[FileUsed, ...]
+
+    def trials(self) -> Iterator[tuple[Described, Stretch]]:
+        cells = self._channel_cells()
+        clocks = self._clocks({(c.file, c.table) for c in cells.values()})
+        for each in (*cells.values(), *(c.cells for c in clocks.values() if c.cells)):
+            self.opened.want(each)
+        main = self._main(clocks)
+        chosen = [self._find(key, column) for key, column in self._choosing()]
+        for each in chosen:
+            if (each.file, each.table) != main:
+                raise MappingError(f"column {each.name!r} has another clock than the channels")
+            self.opened.want(each)
+        for stretch in self._stretches(main, clocks[main], chosen):
+            yield self._described(main, stretch, cells, clocks), stretch
+
+    def _channel_cells(self) -> dict[str, Cells]:
+        found = {}
+        for name, channel in self.layout.channels.items():
+            if channel.column is not None:
+                found[name] = self._find((name, "column"), channel, of_columns=True)
+        return found
+
+    def _find(self, keys: Key, wanted: ColumnPlace, *, of_columns: bool = False) -> Cells:
+        try:
+            return self.opened.find(wanted, self.entry.table)
+        except AmbiguousError as error:
+            raise MappingError(f"{self._names()}: {error}", keys, of_columns=of_columns) from None
+
+    def _names(self) -> str:
+        return " and ".join(each.name for each in self.used)
+
+    def _choosing(self) -> Iterator[tuple[Key, ColumnPlace]]:
+        """The columns that tell trials apart."""
+        entry = self.entry
+        if entry.where is not None:
+            yield ("where", "column"), ColumnPlace(column=entry.where.column)
+        if entry.each is not None:
+            yield ("each",), ColumnPlace(column=entry.each)
+        if entry.trigger is not None:
+            yield ("trigger", "column"), ColumnPlace(column=entry.trigger.column)
+
+    # Clocks
+
+    def _clocks(self, tables: Collection[tuple[int, int]]) -> dict[tuple[int, int], ClockUsed]:
+        return {table: self._clock(*table) for table in sorted(tables)}
+
+    def _clock(self, file: int, table: int) -> ClockUsed:
+        time, stated = self.layout.time, self.opened.table(file, table).clock
+        if time is not None and time.column is not None:
+            return self._column_clock(time, file, table)
+        if time is not None and time.sample_rate is not None:
+            return ClockUsed(step=1.0 / time.sample_rate)
+        if stated is not None:
+            return ClockUsed(step=stated.step, start=stated.start)
+        raise MappingError(f"{self._names()}: {TIMELESS}", of_columns=True)
+
+    def _column_clock(self, time: TimeColumn, file: int, table: int) -> ClockUsed:
+        name = self.opened.table(file, table).name
+        within = time.model_copy(
+            update={"file": time.file or file + 1, "table": time.table or name}
+        )
+        cells = self._find(("time", "column"), within, of_columns=True)
+        if (cells.file, cells.table) != (file, table):
+            raise MappingError(
+                f"{self._names()}: the times of column {cells.name!r} are those of other rows",
+                ("time", "column"),
+                of_columns=True,
+            )
+        unit = time.unit or self.opened.column(cells).unit
+        if unit in PLAIN:
+            message = f"the file states no unit of column {cells.name!r}; write unit = ..."
+            raise MappingError(f"{self._names()}: {message}", ("time",), of_columns=True)
+        try:
+            one = parse_unit(unit)
+        except ValueError as error:
+            raise MappingError(str(error), ("time", "unit"), of_columns=True) from None
+        if one.dimensions != parse_unit("s").dimensions:
+            raise MappingError(f"{unit!r} is no unit of time", ("time", "unit"), of_columns=True)
+        return ClockUsed(cells=cells, factor=float(one.factor))
+
+    def _times(self, clock: ClockUsed) -> Callable[[int, int], Array]:
+        return lambda first, stop: clock_times(clock, self.opened, first, stop)
+
+    def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
+        """The table with the fastest clock: the others are held."""
+        if len(clocks) == 1:
+            return next(iter(clocks))
+
+        def step(table: tuple[int, int]) -> float:
+            rows = min(self.opened.rows(*table), 1000)
+            times = self._times(clocks[table])(0, rows)
+            return float(np.median(np.diff(times))) if rows > 1 else np.inf
+
+        return min(clocks, key=step)
+
+    # Rows
+
+    def _stretches(
+        self, main: tuple[int, int], clock: ClockUsed, chosen: Sequence[Cells]
+    ) -> Sequence[Stretch]:
+        total = self.opened.rows(*main)
+        if total < SHORTEST:
+            message = f"it has {counted(total, 'row')}, and {NEEDED}"
+            raise MappingError(f"{self._names()}: {message}", ("file",))
+        first, stop = self._bounds(clock, total)
+        if not chosen:
+            return [Stretch(first, stop - first, {})]
+        entry, name = self.entry, chosen[0].name
+        values = self.opened.part(chosen[0], first, stop)
+        try:
+            if entry.trigger is not None:
+                ends = partial(self._after, clock, entry.trigger.duration, stop)
+                return by_trigger(values, first, name, entry.trigger.level, ends, stop)
+            if entry.where is not None:
+                return by_value(values, first, name, "where", entry.where.equals)
+            return by_value(values, first, name, "each")
+        except CutError as error:
+            raise MappingError(f"{self._names()}: {error}", (error.key,)) from None
+
+    def _after(self, clock: ClockUsed, duration: float, stop: int, rises: np.ndarray) -> np.ndarray:
+        times = self._times(clock)(0, stop)
+        # Half a sample early: times are written with finite digits.
+        half = 0.5 * float(np.median(np.diff(times)))
+        ends = np.searchsorted(times, times[rises] + duration - half, side="left")
+        return np.where(times[rises] + duration - 2.0 * half > times[-1], stop + 1, ends)
+
+    def _bounds(self, clock: ClockUsed, total: int) -> tuple[int, int]:
+        entry = self.entry
+        if entry.start is None and entry.stop is None:
+            return 0, total
+        times = self._times(clock)(0, total)
+        first = 0 if entry.start is None else int(np.searchsorted(times, entry.start))
+        stop = total if entry.stop is None else int(np.searchsorted(times, entry.stop))
+        if stop - first < SHORTEST:
+            begin = "its beginning" if entry.start is None else f"{entry.start:g} s"
+            end = "its end" if entry.stop is None else f"{entry.stop:g} s"
+            message = (
+                f"{counted(max(stop - first, 0), 'row')} from {begin} to {end}, and {NEEDED}; its "
+                f"times are {times[0]:g} to {times[-1]:g} s"
+            )
+            key = "stop" if entry.start is None else "start"
+            raise MappingError(f"{self._names()}: {message}", (key,))
+        return first, stop
+
+    # Channels
+
+    def _described(
+        self,
+        main: tuple[int, int],
+        stretch: Stretch,
+        cells: dict[str, Cells],
+        clocks: dict[tuple[int, int], ClockUsed],
+    ) -> Described:
+        clock = clocks[main]
+        repairs = self.layout.time.repair if self.layout.time is not None else ()
+        try:
+            even = even_clock(self._times(clock), stretch.first, stretch.rows, repairs)
+        except UnevenError as error:
+            raise MappingError(f"{self._names()}: {error}", ("file",)) from None
+        remarks = [*stretch.remarks, *even.remarks]
+        made = self._made(main, cells, clocks, even, remarks)
+        shifts = [each.shift for each in made if each.clock is None]
+        skip, cut = max(0, -min(shifts, default=0)), max(0, *shifts, 0)
+        if (left := even.samples - skip - cut) < SHORTEST:
+            what = f"its delays and repairs leave {counted(max(left, 0), 'sample')}, and {NEEDED}"
+            raise MappingError(f"{self._names()}: {what}", ("file",))
+        described = Described(
+            files=self.used,
+            table=main,
+            first=stretch.first,
+            rows=stretch.rows,
+            clock=clock,
+            sample_rate=even.rate,
+            samples=even.samples - skip - cut,
+            skip=skip,
+            repairs=repairs if even.positions is not None else (),
+            channels=tuple(made),
+            remarks=tuple(remarks),
+        )
+        return self._checked(described)
+
+    def _checked(self, described: Described) -> Described:
+        """With what its channels show remarked, and scales that begin anew made continuous.
+
+        Raises MappingError for a defect that nobody has accepted.
+        """
+        remarks = list(described.remarks)
+        periods: dict[str, float] = {}
+        for defect in defects_of(described, self.opened, self.rig.ratio):
+            name = next(iter(defect.channels), "")
+            entry = self.layout.channels.get(name)
+            if defect.kind == WRAPAROUND and entry is not None and "unwrap" in entry.repair:
+                periods[name] = defect.size
+                remarks.append(f"{name} was made continuous: {defect.what}")
+                continue
+            accepted = entry is not None and defect.kind in entry.accept
+            if defect.severity is Severity.NOTED or accepted:
+                remarks.append(defect.what)
+                continue
+            what = f"{self._names()}: {defect.what}; {remedy(defect)}"
+            keys = (name,) if name else ()
+            raise DefectError(what, keys, defect.kind, of_columns=bool(name))
+        channels = tuple(
+            each.model_copy(update={"period": periods.get(each.name)})
+            for each in described.channels
+        )
+        return described.model_copy(update={"channels": channels, "remarks": tuple(remarks)})
+
+    def _made(
+        self,
+        main: tuple[int, int],
+        cells: dict[str, Cells],
+        clocks: dict[tuple[int, int], ClockUsed],
+        even: EvenClock,
+        remarks: list[str],
+    ) -> list[Made]:
+        made: dict[str, Made] = {}
+        for name, channel in self.layout.channels.items():
+            if name in cells:
+                one = self._of_column(name, channel, cells[name], even, remarks)
+                table = (one.cells.file, one.cells.table) if one.cells else main
+                if table != main:
+                    one = one.model_copy(update=self._slower(clocks[table], table, even))
+                made[name] = one
+        for name, channel in self.layout.channels.items():
+            if name not in cells:
+                made |= self._derived(name, channel, made)
+        for one, remark in following(self.wanted - made.keys(), made, self.rig):
+            made[one.name] = one
+            remarks.append(remark)
+        return list(made.values())
+
+    def _of_column(
+        self, name: str, channel: ChannelColumn, at: Cells, even: EvenClock, remarks: list[str]
+    ) -> Made:
+        shift = round(channel.delay * even.rate)
+        if shift:
+            remarks.append(f"{name} is put back by {shift} samples, {shift / even.rate:.6g} s")
+        try:
+            return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig, shift)
+        except ValueError as error:
+            raise MappingError(f"{self._names()}: {error}", (name,), of_columns=True) from None
+
+    def _derived(self, name: str, channel: ChannelColumn, made: dict[str, Made]) -> dict[str, Made]:
+        source = made.get(channel.derive)
+        if source is None:
+            message = f"{channel.derive} is derived itself; derive {name} from a column"
+            raise MappingError(message, (name, "derive"), of_columns=True)
+        try:
+            return {name: made_of_channel(name, channel, source, self.rig)}
+        except ValueError as error:
+            raise MappingError(str(error), (name, "derive"), of_columns=True) from None
+
+    def _slower(
+        self, clock: ClockUsed, table: tuple[int, int], even: EvenClock
+    ) -> dict[str, object]:
+        rows = self.opened.rows(*table)
+        times = self._times(clock)(0, rows)
+        step = float(times[-1] - times[0]) / max(rows - 1, 1)
+        ends = even.start, even.start + (even.samples - 1) / even.rate
+        if step <= 0 or times[0] > ends[0] + step or times[-1] + step < ends[1] - step:
+            what = self.opened.table(*table).name or self.used[table[0]].name
+            message = (
+                f"{what} has times from {times[0]:.6g} to {times[-1]:.6g} s, and the trial is from "
+                f"{ends[0]:.6g} to {ends[1]:.6g} s: cut it by start and stop, or correct a clock"
+            )
+            raise MappingError(f"{self._names()}: {message}", ("file",))
+        return {"clock": clock, "own_rate": 1.0 / step}

@@ -1,0 +1,229 @@
+"""Times of rows as an even clock: what its rate is, where it is none, and what may be done then.
+
+A trial is sampled evenly. Times that are rounded are no reason to touch anything; times that
+stand still, run back, jump or wander are told with their rows, and nothing is done about them that
+the mapping does not ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.importing.defects.defect import counted
+from campaign.importing.interface import Array
+
+TOLERANCE = 0.25
+"""of a sample by which a time may be off an even clock: half of what would name another sample."""
+WORTH_TELLING = 0.02
+"""of a sample; less is the rounding of times that are written with few digits."""
+GAP = 1.5
+"""of the usual step, beyond which rows are missing."""
+LONGEST = 50_000_000
+"""rows of a trial whose times are repaired: that is done in memory."""
+BLOCK = 1 << 20
+Times = Callable[[int, int], Array]
+"""The times (s) of rows [first, stop), shape (stop - first,)."""
+
+
+class UnevenError(ValueError):
+    """Times that are no even clock: what, in which rows, and what can be done."""
+
+
+@dataclass(frozen=True)
+class EvenClock:
+    """Samples at k / rate, and which rows they come from.
+
+    Attributes:
+        rate: Hz.
+        start: time of the first row (s).
+        samples: how many.
+        positions: the row that each sample comes from, from the trial's first, shape (samples,);
+            a fraction between two rows, NaN where a gap is marked. None: sample k is row k.
+        remarks: what was done, and what was seen, in sentences.
+    """
+
+    rate: float
+    start: float
+    samples: int
+    positions: Array | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What the steps between rows are; rows from the first of the recording."""
+
+    step: float  # the usual one (s)
+    back: tuple[int, ...]  # rows whose time is not after that of the row before
+    gaps: tuple[int, ...]  # rows before which rows are missing
+    undefined: tuple[int, ...]
+    missing: int
+
+
+def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ()) -> EvenClock:
+    """The clock of `rows` rows from row `first`.
+
+    Args:
+        repairs: what may be done: `drop repeated`, `mark gaps`, `resample`.
+
+    Raises UnevenError for times that are no even clock, with what would help.
+    """
+    if rows < 2:
+        raise UnevenError(f"{counted(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
+    start, last = (float(times(k, k + 1)[0]) for k in (first, first + rows - 1))
+    if np.isfinite(last - start) and last > start:
+        rate = (rows - 1) / (last - start)
+        worst, row, level, bend = _furthest(times, first, rows, start, rate)
+        if WORTH_TELLING < worst <= 4.0 * TOLERANCE:  # the two ends may be the worst of all
+            start += (level - 0.5 * (rows - 1) * bend) / rate
+            rate /= 1.0 + bend
+            worst, row, *_ = _furthest(times, first, rows, start, rate)
+        if worst <= TOLERANCE:
+            told = f"times are off an even clock by up to {worst:.2g} of a sample (row {row})"
+            remarks = (told,) if worst > WORTH_TELLING else ()
+            return EvenClock(rate, start, rows, None, remarks)
+    if rows > LONGEST:
+        raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
+    clock = times(first, first + rows)
+    return _repaired(clock, first, _look(clock, first), repairs)
+
+
+def _furthest(
+    times: Times, first: int, rows: int, start: float, rate: float
+) -> tuple[float, int, float, float]:
+    """How far a row is off sample k of the clock, at most, and which row it is; samples.
+
+    Also the mean of all of them, and their slope over k: what start and rate are off by.
+    """
+    worst, row, total, moment, square = 0.0, first, 0.0, 0.0, 0.0
+    middle = 0.5 * (rows - 1)
+    for k in range(0, rows, BLOCK):
+        block = times(first + k, first + min(k + BLOCK, rows))
+        number = np.arange(k, k + len(block), dtype=np.float64)
+        off = (block - start) * rate - number
+        if not np.isfinite(off).all():
+            return np.inf, first + k + int(np.argmin(np.isfinite(off))), 0.0, 0.0
+        at = int(np.argmax(np.abs(off)))
+        if abs(off[at]) > worst:
+            worst, row = float(abs(off[at])), first + k + at
+        total += float(off.sum())
+        moment += float((number - middle) @ off)
+        square += float((number - middle) @ (number - middle))
+    return worst, row, total / rows, moment / square
+
+
+def _look(clock: Array, first: int) -> _Seen:
+    """What is wrong with times, shape (n,)."""
+    undefined = np.flatnonzero(~np.isfinite(clock))
+    steps = np.diff(clock)
+    forward = steps[np.isfinite(steps) & (steps > 0)]
+    if not len(forward):
+        raise UnevenError("its times do not go on: all rows have one time")
+    step = float(np.median(forward))
+    back = np.flatnonzero(steps <= 0) + 1
+    gaps = np.flatnonzero(steps > GAP * step) + 1
+    # A gap among jittering times is one only if the clock is late behind it.
+    missing = int(np.sum(np.rint(steps[gaps - 1] / step) - 1)) if len(gaps) else 0
+
+    def rows(found: np.ndarray) -> tuple[int, ...]:
+        return tuple(int(k) + first for k in found)
+
+    return _Seen(step, rows(back), rows(gaps), rows(undefined), missing)
+
+
+def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> EvenClock:
+    """Raises UnevenError where `repairs` do not allow for what is wrong."""
+    remarks: list[str] = []
+    keep = np.isfinite(clock)
+    if seen.undefined:
+        raise UnevenError(f"row {_told(seen.undefined)} {_has(seen.undefined)} no time")
+    if seen.back:
+        if "drop repeated" not in repairs:
+            raise UnevenError(
+                f"the time of row {_told(seen.back)} is not after that of the row before; "
+                'repair = ["drop repeated"] leaves such rows out'
+            )
+        latest = np.maximum.accumulate(clock)
+        keep = np.concatenate([[True], clock[1:] > latest[:-1]])
+        remarks.append(
+            f"{int(np.sum(~keep))} rows were left out, whose time was no later: row "
+            f"{_told([first + int(k) for k in np.flatnonzero(~keep)])}"
+        )
+    rows = np.flatnonzero(keep).astype(np.float64)
+    clock = clock[keep]
+    if len(clock) < 2:
+        raise UnevenError("its times do not go on")
+    if "resample" in repairs:
+        return _resampled(clock, rows, seen.step, remarks)
+    return _marked(clock, rows, seen, repairs, remarks)
+
+
+def _marked(
+    clock: Array, rows: Array, seen: _Seen, repairs: Sequence[str], remarks: list[str]
+) -> EvenClock:
+    """Each row on the sample it belongs to, and nothing where there is no row."""
+    number = np.concatenate(
+        [[0.0], np.cumsum(np.maximum(1.0, np.rint(np.diff(clock) / seen.step)))]
+    )
+    # The usual step is rounded as the times are; the line through all of them is not.
+    slope = float(np.polynomial.Polynomial.fit(number, clock, 1).convert().coef[1])
+    number = np.rint((clock - clock[0]) / slope)
+    off = np.abs((clock - clock[0]) / slope - number)
+    even = len(np.unique(number)) == len(number) and float(off.max()) <= TOLERANCE
+    missing = int(number[-1]) + 1 - len(number)
+    if even and (not missing or "mark gaps" in repairs):
+        if not missing:
+            return EvenClock(1.0 / slope, float(clock[0]), len(clock), rows, tuple(remarks))
+        positions = np.full(int(number[-1]) + 1, np.nan)
+        positions[number.astype(int)] = rows
+        told = f"{missing} samples are missing and marked as lost, before row {_told(seen.gaps)}"
+        return EvenClock(1.0 / slope, float(clock[0]), len(positions), positions, (*remarks, told))
+    if even:
+        raise UnevenError(
+            f"{missing} samples are missing, before row {_told(seen.gaps)}; "
+            'repair = ["mark gaps"] marks them as lost, and a trial for each stretch is had by '
+            "'start' and 'stop'"
+        )
+    spread = float(np.std(np.diff(clock)) / seen.step)
+    raise UnevenError(
+        f"its times are no even clock: steps vary by {100 * spread:.3g} % about {seen.step:.6g} s, "
+        f"up to {float(np.diff(clock).max()):.6g} s; "
+        'repair = ["resample"] puts lines through the samples'
+    )
+
+
+def _resampled(clock: Array, rows: Array, step: float, remarks: list[str]) -> EvenClock:
+    """Samples on lines between rows; where rows are missing, nothing."""
+    # Jitter may double a step; more than that is a hole, across which no line is put. The usual
+    # step is told by all of them: single ones jitter.
+    steps = np.diff(clock)
+    holes = steps > 2.0 * GAP * step
+    step = float(steps[~holes].mean()) if not holes.all() else step
+    samples = int(np.floor((clock[-1] - clock[0]) / step + 1e-9)) + 1
+    wanted = clock[0] + step * np.arange(samples)
+    positions = np.interp(wanted, clock, rows)
+    after = np.clip(np.searchsorted(clock, wanted, side="right"), 1, len(clock) - 1)
+    on_row = np.isin(wanted, clock)
+    hole = (clock[after] - clock[after - 1] > 2.0 * GAP * step) & ~on_row
+    positions[hole] = np.nan
+    moved = float(np.max(np.abs(np.diff(clock) - step))) / step
+    told = (
+        f"resampled at {1 / step:.6g} Hz on lines between rows; steps varied by up to {moved:.2g}"
+    )
+    remarks.append(f"{told} of a sample")
+    if hole.any():
+        remarks.append(f"{int(hole.sum())} samples lie in gaps and are marked as lost")
+    return EvenClock(1.0 / step, float(clock[0]), samples, positions, tuple(remarks))
+
+
+def _told(rows: Sequence[int]) -> str:
+    """`17, 18, 40 and 12 more`, as people count: from 1."""
+    told = ", ".join(str(row + 1) for row in rows[:3])
+    return told if len(rows) <= 3 else f"{told} and {len(rows) - 3} more"
+
+
+def _has(rows: Sequence[int]) -> str:
+    return "has" if len(rows) == 1 else "have"

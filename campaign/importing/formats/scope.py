@@ -1,0 +1,60 @@
+"""CSV of Rigol's oscilloscopes: samples are counted, and start and step stand beside the names.
+
+X,CH1,CH2,Start,Increment,
+Sequence,Volt,Volt,-1.000e-03,2.000e-06
+0,1.02,0.98,
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from campaign.errors import Problem
+from campaign.importing.cells import is_number, value_of
+from campaign.importing.dialect import Dialect, split
+from campaign.importing.interface import Clock, Column, RecordingError, RecordingFormat, Table
+from campaign.importing.rows import beginning, blocks, encoding_of_file
+
+_INDEX = "X,"
+_CLOCK = ("Start", "Increment")
+
+
+def _tables(path: Path) -> Sequence[Table]:
+    encoding = encoding_of_file(path)
+    with path.open(encoding=encoding) as file:
+        lines = beginning(file, path, 3)
+    names, units, first = ([*split(line, ",")] for line in [*lines, "", ""][:3])
+    count = names.index(_CLOCK[0])
+    clock = _clock(path, names, units)
+    width = len(first)
+    if width < count or not all(is_number(cell, ".") for cell in first[:count]):
+        raise RecordingError([Problem(path, 3, 1, "no row of numbers follows the heading")])
+    dialect = Dialect(
+        ",", ".", 3, width, tuple(names[:count]), ("",) * count, (True,) * count
+    )  # fmt: skip
+    columns = tuple(
+        Column(names[k], units[k] if k else "", f"column {k + 1}") for k in range(count)
+    )
+    return [Table("", columns, partial(blocks, path, encoding, dialect), clock)]
+
+
+def _clock(path: Path, names: Sequence[str], units: Sequence[str]) -> Clock:
+    try:
+        start, step = (value_of(units[names.index(key)], ".") for key in _CLOCK)
+    except (ValueError, IndexError):
+        start = step = float("nan")
+    if not step > 0:
+        message = f"below {' and '.join(_CLOCK)} there is no time of the first sample, and no step"
+        raise RecordingError([Problem(path, 2, 1, message)])
+    return Clock(step, start)
+
+
+def _recognises(head: bytes) -> bool:
+    first = head.lstrip(b"\xef\xbb\xbf").split(b"\n", 1)[0].decode("ascii", "replace")
+    cells = [cell.strip() for cell in first.split(",")]
+    return first.startswith(_INDEX) and all(key in cells for key in _CLOCK)
+
+
+FORMAT = RecordingFormat("rigol", "CSV of a Rigol oscilloscope", (".csv",), _recognises, _tables)

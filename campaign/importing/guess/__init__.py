@@ -1,0 +1,6 @@
+"""A first mapping of files that nobody described: what is in them, and what columns may be."""
+
+from campaign.importing.guess.guessing import Basis, ColumnGuess, Guess, TableGuess, guess
+from campaign.importing.guess.text import mapping_text
+
+__all__ = ["Basis", "ColumnGuess", "Guess", "TableGuess", "guess", "mapping_text"]

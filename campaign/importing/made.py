@@ -1,0 +1,264 @@
+"""From columns to channels: units, signs, constants, and channels that follow from others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_ANGLE,
+    MOTOR_CURRENT,
+    MOTOR_RATE,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+    VOCABULARY,
+    AxisKind,
+    Quantity,
+    info,
+)
+from campaign.importing.described import Cells, Made
+from campaign.importing.mapping import ChannelColumn
+from campaign.trial import ChannelInfo
+from campaign.unit_grammar import ONE, Unit, parse_unit
+from campaign.units import split_quantity
+
+PLAIN = ("", "1", "-")
+"""How people write that a number has no unit."""
+AT_REST = "the hull is taken to be at rest, so the load's rate in space is that to the hull"
+
+
+@dataclass(frozen=True)
+class RigFacts:
+    """What of a rig turns one channel into another; None where it is not known.
+
+    Attributes:
+        axis: how the axis moves; `motor` how its motor does.
+        ratio: N, motor rate over load rate.
+        torque_per_current: drive torque at the load per ampere (N m/A).
+    """
+
+    axis: AxisKind = AxisKind.ROTARY
+    motor: AxisKind = AxisKind.ROTARY
+    ratio: float | None = None
+    torque_per_current: float | None = None
+
+
+def made_of_column(
+    name: str, entry: ChannelColumn, cells: Cells, stated: str, rig: RigFacts, shift: int
+) -> Made:
+    """The channel that a column is.
+
+    Args:
+        stated: the unit that the file states; "" for none.
+        shift: samples by which the column is late.
+
+    Raises ValueError with a message for the user where units do not go together.
+    """
+    written = entry.unit or stated
+    if not written and not entry.unit:
+        what = _info(name, entry, rig, None)
+        if what.unit:
+            raise ValueError(
+                f"the file states no unit of column {cells.name!r}; write unit = ..., or "
+                'unit = "1" for a number without one'
+            )
+    number, by = _times(entry)
+    unit = _unit(written) * by
+    what = _info(name, entry, rig, unit)
+    si = _unit(what.unit)
+    if unit.dimensions != si.dimensions:
+        raise ValueError(_mismatch(name, entry, written, what))
+    return Made(
+        name=name,
+        unit=what.unit,
+        label=what.label,
+        display_unit=what.display_unit,
+        cells=cells,
+        factor=entry.sign * number * float(unit.factor / si.factor),
+        offset=entry.offset,
+        shift=shift,
+        relative_uncertainty=_relative(entry, number),
+        filter=entry.filter,
+    )
+
+
+def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts) -> Made:
+    """The channel that is derived from another, as the mapping says.
+
+    Raises ValueError where nothing leads from one to the other.
+    """
+    what = _info(name, entry, rig, None)
+    number, by = _times(entry)
+    for how in ("copy", "derivative"):
+        unit = _unit(source.unit) * by
+        if how == "derivative":
+            unit = unit * _unit("1/s")
+        if unit.dimensions == _unit(what.unit).dimensions:
+            return Made(
+                name=name,
+                unit=what.unit,
+                label=what.label,
+                display_unit=what.display_unit,
+                how="copy" if how == "copy" else "derivative",
+                source=source.name,
+                factor=entry.sign * number * float(unit.factor / _unit(what.unit).factor),
+                relative_uncertainty=_together(
+                    _relative(entry, number), source.relative_uncertainty
+                ),
+                filter=entry.filter,
+            )
+    raise ValueError(
+        f"{name} is in {what.unit} and {source.name} in {source.unit}; neither that times a "
+        "constant nor its derivative is the other"
+    )
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How a channel follows from another one, where the rig is known well enough."""
+
+    name: str
+    source: str
+    derivative: bool
+    factor: Callable[[RigFacts], float | None]
+    remark: str = ""
+
+
+def _one(rig: RigFacts) -> float:
+    return 1.0
+
+
+def _by_gear(rig: RigFacts) -> float | None:
+    return None if rig.ratio is None else 1.0 / rig.ratio
+
+
+_WAYS = (
+    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear),
+    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, _one),
+    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear),
+    _Way(RELATIVE_RATE, GYRO_RATE, False, _one, AT_REST),
+    _Way(GYRO_RATE, RELATIVE_RATE, False, _one, AT_REST),
+    _Way(DRIVE_TORQUE, MOTOR_CURRENT, False, lambda rig: rig.torque_per_current),
+)
+"""What suffices for a channel that nobody recorded, the best first."""
+
+
+def sufficient(have: Collection[str], rig: RigFacts) -> frozenset[str]:
+    """The channels that there are, and those that follow from them."""
+    known = set(have)
+    while more := {w.name for w in _WAYS if w.source in known and w.factor(rig)} - known:
+        known |= more
+    return frozenset(known)
+
+
+def following(
+    wanted: Collection[str], have: Mapping[str, Made], rig: RigFacts
+) -> Iterator[tuple[Made, str]]:
+    """Channels that are wanted and not there, made of others, and what to remark; in their order.
+
+    A channel on the way to a wanted one comes before it.
+    """
+    known = dict(have)
+    for name in sorted(wanted):
+        for way in _path(name, known, rig):
+            what = info(way.name, axis=rig.axis)
+            made = Made(
+                name=way.name,
+                unit=what.unit,
+                label=what.label,
+                display_unit=what.display_unit,
+                how="derivative" if way.derivative else "copy",
+                source=way.source,
+                factor=way.factor(rig) or 1.0,
+                relative_uncertainty=known[way.source].relative_uncertainty,
+            )
+            known[way.name] = made
+            verb = "the derivative of" if way.derivative else "made of"
+            yield (
+                made,
+                f"{way.name} is {verb} {way.source}{f'; {way.remark}' if way.remark else ''}",
+            )
+
+
+def _path(
+    name: str, known: Mapping[str, Made], rig: RigFacts, on_the_way: frozenset[str] = frozenset()
+) -> list[_Way]:
+    """The ways from what is known to a channel, in order; none where there are none."""
+    if name in known:
+        return []
+    for way in _WAYS:
+        if way.name != name or way.source in on_the_way or not way.factor(rig):
+            continue
+        before = _path(way.source, known, rig, on_the_way | {name})
+        if way.source in known or before:
+            return [*before, way]
+    return []
+
+
+def _info(name: str, entry: ChannelColumn, rig: RigFacts, unit: Unit | None) -> ChannelInfo:
+    """What a channel is; one of the laboratory's own has the unit it is written in."""
+    if name == COMMAND and unit is not None:
+        for mode in ("rate", "torque"):
+            what = info(COMMAND, mode, axis=rig.axis)
+            if _unit(what.unit).dimensions == unit.dimensions:
+                return what
+    if name in VOCABULARY:
+        of = VOCABULARY[name]
+        axis = rig.motor if name in (MOTOR_ANGLE, MOTOR_RATE) else rig.axis
+        if of.quantity is Quantity.DEPENDS and unit is None:
+            return info(name, "rate", axis=axis)
+        return info(name, axis=axis)
+    if not entry.label:
+        raise ValueError(
+            f"{name!r} is none of the channels that analyses know (`campaign kinds channels`); "
+            "give a channel of your own a 'label'"
+        )
+    written = entry.unit if entry.unit not in PLAIN else ""
+    if entry.times:
+        written = split_quantity(entry.times)[1]
+    return ChannelInfo(name, written, entry.label, written)
+
+
+def _unit(text: str) -> Unit:
+    return ONE if text.strip() in PLAIN else parse_unit(text)
+
+
+def _times(entry: ChannelColumn) -> tuple[float, Unit]:
+    if not entry.times:
+        return 1.0, ONE
+    number, unit = split_quantity(entry.times)
+    if number == 0:
+        raise ValueError("'times' is zero; nothing would be left of the column")
+    return number, _unit(unit)
+
+
+def _relative(entry: ChannelColumn, number: float) -> float | None:
+    """The uncertainty of `times` as a share of it; None where none is stated."""
+    if not entry.uncertainty:
+        return None
+    error, unit = split_quantity(entry.uncertainty)
+    if error < 0:
+        raise ValueError(f"the uncertainty {entry.uncertainty!r} is negative")
+    if unit.strip() == "%":
+        return error / 100.0  # of 'times', whatever it is in
+    _, by = _times(entry)
+    of = _unit(unit)
+    if of.dimensions != by.dimensions:
+        raise ValueError(f"the uncertainty {entry.uncertainty!r} has another unit than 'times'")
+    return abs(error * float(of.factor / by.factor) / number)
+
+
+def _together(*shares: float | None) -> float | None:
+    """Relative uncertainties of factors that are independent: the root of their squares."""
+    known = [share for share in shares if share is not None]
+    return math.hypot(*known) if known else None
+
+
+def _mismatch(name: str, entry: ChannelColumn, written: str, what: ChannelInfo) -> str:
+    given = f"{written!r} times {entry.times!r}" if entry.times else repr(written)
+    constant = "" if entry.times else "; 'times' is for a constant that leads there"
+    return f"{name} is in {what.unit or 'no unit'}, and {given} is no multiple of that{constant}"

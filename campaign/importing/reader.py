@@ -1,0 +1,159 @@
+"""Samples of a described recording: read again from its files, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.defects.repairs import unwrap
+from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
+from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
+from campaign.importing.interface import ROWS, Array, RecordingError
+from campaign.importing.opened import OpenedFiles
+from campaign.trial import Channel, Recording
+
+
+class RecordingReader:
+    """Channels of a recording over the trial's own time.
+
+    Raises RecordingError where its files are no longer what they were.
+    """
+
+    def __init__(self, described: Described, opened: OpenedFiles) -> None:
+        self.described = described
+        self._opened = opened
+        self._made = {each.name: each for each in described.channels}
+        for each in described.channels:
+            for clock in (described.clock, each.clock):
+                if clock is not None and clock.cells is not None:
+                    opened.want(clock.cells)
+            if each.cells is not None:
+                opened.want(each.cells)
+        self._whole: dict[str, Array] = {}
+        self._positions: Array | None = None
+        if described.repairs:
+            self._positions = self._clock().positions
+
+    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array, Array]]:
+        """Time (n,), samples (channels, n) in the order described, and which rows are lost (n,)."""
+        names = [each.name for each in self.described.channels]
+        for first in range(0, self.described.samples, size):
+            stop = min(first + size, self.described.samples)
+            time = np.arange(first, stop) / self.described.sample_rate
+            yield time, self.samples(names, first, stop), self._lost(first, stop)
+
+    def samples(self, names: Collection[str], first: int, stop: int) -> Array:
+        """Samples [first, stop) of some channels, shape (channels, stop - first)."""
+        return np.array([self._channel(self._made[name], first, stop) for name in names])
+
+    def recording(self, names: Collection[str] | None = None) -> Recording:
+        """All samples of some channels, or of all."""
+        count = self.described.samples
+        chosen = self._made if names is None else {n: self._made[n] for n in names}
+        channels: dict[str, Channel] = {
+            name: made.info.with_samples(self._channel(made, 0, count))
+            for name, made in chosen.items()
+        }
+        return Recording(np.arange(count) / self.described.sample_rate, channels)
+
+    def _channel(self, made: Made, first: int, stop: int) -> Array:
+        if made.period is not None:
+            return self._unwrapped(made, made.period)[first:stop]
+        if made.cells is not None:
+            return made.factor * (self._column(made, made.cells, first, stop) - made.offset)
+        source = self._made[made.source]
+        if made.how == "copy":
+            return made.factor * self._channel(source, first, stop)
+        before, after = max(first - 1, 0), min(stop + 1, self.described.samples)
+        values = self._channel(source, before, after)
+        slope = np.gradient(values) if len(values) > 1 else np.zeros(len(values))
+        cut: Array = slope[first - before : first - before + stop - first]
+        return made.factor * self.described.sample_rate * cut
+
+    def _unwrapped(self, made: Made, period: float) -> Array:
+        """All of a channel whose scale begins anew; it is kept, as no part of it stands alone."""
+        if made.name not in self._whole:
+            plain = made.model_copy(update={"period": None})
+            values = self._channel(plain, 0, self.described.samples)
+            self._whole[made.name] = unwrap(values, period).values
+        return self._whole[made.name]
+
+    def _column(self, made: Made, cells: Cells, first: int, stop: int) -> Array:
+        if made.clock is not None:
+            return self._held(made, cells, made.clock, first, stop)
+        places = np.arange(first, stop) + self.described.skip + made.shift
+        begin = self.described.first
+        if self._positions is None:
+            low = begin + int(places[0])
+            return self._opened.part(cells, low, low + stop - first)
+        at = self._positions[places]
+        there = np.isfinite(at)
+        values = np.full(len(at), np.nan)
+        if there.any():
+            low, high = int(np.floor(at[there].min())), int(np.ceil(at[there].max()))
+            rows = self._opened.part(cells, begin + low, begin + high + 1)
+            values[there] = np.interp(at[there] - low, np.arange(len(rows)), rows)
+        return values
+
+    def _held(self, made: Made, cells: Cells, clock: ClockUsed, first: int, stop: int) -> Array:
+        """Of another clock: the last value that was known at each time."""
+        count = self._opened.rows(cells.file, cells.table)
+        times = clock_times(clock, self._opened, 0, count)
+        values = self._opened.part(cells, 0, count)
+        start = float(clock_times(self.described.clock, self._opened, *self._first_row())[0])
+        wanted = np.arange(first, stop) + self.described.skip + made.shift
+        at = start + wanted / self.described.sample_rate
+        # Half a millionth of a sample: both clocks are written with finite digits.
+        slack = 5e-7 / self.described.sample_rate
+        index = np.searchsorted(times, at + slack, side="right") - 1
+        # Before its first value and a step behind its last one nothing is known.
+        step = (times[-1] - times[0]) / max(count - 1, 1)
+        known = (index >= 0) & (at <= times[-1] + step + slack)
+        return np.where(known, values[np.maximum(index, 0)], np.nan)
+
+    def _first_row(self) -> tuple[int, int]:
+        return self.described.first, self.described.first + 1
+
+    def _lost(self, first: int, stop: int) -> np.ndarray:
+        if self._positions is None:
+            return np.zeros(stop - first, dtype=bool)
+        skip = self.described.skip
+        lost: np.ndarray = ~np.isfinite(self._positions[first + skip : stop + skip])
+        return lost
+
+    def _clock(self) -> EvenClock:
+        told = self.described
+        try:
+            return even_clock(
+                lambda a, b: clock_times(told.clock, self._opened, a, b),
+                told.first,
+                told.rows,
+                told.repairs,
+            )
+        except UnevenError as error:  # it was even when the plan was made
+            path = self._opened.paths[told.table[0]]
+            raise RecordingError([Problem(path, 0, 0, str(error))]) from None
+
+
+def clock_times(clock: ClockUsed, opened: OpenedFiles, first: int, stop: int) -> Array:
+    """Times (s) of rows [first, stop) by a clock."""
+    if clock.cells is not None:
+        times: Array = clock.factor * opened.part(clock.cells, first, stop)
+        return times
+    even: Array = clock.start + (clock.step or 1.0) * np.arange(first, stop, dtype=np.float64)
+    return even
+
+
+def paths_unchanged(described: Described) -> Sequence[Path]:
+    """The files of a recording. Raises RecordingError where one is not what it was."""
+    paths = []
+    for used in described.files:
+        path = Path(used.path)
+        if file_used(path, used.name).sha256 != used.sha256:
+            message = "it has changed since it was mapped (its SHA-256 is another)"
+            raise RecordingError([Problem(path, 0, 0, message)])
+        paths.append(path)
+    return paths

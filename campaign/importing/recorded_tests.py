@@ -1,0 +1,363 @@
+"""A protocol whose tests were executed elsewhere: each test's recordings in place of its trials."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import JsonValue
+
+from campaign.errors import Problem, ProtocolError
+from campaign.estimate import Window
+from campaign.importing.cutting import Stretch
+from campaign.importing.described import Described
+from campaign.importing.describing import MappingError, describe
+from campaign.importing.interface import RecordingError
+from campaign.importing.made import RigFacts, sufficient
+from campaign.importing.mapping import Layout, RecordingEntry, layouts, recordings_of
+from campaign.importing.opened import OpenedFiles
+from campaign.importing.reader import RecordingReader
+from campaign.importing.rig_facts import rig_facts
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.protocol.files import Origin
+from campaign.protocol.problems import allowed, nearest, shown
+from campaign.protocol.schema import ChosenValue, ExperimentKind, Protocol, StageKind, Test
+from campaign.trial import Offered, Recording, Task, TrialRequest
+from campaign.units import to_si
+
+ROUNDING = 1e-9
+_FILE = re.compile(r"^.*?(?=(:\d+:\d+)?: )")
+"""What a message says first of which file it is about; rows are not part of it."""
+NO_RECORDING = (
+    "it has no recordings; add [[test.recording]] for each, or `campaign run` executes it"
+)
+
+
+@contextmanager
+def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
+    """The protocol with the trials of its recordings; their files are open until it is planned.
+
+    Raises ProtocolError with everything that is wrong with mapping and files.
+    """
+    problems: list[Problem] = []
+    origin = protocol.origin
+    known = layouts(protocol.columns, origin, problems) if origin is not None else {}
+    with ExitStack() as stack:
+        loader = _Loader(protocol.path.parent, known, problems, stack)
+        tests = tuple(loader.test(test) for test in protocol.tests)
+        if problems:
+            raise ProtocolError(_once(problems))
+        yield replace(protocol, tests=tests)
+
+
+def _once(problems: Sequence[Problem]) -> list[Problem]:
+    """What is wrong at one place with many files alike is told of the first of them."""
+    alike: dict[tuple[Path, int, int, str], list[Problem]] = {}
+    for each in problems:
+        tail = _FILE.sub("", each.message)
+        alike.setdefault((each.file, each.line, each.column, tail), []).append(each)
+    return [
+        first if not more else replace(first, message=f"{first.message} ({len(more)} more alike)")
+        for first, *more in alike.values()
+    ]
+
+
+def _of_file(
+    what: Problem,
+    at: Origin,
+    keys: tuple[str | int, ...],
+    paths: Sequence[Path],
+    entry: RecordingEntry,
+) -> Problem:
+    """What is wrong with a file, at its name in the mapping; `keys` are those of `file`."""
+    if not isinstance(entry.file, str) and what.file in paths:
+        keys = (*keys, paths.index(what.file))
+    return at.problem(keys, "value", str(what))
+
+
+@dataclass(frozen=True)
+class RecordedKind:
+    """An experiment whose trials have been executed; see `protocol.schema.ExperimentKind`."""
+
+    name: str
+    options: type[Options]
+    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
+    requires: Mapping[str, str]
+    can_use: Mapping[str, str]
+    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
+    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
+    recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
+    windows: tuple[str, ...] = ()
+    stages: Sequence[StageKind] = ()
+    seeks_instability: bool = False
+
+
+@dataclass(frozen=True)
+class Found:
+    """One recording of a test: what its entry says, and what its files hold."""
+
+    entry: RecordingEntry
+    index: int
+    described: Described
+    stretch: Stretch
+    opened: OpenedFiles
+
+    @property
+    def label(self) -> str:
+        """Where it is, for people."""
+        names = " and ".join(file.name for file in self.described.files)
+        return f"{names} from row {self.described.first + 1}" if self.described.first else names
+
+
+@dataclass
+class _Loader:
+    """Problems go to `problems`, open files to `stack`."""
+
+    folder: Path
+    layouts: Mapping[str, Layout]
+    problems: list[Problem]
+    stack: ExitStack
+
+    def test(self, test: Test) -> Test:
+        origin, before = test.origin, len(self.problems)
+        if not test.entry.recording:
+            self.problems.append(
+                origin.problem((), "key", f"{shown(test.entry.name)}: {NO_RECORDING}")
+            )
+        for key, there in (
+            ("matrix", bool(test.axes)),
+            ("repeat", test.entry.repeat > 1),
+            ("truth", test.truth is not None),
+        ):
+            if there:
+                message = f"a test with recordings has no {key!r}: each recording says what it is"
+                self.problems.append(origin.problem((key,), "key", message))
+        entries = recordings_of(
+            test.entry.recording, origin, self.problems, test.experiment.windows
+        )
+        found: list[Found] = []
+        if len(self.problems) == before or entries:
+            bench = Bench.model_validate(test.bench)
+            for index, entry in entries:
+                found += self._found(test, index, entry, rig_facts(bench))
+        return replace(test, experiment=_kind(test.experiment, found))
+
+    def _found(self, test: Test, index: int, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
+        at, below = test.origin, ("recording", index)
+        layout = self._layout(at, below, entry)
+        wanted = {*test.experiment.requires, *test.experiment.can_use}
+        found: list[Found] = []
+        for written in self._files(at, below, entry):
+            if layout is None:
+                continue
+            paths = [self.folder / each for each in written]
+            try:
+                opened, trials = describe(entry, layout, paths, written, rig, wanted)
+            except RecordingError as error:
+                self.problems += (
+                    _of_file(each, at, (*below, "file"), paths, entry) for each in error.problems
+                )
+                continue
+            except MappingError as error:
+                self.problems.append(self._placed(at, below, entry, error))
+                continue
+            self.stack.enter_context(opened)
+            found += (Found(entry, index, *both, opened) for both in trials)
+        return found
+
+    def _placed(
+        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry, error: MappingError
+    ) -> Problem:
+        if error.of_columns:
+            name = entry.columns or next(iter(self.layouts))
+            return _Main(at).problem(("columns", name, *error.keys), str(error))
+        return at.problem((*below, *error.keys), "value", str(error))
+
+    def _layout(
+        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
+    ) -> Layout | None:
+        names = list(self.layouts)
+        if entry.columns in self.layouts:
+            return self.layouts[entry.columns]
+        if not entry.columns and len(names) == 1:
+            return self.layouts[names[0]]
+        if not names:
+            if not self.problems:
+                message = "nothing says what its columns are; add [columns.NAME] tables"
+                self.problems.append(at.problem((*below, "file"), "key", message))
+        elif not entry.columns:
+            message = f"say by which 'columns' it is read; {allowed(names)}"
+            self.problems.append(at.problem((*below, "file"), "key", message))
+        elif not self.problems:
+            message = f"there is no [columns.{entry.columns}]; {allowed(names)}"
+            message += nearest(entry.columns, names)
+            self.problems.append(at.problem((*below, "columns"), "value", message))
+        return None
+
+    def _files(
+        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
+    ) -> Iterator[list[str]]:
+        if not isinstance(entry.file, str):
+            yield list(entry.file)
+            return
+        if not any(sign in entry.file for sign in "*?["):
+            yield [entry.file]
+            return
+        pattern = entry.file
+        matching = sorted(glob.glob(pattern, root_dir=self.folder))  # noqa: PTH207 - absolute ones, too
+        if not matching:
+            message = f"{shown(pattern)}: no file of that name (looked in {self.folder})"
+            self.problems.append(at.problem((*below, "file"), "value", message))
+        for each in matching:
+            yield [each]
+
+
+@dataclass(frozen=True)
+class _Main:
+    """The main file that an origin within it belongs to."""
+
+    origin: Origin
+
+    def problem(self, keys: tuple[str | int, ...], message: str) -> Problem:
+        source = getattr(self.origin, "base", self.origin)
+        source = getattr(source, "source", None)
+        if source is None:
+            return self.origin.problem((), "key", message)
+        found: Problem = source.problem(keys, "key", message)
+        return found
+
+
+def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
+    planned = any(each.entry.trial is not None for each in found)
+
+    def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
+        asked = list(experiment.trials(options, bench)) if planned else []
+        for each in found:
+            if each.entry.trial is not None:
+                yield _planned(each, asked)
+            else:
+                yield from _offered(each, experiment, options, bench)
+
+    return RecordedKind(
+        experiment.name,
+        experiment.options,
+        trials,
+        experiment.requires,
+        experiment.can_use,
+        fit=experiment.fit if planned else None,
+    )
+
+
+def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
+    """The planned trial that a recording answers. Raises ValueError where it is none."""
+    number, told = found.entry.trial or 0, found.described
+    if number > len(asked):
+        raise ValueError(f"{found.label}: there is no trial {number}; {len(asked)} are planned")
+    request = asked[number - 1]
+    task, duration = request.task, told.samples / told.sample_rate
+    short = duration < task.duration * (1.0 - ROUNDING) - 1.5 / told.sample_rate
+    if short and task.stop_rate is None:
+        raise ValueError(
+            f"{found.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
+        )
+    count = min(told.samples, round(task.duration * told.sample_rate))
+    told = told.model_copy(update={"samples": count})
+    task = task.model_copy(
+        update={"sample_rate": told.sample_rate, "duration": count / told.sample_rate}
+    )
+    return replace(
+        request,
+        task=task,
+        point={**request.point, **_conditions(found)},
+        recording=told.model_dump(mode="json", exclude_defaults=True),
+        note=_note(found, request.note),
+    )
+
+
+def _offered(
+    found: Found, experiment: ExperimentKind, options: Any, bench: Bench
+) -> Iterator[TrialRequest]:
+    """The trials that a recording holds which nobody planned. Raises ValueError for none."""
+    told = found.described
+    duration = told.samples / told.sample_rate
+    windows = tuple(Window(name, *ends) for name, ends in found.entry.windows.items())
+    for window in windows:
+        if not 0 <= window.start < window.stop <= duration * (1.0 + ROUNDING):
+            raise ValueError(
+                f"{found.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
+                f"s, is no part of its {duration:.6g} s"
+            )
+    conditions = _conditions(found)
+    whole = TrialRequest(
+        Task(
+            mode="recorded",
+            duration=duration,
+            window=(windows[0].start, windows[0].stop) if windows else (0.0, duration),
+            sample_rate=told.sample_rate,
+        ),
+        windows=windows,
+    )
+    requests: Iterable[TrialRequest] = [whole]
+    if experiment.recorded is not None:
+        names = frozenset(each.name for each in told.channels)
+
+        def read(wanted: Any) -> Recording:
+            return RecordingReader(told, found.opened).recording(list(wanted))
+
+        offered = Offered(
+            duration,
+            told.sample_rate,
+            sufficient(names, rig_facts(bench)),
+            conditions,
+            windows,
+            read,
+        )
+        try:
+            requests = list(experiment.recorded(options, bench, offered))
+        except ValueError as error:
+            raise ValueError(f"{found.label}: {error}") from None
+    for request in requests:
+        part = _part(told, request.part)
+        task = request.task.model_copy(
+            update={"sample_rate": told.sample_rate, "duration": part.samples / told.sample_rate}
+        )
+        yield replace(
+            request,
+            task=task,
+            point={**conditions, **request.point},
+            recording=part.model_dump(mode="json", exclude_defaults=True),
+            note=_note(found, request.note),
+        )
+
+
+def _part(told: Described, part: tuple[float, float] | None) -> Described:
+    """The samples of a part of a recording (s)."""
+    if part is None:
+        return told
+    first, stop = (round(end * told.sample_rate) for end in part)
+    return told.model_copy(
+        update={"skip": told.skip + first, "samples": min(stop, told.samples) - first}
+    )
+
+
+def _conditions(found: Found) -> dict[str, JsonValue]:
+    """What was set for a recording, SI where it has a unit; and what tells its stretch apart."""
+    told: dict[str, JsonValue] = dict(found.stretch.conditions)
+    for name, value in found.entry.conditions.items():
+        told[name] = value
+        if isinstance(value, str):
+            try:
+                told[name] = to_si(value)
+            except ValueError:
+                told[name] = value  # a word
+    return told
+
+
+def _note(found: Found, planned: str) -> str:
+    return "; ".join(filter(None, (found.entry.note, planned, found.label)))

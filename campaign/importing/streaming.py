@@ -1,0 +1,159 @@
+"""Reading block by block in processes of their own, for libraries that a broken file brings down.
+
+One process says which tables a file has; each reading of one is another, which pours its blocks
+into a pipe. Nothing is kept: memory does not grow with a file, and no copy of it is made.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.errors import Problem
+from campaign.importing.apart import PATIENCE, REFUSED
+from campaign.importing.interface import Array, Clock, Column, RecordingError, Table
+
+_LENGTH = 8
+"""Bytes before a block that say how many rows it has; after the last there are none."""
+
+
+def tables_streamed(module: str, path: Path) -> list[Table]:
+    """What `module.tables` finds in a file, asked in other processes. Raises RecordingError."""
+    with _process(module, path, "tell") as output:
+        raw = output.read()
+    return [
+        Table(
+            each["name"],
+            tuple(Column(**column) for column in each["columns"]),
+            partial(_read, module, path, number),
+            None if each["clock"] is None else Clock(**each["clock"]),
+            each["rows"],
+            each["said"],
+            tuple(each["doubts"]),
+        )
+        for number, each in enumerate(json.loads(raw))
+    ]
+
+
+def _read(module: str, path: Path, number: int, places: Sequence[int]) -> Iterator[Array]:
+    wanted = list(places)
+    with _process(module, path, "pour", number, *wanted) as output:
+        while rows := int.from_bytes(output.read(_LENGTH), "little"):
+            raw = output.read(8 * rows * len(wanted))
+            yield np.frombuffer(raw, dtype="<f8").reshape(rows, len(wanted)).astype(np.float64)
+
+
+class _EndedEarlyError(Exception):
+    """The process says no more; how it ended tells why."""
+
+
+class _Output:
+    """What a process says; it is ended when it is silent for too long."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None  # noqa: S101 - it is a pipe
+        self._pipe = process.stdout
+        self._process = process
+        self.late = False
+
+    def read(self, size: int = -1) -> bytes:
+        """So many bytes, or all that come. Raises _EndedEarlyError for fewer."""
+        # Only while somebody waits: what becomes of a block may take its time.
+        watch = threading.Timer(PATIENCE, self._end)
+        watch.daemon = True
+        watch.start()
+        try:
+            found = self._pipe.read(size)
+        finally:
+            watch.cancel()
+        if len(found) < size:
+            raise _EndedEarlyError
+        return found
+
+    def _end(self) -> None:
+        self.late = True
+        self._process.kill()
+
+
+@contextmanager
+def _process(module: str, path: Path, *task: object) -> Iterator[_Output]:
+    """What a process says about a file; it ends with the block.
+
+    Raises RecordingError where it says what is wrong, falls, or is silent for too long.
+    """
+    code = f"from {module} import tables; from {__name__} import answer; answer(tables)"
+    # -P: what lies in the folder where somebody happens to be is not imported.
+    command = [sys.executable, "-P", "-c", code, str(path), *map(str, task)]
+    with (
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(  # noqa: S603 - this interpreter, and paths as arguments
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said
+        ) as process,
+    ):
+        output = _Output(process)
+        try:
+            yield output
+        except _EndedEarlyError:
+            pass
+        except BaseException:
+            process.kill()  # nobody wants the rest
+            raise
+        end = process.wait()
+        if output.late:
+            message = f"reading it did not go on for {PATIENCE:g} s"
+            raise RecordingError([Problem(path, 0, 0, message)])
+        if end == REFUSED:
+            said.seek(0)
+            raise RecordingError([Problem(path, 0, 0, said.read().decode("utf-8", "replace"))])
+        if end:
+            raise _broken(path)
+
+
+def _broken(path: Path) -> RecordingError:
+    message = "it is so broken that the library that reads such files fell over it"
+    return RecordingError([Problem(path, 0, 0, message)])
+
+
+def answer(tables: Callable[[Path], Sequence[Table]]) -> None:
+    """In the process: say what tables a file has, or pour some columns of one."""
+    path, task, *numbers = sys.argv[1:]
+    output = sys.stdout.buffer
+    try:
+        found = tables(Path(path))
+        if task == "tell":
+            output.write(json.dumps([_told(table) for table in found]).encode())
+        else:
+            number, *places = map(int, numbers)
+            for block in found[number].read(places):
+                if not len(block):
+                    continue
+                output.write(len(block).to_bytes(_LENGTH, "little"))
+                output.write(np.ascontiguousarray(block, dtype="<f8").tobytes())
+            output.write(bytes(_LENGTH))
+        output.flush()
+    except RecordingError as error:
+        output.flush()
+        sys.stderr.write("; ".join(problem.message for problem in error.problems))
+        sys.exit(REFUSED)
+
+
+def _told(table: Table) -> dict[str, Any]:
+    return {
+        "name": table.name,
+        "columns": [asdict(column) for column in table.columns],
+        "clock": None if table.clock is None else asdict(table.clock),
+        "rows": table.rows,
+        "said": dict(table.said),
+        "doubts": list(table.doubts),
+    }

@@ -1,0 +1,83 @@
+"""Times of rows as an even clock: rounding is nothing, all else is told with its rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from campaign.importing.even_clock import UnevenError, even_clock
+
+
+def clock(times, repairs=()):
+    times = np.asarray(times, dtype=float)
+    return even_clock(lambda a, b: times[a:b], 0, len(times), repairs)
+
+
+def test_an_even_clock_from_anywhere():
+    found = clock(1.7e9 + np.arange(1000) / 250.0)
+    assert found.rate == pytest.approx(250.0, rel=1e-6)
+    assert found.positions is None
+    assert found.samples == 1000
+
+
+def test_rounded_times_are_even():
+    """430 Hz in whole milliseconds: steps of 2 and 3 ms, and nothing to be repaired."""
+    found = clock(np.round(np.arange(5000) / 430.0, 3))
+    assert found.rate == pytest.approx(430.0, rel=1e-5)
+    assert "0.2" in found.remarks[0]
+
+
+def test_the_rate_is_that_of_all_rows_and_not_of_the_ends():
+    times = np.arange(2000) / 1000.0
+    times[0] -= 0.2e-3
+    times[-1] += 0.2e-3
+    assert clock(times).rate == pytest.approx(1000.0, rel=2e-6)  # by the ends: 2e-4 off
+
+
+def test_gaps_are_named_and_marked_when_that_is_asked_for():
+    times = np.delete(np.arange(1000) / 100.0, [300, 301, 700])
+    with pytest.raises(UnevenError, match=r"3 samples are missing, before row 301, 699.*mark gaps"):
+        clock(times)
+    found = clock(times, ["mark gaps"])
+    assert found.samples == 1000
+    assert list(np.flatnonzero(np.isnan(found.positions))) == [300, 301, 700]
+    assert found.positions[302] == 300.0
+    assert found.rate == pytest.approx(100.0)
+
+
+def test_repeated_and_backward_rows_are_named_and_left_out_when_that_is_asked_for():
+    times = np.insert(np.arange(100) / 10.0, [5, 50], [0.4, 4.9])
+    with pytest.raises(UnevenError, match=r"row 6, 52 is not after.*drop repeated"):
+        clock(times)
+    found = clock(times, ["drop repeated"])
+    assert found.samples == 100
+    assert found.rate == pytest.approx(10.0)
+    assert "2 rows were left out" in found.remarks[0]
+
+
+def test_jitter_is_resampled_only_when_that_is_asked_for():
+    rng = np.random.default_rng(3)
+    times = np.arange(4000) / 500.0 + rng.uniform(-0.4, 0.4, 4000) / 500.0
+    with pytest.raises(UnevenError, match=r"no even clock: steps vary by .* %.*resample"):
+        clock(times)
+    found = clock(times, ["resample"])
+    assert found.rate == pytest.approx(500.0, rel=1e-3)
+    signal = np.interp(found.positions, np.arange(4000), np.sin(2 * np.pi * 3.0 * times))
+    at = times[0] + np.arange(found.samples) / found.rate
+    # A line between samples dt apart is off a sine by (w dt)^2 / 8 at most.
+    most = (2 * np.pi * 3 * 1.8 / 500) ** 2 / 8
+    assert np.max(np.abs(signal - np.sin(2 * np.pi * 3.0 * at))) < most
+
+
+def test_across_a_hole_no_line_is_put():
+    rng = np.random.default_rng(3)
+    times = np.arange(1000) / 100.0 + rng.uniform(-0.4, 0.4, 1000) / 100.0
+    times = np.delete(times, np.arange(400, 420))
+    found = clock(times, ["resample"])
+    assert 18 <= np.isnan(found.positions).sum() <= 21
+
+
+@pytest.mark.parametrize("times", [[0.0], [1.0, 1.0, 1.0], [0.0, np.nan, 0.2]])
+def test_what_is_no_clock_at_all_is_told(times):
+    with pytest.raises(UnevenError):
+        clock(times, ["drop repeated", "mark gaps", "resample"])

@@ -1,0 +1,233 @@
+"""What of a mapping and its files is refused or told, and which rows are which trial."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from campaign.cli.prepare import Request, prepare
+from campaign.errors import ProtocolError, UsageError
+from campaign.importing import defects
+from campaign.importing.described import file_used
+from campaign.importing.interface import RecordingError
+from campaign.importing.opening import open_recordings
+from tests.importing.test_mapping import COLUMNS, ENTRY, TEST, planned, refused, write
+
+
+def test_only_regular_files_are_opened(tmp_path: Path):
+    """A pipe that nobody writes to would be waited for, here and where it is hashed."""
+    for opening in (open_recordings, lambda path: file_used(path, path.name)):
+        with pytest.raises(RecordingError, match="device or the like, and no regular file"):
+            opening(Path(os.devnull))
+        with pytest.raises(RecordingError, match="it is a folder"):
+            opening(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_a_pipe_is_no_recording_and_is_not_waited_for(tmp_path: Path):
+    text = COLUMNS + TEST + ENTRY.replace("a.csv", "pipe")
+    write(tmp_path, text)
+    os.mkfifo(tmp_path / "pipe")
+    for command in (["plan", "m.toml", "--backend", "import"], ["import", "--guess", "pipe"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "campaign", *command],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 2, done.stderr
+        assert "no regular file" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("file", "column", "what"),
+    [
+        ('"none.csv"', 8, "none.csv: it cannot be opened: No such file"),
+        ('["a.csv", "none.csv"]', 18, "none.csv: it cannot be opened: No such file"),
+        ('"broken.csv"', 8, "broken.csv:4:1: 'x' is no number"),
+        ('"broken*.csv"', 8, "'x' is no number, as the rest of its column is (1 more alike)"),
+        ('""', 8, "it is empty; name the file"),
+        ("[]", 8, "it is empty; name the file"),
+        ('"a\\u0000b"', 8, "no file has a name with a NUL"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told_at_its_name(
+    tmp_path: Path, file: str, column: int, what: str
+):
+    rows = [f"{k},{k},{k}" for k in range(50)]
+    rows[2] = "x,2,2"
+    for name in ("broken.csv", "broken2.csv"):
+        (tmp_path / name).write_text("t,pos,i\n" + "\n".join(rows))
+    told = refused(tmp_path, COLUMNS + TEST + ENTRY.replace('"a.csv"', file))
+    assert f"m.toml:19:{column}: " in told
+    assert what in told
+    assert "\n" not in told
+
+
+def test_a_mapping_that_is_to_be_simulated_is_told_to_be_recordings(tmp_path: Path):
+    """Not what of its bench a simulation lacks: nobody wants to simulate it."""
+    text = COLUMNS + TEST.replace('"platform"', '"./rig.toml"') + ENTRY
+    rig = 'schema = 3\nname = "Rig"\n[axis]\nname = "joint"\n'
+    (tmp_path / "rig.toml").write_text(rig)
+    path = write(tmp_path, text)
+    with pytest.raises(UsageError) as caught:
+        prepare(Request(path, backend="sim"))
+    told = str(caught.value)
+    assert f"`campaign import {path}`" in told
+    assert f"`campaign plan {path} --backend import`" in told
+    assert "inertia" not in told
+
+
+def cut(folder: Path, runs: list[object], line: str):
+    """The plan of a file of as many rows as `runs`, which are the column `run`."""
+    rows = "t,pos,i,run\n" + "\n".join(f"{k},{0.05 * k:.6g},1,{r}" for k, r in enumerate(runs))
+    return planned(folder, COLUMNS + TEST + ENTRY + line, rows)
+
+
+def test_stretches_that_are_alike_are_numbered(tmp_path: Path):
+    runs = [1] * 20 + [2] * 20 + [1] * 20
+    trials = cut(tmp_path, runs, 'each = "run"').trials
+    assert [trial.point for trial in trials] == [
+        {"run": 1.0, "part": 1},
+        {"run": 2.0, "part": 2},
+        {"run": 1.0, "part": 3},
+    ]
+    assert len({trial.label for trial in trials}) == 3
+    trials = cut(tmp_path, runs, 'where = { column = "run", equals = 1 }').trials
+    assert [trial.point["part"] for trial in trials] == [1, 2]
+    line = 'trigger = { column = "run", level = 1.5, duration = "15 ms" }'
+    trials = cut(tmp_path, runs * 2, line).trials
+    assert [trial.point for trial in trials] == [{"part": 1}, {"part": 2}]
+
+
+def test_short_stretches_are_left_out_and_told(tmp_path: Path):
+    runs = [1] * 20 + [2] * 9 + [3] * 20 + [""] + [3] * 10
+    trials = cut(tmp_path, runs, 'each = "run"').trials
+    assert [trial.recording["rows"] for trial in trials] == [20, 20, 10]
+    assert [trial.point["run"] for trial in trials] == [1, 3, 3]
+    remarks = " ".join(trials[0].recording["remarks"])
+    assert "1 stretch of column 'run' with fewer than 10 rows is no trial" in remarks
+    assert "column 'run' has no value in 1 row, which is in no trial" in remarks
+
+
+@pytest.mark.parametrize(
+    ("runs", "line", "what"),
+    [
+        (
+            list(range(400)),
+            'each = "run"',
+            "makes 400 stretches, the shortest of 1 row and the longest of 1 row; a recording",
+        ),
+        (
+            [1, ""] * 20,
+            'where = { column = "run", equals = 1 }',
+            "the longest of 1 row; a recording needs 10. Column 'run' has no value in 20 rows",
+        ),
+        (
+            [0, *[2] * 30, *[0] * 5, *[2] * 80],
+            'trigger = { column = "run", level = 1, duration = "50 ms" }',
+            "again in row 37, 15 rows before the trial that is running there ends",
+        ),
+        (
+            [0] * 20 + [1] * 40,
+            'trigger = { column = "run", level = 0.5, duration = "5 ms" }',
+            "its 'duration' holds 5 rows, and a recording needs 10",
+        ),
+        ([1] * 2, "", "a.csv: it has 2 rows, and a recording needs 10"),
+        ([1] * 9, "", "a.csv: it has 9 rows, and a recording needs 10"),
+        ([1] * 40, 'stop = "3 ms"', "3 rows from its beginning to 0.003 s, and a recording"),
+    ],
+)
+def test_what_holds_no_trial_is_refused(tmp_path: Path, runs: list[object], line: str, what: str):
+    with pytest.raises(ProtocolError) as caught:
+        cut(tmp_path, runs, line)
+    told = str(caught.value)
+    assert what in told
+    assert "m.toml:20:" in told if line else "m.toml:19:8: " in told
+
+
+def test_a_lost_value_of_a_trigger_is_no_fall(tmp_path: Path):
+    runs = [0] * 10 + [2] * 20 + [""] + [2] * 60
+    line = 'trigger = { column = "run", level = 1, duration = "30 ms" }'
+    (trial,) = cut(tmp_path, runs, line).trials
+    assert trial.recording["first"] == 10
+
+
+def test_as_few_as_ten_samples_are_a_recording(tmp_path: Path):
+    (trial,) = cut(tmp_path, [1] * 10, "").trials
+    assert trial.recording["samples"] == 10
+
+
+def test_kinds_to_accept_are_those_that_are_looked_for(tmp_path: Path):
+    text = COLUMNS.replace('unit = "deg"', 'unit = "deg"\naccept = ["cliping"]') + TEST + ENTRY
+    told = refused(tmp_path, text)
+    assert "m.toml:7:" in told
+    assert "'cliping' is nothing that is looked for" in told
+    assert "did you mean 'clipping'?" in told
+    assert planned(tmp_path, text.replace("cliping", "clipping")).trials
+
+
+def test_every_kind_that_is_found_in_channels_can_be_accepted():
+    """Of the sources: whatever is made a `Defect` of channels is in the list, and no more."""
+    found = set()
+    for source in Path(defects.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Defect":
+                kind, channels = node.args[:2]
+                assert isinstance(kind, ast.Constant)
+                if not isinstance(channels, ast.Tuple) or channels.elts:
+                    found.add(kind.value)
+    assert found == set(defects.CHANNEL_KINDS)
+
+
+@pytest.mark.parametrize(("uncertainty", "share"), [("5 %", 0.05), ("0.1 N m/A", 0.04), ("0 %", 0)])
+def test_an_uncertainty_may_be_a_share(tmp_path: Path, uncertainty: str, share: float):
+    text = COLUMNS.replace("0.05 N m/A", uncertainty) + TEST + ENTRY
+    (trial,) = planned(tmp_path, text).trials
+    torque = next(c for c in trial.recording["channels"] if c["name"] == "drive_torque")
+    assert torque["relative_uncertainty"] == pytest.approx(share)
+
+
+@pytest.mark.parametrize("uncertainty", ["-5 %", "-0.1 N m/A"])
+def test_a_negative_uncertainty_is_refused(tmp_path: Path, uncertainty: str):
+    told = refused(tmp_path, COLUMNS.replace("0.05 N m/A", uncertainty) + TEST + ENTRY)
+    assert f"the uncertainty '{uncertainty}' is negative" in told
+    assert "m.toml:7:" in told
+
+
+def test_what_is_derived_has_the_uncertainty_of_both(tmp_path: Path):
+    more = """\
+[columns.rig.motor_current]
+derive = "drive_torque"
+times = "0.4 A/(N m)"
+uncertainty = "1.5 %"
+[columns.rig.joint_torque]
+derive = "drive_torque"
+"""
+    (trial,) = planned(tmp_path, COLUMNS + more + TEST + ENTRY).trials
+    known = {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
+    assert known["drive_torque"] == pytest.approx(0.02)
+    assert known["motor_current"] == pytest.approx(0.025)
+    assert known["joint_torque"] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "known"),
+    [
+        ("breakaway", "rest, ramp; did you mean 'ramp'?"),
+        ("step_response", "rest, answer"),
+        ("velocity_map", "positive, negative"),
+    ],
+)
+def test_windows_that_no_analysis_looks_for_are_refused(tmp_path: Path, kind: str, known: str):
+    line = 'windows = { rampp = ["0 s", "0.1 s"] }'
+    told = refused(tmp_path, COLUMNS + TEST.replace("motion", kind) + ENTRY + line)
+    assert "m.toml:20:13: " in told
+    assert f"looks for a window 'rampp'; allowed are {known}" in told
