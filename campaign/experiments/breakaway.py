@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, JsonValue
 
-from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Origin, Window
 from campaign.experiments.conclusions.breakaway import breakaway_conclusions
 from campaign.experiments.conclusions.parts import Settings
@@ -27,13 +27,15 @@ from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.found_excitation import found_ramp
 from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
-from campaign.trial import Array, Task, Trial, TrialRequest
+from campaign.trial import Array, Offered, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
     AngularRate,
@@ -43,6 +45,7 @@ from campaign.units import (
     Time,
     Torque,
     TorqueRate,
+    rate_here,
 )
 
 STOP_FACTOR = 4.0
@@ -104,9 +107,38 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
                 stop_rate=stop_rate,
             ),
             point={"measurement": number, "position": position, "direction": direction},
-            note=f"ends early, once the load slides at {np.rad2deg(stop_rate):.3g} deg/s",
+            note=f"ends early, once the load slides at {rate_here(stop_rate)}",
             windows=windows,
         )
+
+
+def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The ramp of a recording that nobody planned: up to when the load first slides."""
+    known = {RELATIVE_ANGLE} & offered.channels
+    recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
+    sliding = np.abs(recording[GYRO_RATE]) > options.sliding_rate
+    if not sliding.any():
+        rate = np.rad2deg(options.sliding_rate)
+        raise ValueError(f"the load never slides at {rate:.3g} deg/s (sliding_rate)")
+    slides = float(recording.time[int(np.argmax(sliding))])
+    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], slides)
+    stops = np.abs(recording[GYRO_RATE]) > STOP_FACTOR * options.sliding_rate
+    stop = float(recording.time[int(np.argmax(stops))]) if stops.any() else offered.duration
+    place: dict[str, JsonValue] = {}
+    if known and "position" not in offered.conditions:
+        place["position"] = round(float(recording[RELATIVE_ANGLE][0]), 4)
+    windows = offered.windows or (
+        Window("rest", 0.0, ramp.start),
+        Window("ramp", ramp.start, stop),
+    )
+    yield TrialRequest(
+        Task(mode="recorded", duration=stop, window=(ramp.start, stop), sample_rate=1.0),
+        point=place | {"direction": "positive" if ramp.slope > 0 else "negative"},
+        note=f"a ramp of {ramp.slope:.3g} N m/s from {ramp.start:.3g} s was found",
+        windows=windows,
+        part=(0.0, stop),
+        options={"torque_rate": float(f"{abs(ramp.slope):.3g}"), "rest": ramp.start},
+    )
 
 
 def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
@@ -143,7 +175,7 @@ def _presliding(data: TrialData, breakaway: float) -> Presliding:
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Breakaway torque; where the curve of bristles shows, stiffness and what follows from it."""
     options, bench = _options(data.trial), bench_of(data.trial)
-    inertia = bench.axis.inertia
+    inertia = inertia_of(bench, "friction of a load that gathers speed")
     found = breakaway_torque(*_samples(data), inertia, options.sliding_rate)
     torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
     torque = _by_torque_constant(torque, bench)
@@ -163,7 +195,7 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
         models = friction_models()
         load = (each for each in bench.friction.values() if each.side == "load")
         viscous = sum(models[each.model].viscous(each) for each in load)
-    inertia = options.inertia or bench.axis.inertia
+    inertia = options.inertia or inertia_of(bench, "a damping ratio")
     stiffness = curve.stiffness.value
     damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
     curve = curve.with_damping(damping)
@@ -209,12 +241,14 @@ def _analyse(data: TestData) -> Result:
         findings += findings_of(ramps, means)
         notes += remarks(ramps)
     rates = [_options(item.trial).torque_rate for item in data.completed()]
+    known = any(bench_of(item.trial).axis.inertia is not None for item in data.completed())
+    settings = Settings.of(data, BreakawayOptions)
     return Result(
         tuple(tables),
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        breakaway_conclusions(findings, rates, Settings.of(data, BreakawayOptions)),
+        breakaway_conclusions(findings, rates, settings, inertia_known=known or not rates),
     )
 
 
@@ -223,6 +257,9 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
     for item in group:
         try:
             own = metrics(item, _measure)
+        except IncompleteBenchError as error:  # said once for all ramps
+            notes.append(f"No breakaway torque: {error}.")
+            continue
         except ValueError as error:
             notes.append(f"{item.trial.label}: {error}.")
             continue
@@ -245,7 +282,7 @@ def _figures(
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
         curve, place = _presliding(data, torque), ramps.places[shown]
         yield ramp_figure(_samples(data), curve, torque, suffix, place, trials_of([data]))
-    if len(ramps.found) > 2:
+    if len(ramps.found) > 2 and all("position" in place for place in ramps.places):
         yield position_figure(ramps, means, suffix)
 
 
@@ -257,6 +294,8 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     fit=fitting.breakaway,
     measure=_measure,
+    recorded=_found,
+    windows=("rest", "ramp"),
     requires={
         DRIVE_TORQUE: "the torque at which the load slides",
         GYRO_RATE: "the presliding curve, and the moment at which the load slides",

@@ -32,6 +32,7 @@ from campaign.identification.readings import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import inertia_of
 from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
@@ -160,8 +161,7 @@ def _count(data: TrialData, component: str) -> float:
     """One count of the torque sensor, seen at the load (N m)."""
     options = _options(data)
     bench = bench_of(data.trial)
-    motor = bench.friction[component].side == "motor"
-    return options.sensor_resolution * (bench.gear.ratio if motor else 1.0)
+    return options.sensor_resolution * bench.at_load(bench.friction[component])[0]
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
@@ -172,7 +172,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
         recording.time,
         recording[GYRO_RATE],
         recording[DRIVE_TORQUE],
-        bench_of(data.trial).axis.inertia,
+        inertia_of(bench_of(data.trial), "friction of a load that gathers speed"),
         options.sliding_rate,
     ).torque
     count = _count(data, str(data.trial.point["component"]))
@@ -319,8 +319,9 @@ def _table(readings: list[Reading], suffix: str) -> Table:
 def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
     options = _options(first)
     motor = [name for name, own in _by_component(readings).items() if _side(own[0]) == "motor"]
-    if motor and options.sensor_resolution > 0:
-        step = options.sensor_resolution * bench_of(first.trial).gear.ratio
+    gear = bench_of(first.trial).gear
+    if motor and gear is not None and options.sensor_resolution > 0:
+        step = options.sensor_resolution * gear.ratio
         yield (
             f"The torque sensor shows multiples of {options.sensor_resolution:g} N·m. Behind the "
             f"gear that is {step:.3g} N·m at the load: the readings of {' and '.join(motor)} fall "

@@ -33,6 +33,7 @@ from campaign.experiments.results.frequency_response_tables import (
     closed_findings,
     closed_notes,
     closed_tables,
+    falling_amplitude,
     is_extrapolated,
     method,
     modes,
@@ -47,6 +48,8 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
+from campaign.experiments.shared.found_trials import sine_response
+from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
 from campaign.identification.frequency_response import Response, make_response
 from campaign.identification.intervals import with_error
@@ -56,11 +59,21 @@ from campaign.identification.servo import characteristics
 from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate, inertia_of, limits_of
 from campaign.physics.limits import worst_friction
 from campaign.result import Conclusion, Figure, Finding, Result, Table
 from campaign.signals import Sine
-from campaign.trial import NONE_MORE, Most, Task, Trial, TrialRequest
-from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time, Torque
+from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
+from campaign.units import (
+    Angle,
+    AngularAcceleration,
+    AngularRate,
+    Frequency,
+    Time,
+    Torque,
+    angle_here,
+    rate_here,
+)
 
 LIMIT_SHARE = 0.9
 """of the bench's limits that the amplitude of a rate command may use."""
@@ -157,11 +170,20 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
     )
 
 
+def _found(
+    options: FrequencyResponseOptions, bench: Bench, offered: Offered
+) -> Iterator[TrialRequest]:
+    """The sine that a recording of one frequency is."""
+    mode: Literal["rate", "torque"] = "rate" if options.loop == "closed" else "torque"
+    times = options.settle_cycles, options.settle_time
+    yield sine_response(offered, mode, _excitation(mode), STEADY, *times)
+
+
 def _refined_range(options: FrequencyResponseOptions, bench: Bench) -> tuple[float, float]:
     """Lowest and highest frequency (Hz) of a refinement: those of the sweep, and a little beyond,
     as far as the controller's sample rate shows them.
     """
-    swept, control = swept_frequencies(options), bench.controller.sample_rate
+    swept, control = swept_frequencies(options), control_rate(bench)
     highest = swept[-1] * (1.0 + PHASE_SHARE)
     seen = highest if control is None else NYQUIST_SHARE * control
     return swept[0] * (1.0 - PHASE_SHARE), min(highest, seen)
@@ -204,13 +226,13 @@ def _excitation(mode: str) -> str:
 
 def _amplitude(command: Sine, closed: bool) -> str:
     if closed:
-        return f"amplitude {np.rad2deg(command.amplitude):.3g} deg/s"
+        return f"amplitude {rate_here(command.amplitude)}"
     return f"amplitude {command.amplitude:.3g} N·m"
 
 
 def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> float:
     """Of the recording (Hz): `samples_per_cycle`, or a whole share of the controller's rate."""
-    control = bench.controller.sample_rate
+    control = control_rate(bench)
     if control is None:
         return options.samples_per_cycle * frequency
     if frequency > NYQUIST_SHARE * control:
@@ -225,14 +247,13 @@ def _rate_sine(
     options: FrequencyResponseOptions, bench: Bench, frequency: float
 ) -> tuple[Sine, float]:
     """The rate command and half the angle it swings (rad); it starts at rest."""
-    limits, omega = bench.limits, 2.0 * math.pi * frequency
+    rig, omega = Rig(bench), 2.0 * math.pi * frequency
     acceleration = options.max_acceleration
     if acceleration is None:
-        torque = min(limits.torque, limits.current * bench.torque_per_current)
-        torque -= worst_friction(bench, options.amplitude)
+        torque = rig.torque - worst_friction(bench, options.amplitude)
         if torque <= 0:
             raise ValueError("the bench's torque and current limits do not overcome its friction")
-        acceleration = LIMIT_SHARE * min(limits.acceleration, torque / bench.axis.inertia)
+        acceleration = LIMIT_SHARE * min(rig.limits.acceleration, rig.accelerated_by(torque))
     amplitude = min(options.amplitude, acceleration / omega)
     return Sine(amplitude=amplitude, frequency=frequency), amplitude / omega
 
@@ -245,12 +266,13 @@ def _torque_sine(
     It starts at its peak: the rate of a free load then has no offset, and the angle no drift.
     """
     omega = 2.0 * math.pi * frequency
-    rate = options.torque / (bench.axis.inertia * omega)
+    limits = limits_of(bench)
+    rate = options.torque / (inertia_of(bench, "the swing of a free load") * omega)
     swing = rate / omega
-    if abs(options.position) + swing > bench.limits.angle or rate > bench.limits.rate:
+    if abs(options.position) + swing > limits.angle or rate > limits.rate:
         raise ValueError(
             f"{options.torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
-            f"{np.rad2deg(swing):.3g} deg at {np.rad2deg(rate):.3g} deg/s, beyond the bench's "
+            f"{angle_here(swing)} at {rate_here(rate)}, beyond the bench's "
             "limits; lower torque or raise lowest"
         )
     return Sine(amplitude=options.torque, frequency=frequency, phase=0.5 * math.pi), swing
@@ -309,7 +331,7 @@ def _analyse(data: TestData) -> Result:
                 points.append(_point(item))
             except ValueError as error:
                 notes.append(f"{item.trial.label}: {error}.")
-        notes += _falling_amplitude(group)
+        notes += falling_amplitude(group)
         if points:
             sweeps.append(_sweep(group[0], make_response(points), paths))
     closed = [sweep for sweep in sweeps if sweep.loop == "closed"]
@@ -363,25 +385,6 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     return Sweep(place, loop, ", ".join([label, *others]), response, found)
 
 
-def _falling_amplitude(group: tuple[TrialData, ...]) -> Iterator[str]:
-    """A sentence where limits lowered the amplitude of a rate command along the sweep."""
-    sines = [i.trial.task.command for i in group if i.trial.task.mode == "rate"]
-    full = [s for s in sines if isinstance(s, Sine)]
-    if not full:
-        return
-    largest = max(sine.amplitude for sine in full)
-    lowered = [sine for sine in full if sine.amplitude < largest * (1 - 1e-9)]
-    if lowered:
-        first = min(lowered, key=lambda sine: sine.frequency)
-        least = max(lowered, key=lambda sine: sine.frequency)
-        yield (
-            f"The command's amplitude was {np.rad2deg(largest):.3g} deg/s below "
-            f"{first.frequency:.4g} Hz; from there on its acceleration was kept, down to "
-            f"{np.rad2deg(least.amplitude):.3g} deg/s at {least.frequency:.4g} Hz. Where friction "
-            "matters, other amplitudes give other responses."
-        )
-
-
 EXPERIMENT = Experiment(
     name="frequency_response",
     summary="stepped-sine response, bandwidth and margins (Tables 5.3 and 5.9, Figure 4.5)",
@@ -390,6 +393,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=_measure,
     fit=fitting.frequency_response,
+    recorded=_found,
     requires={
         GYRO_RATE: "the response",
         COMMAND: "what a closed loop responds to",

@@ -10,17 +10,28 @@ from typing import Any, Protocol, TypeVar, cast
 
 from pydantic_core import to_json
 
+from campaign.axis_kind import BOTH_ROTARY, Sides, sides_in, speaking_of
 from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.preparing.draws import draws_of, merged
+from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
 from campaign.experiments.preparing.swept_tables import table_names
 from campaign.experiments.preparing.unusable import doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED
 from campaign.result import Result
-from campaign.trial import Ending, Most, Recording, Tree, Trial, TrialRequest, canonical_json
+from campaign.trial import (
+    Ending,
+    Most,
+    Offered,
+    Recording,
+    Tree,
+    Trial,
+    TrialRequest,
+    canonical_json,
+)
 
 _Options = TypeVar("_Options", bound=Options)
 
@@ -125,6 +136,12 @@ class Experiment:
             (`TrialRequest.bench`); what it finds is still said of the test's bench.
         stages: further trials of a point, which follow from those of `trials` and of the stages
             before; nothing else may lead to trials that are not in the plan.
+        recorded: the trials that a recording from elsewhere holds, with their windows, and with the
+            part of it that each is where there are several. Raises ValueError with a message for
+            the user where it holds none. Absent: it is one trial, with the windows that whoever
+            recorded it names.
+        windows: names of the windows that its analysis looks for, where other names tell it
+            nothing; a mapping that names another is refused. Absent: whoever recorded it knows.
         warnings: what the plan should warn of, with what to do about it: sentences without a full
             stop, of the options and the bench of a point whose trials were made. What a test's
             points say alike is told once.
@@ -142,6 +159,8 @@ class Experiment:
     seeks_instability: bool = False
     perturbs_bench: bool = False
     stages: tuple[Stage, ...] = ()
+    recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
+    windows: tuple[str, ...] = ()
     warnings: Callable[[Any, Bench], Iterable[str]] | None = None
 
 
@@ -154,6 +173,16 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
     Recordings that cannot hold anything are kept from it, and a note says which and why. Of a test
     that sweeps the seed of its bench's scatter each draw is analysed by itself.
     """
+    with speaking_of(_sides(data)):
+        return of_its_axis(_result_of(experiment, data))
+
+
+def _sides(data: TestData) -> Sides:
+    """How the bench of a test moves: all of its trials are of one protocol's one bench."""
+    return sides_in(data.trials[0].trial.bench) if data.trials else BOTH_ROTARY
+
+
+def _result_of(experiment: Experiment, data: TestData) -> Result:
     doubts = [doubt(item) for item in data.trials]
     kept = zip(data.trials, doubts, strict=True)
     trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
@@ -183,7 +212,8 @@ def metrics(
 
     What was not determined is not archived, and comes back as such. Raises what `measure` raises.
     """
-    return Metrics({found.name: found for found in data.estimates or measure(data)})
+    found = data.estimates or measure(data)
+    return Metrics({each.name: estimate_here(each) for each in found})
 
 
 class Metrics(dict[str, Estimate]):
@@ -201,7 +231,10 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
     wrong = doubt(data)
     if wrong and wrong.fatal:
         raise ValueError(wrong.what)
-    return experiment.measure(data) if experiment.measure else ()
+    if experiment.measure is None:
+        return ()
+    with speaking_of(sides_in(data.trial.bench)):
+        return tuple(map(estimate_here, experiment.measure(data)))
 
 
 def with_named_tables(data: TestData) -> TestData:

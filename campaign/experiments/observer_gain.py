@@ -46,6 +46,7 @@ from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.options import Options
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete, limits_of
 from campaign.physics.stability import growth_rate
 from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
@@ -91,17 +92,18 @@ class ObserverGainOptions(Options):
         return frozenset(() if self.disturbance_frequencies else rejection)
 
 
-def _tuned(bench: Bench, name: str, corner: float) -> Bench:
+def _tuned(bench: Bench, name: str, corner: float) -> CompleteBench:
     """The bench with its observer at this corner frequency (Hz)."""
-    gain = theory.gain_for(bench, corner, own_observer(bench, name)[1])
+    known = complete(bench, "the theory of an observer")
+    gain = theory.gain_for(known, corner, own_observer(bench, name)[1])
     tree = with_changes(bench, {f"compensation.{name}.gain": gain})
-    return Bench.model_validate(tree, context={"si": True})
+    return complete(Bench.model_validate(tree, context={"si": True}))
 
 
-def _benches(options: ObserverGainOptions, bench: Bench) -> Iterator[tuple[float, Bench]]:
+def _benches(options: ObserverGainOptions, bench: Bench) -> Iterator[tuple[float, CompleteBench]]:
     """Each corner frequency (Hz; 0 is without observer) with the bench tuned to it."""
     own, _ = own_observer(bench, options.observer)
-    yield 0.0, bench
+    yield 0.0, complete(bench)
     for corner in sorted({*options.corners, own}):
         if corner <= 0:
             raise ValueError("corner frequencies are positive; 0 is always measured, too")
@@ -125,7 +127,7 @@ def predicted_limit(bench: Bench, name: str, highest: float) -> float | None:
 
 def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, Chosen]:
     """The base motion, and times of noise and disturbance within the limit of duration."""
-    choices, longest = Choices(options), MOST * bench.limits.duration
+    choices, longest = Choices(options), MOST * limits_of(bench).duration
     why = share("duration", MOST)
     if longest < SETTLE + options.noise_time:
         choices.take("noise_time", max(0.0, nice(longest - SETTLE, "s")), f"within {why}")
@@ -207,7 +209,7 @@ def _analyse(data: TestData) -> Result:
     if not data.trials:
         return Result()
     options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
-    bench = bench_of(data.trials[0].trial)
+    bench = complete(bench_of(data.trials[0].trial), "the theory of an observer")
     own, inertia = own_observer(bench, options.observer)
     groups: dict[float, list[TrialData]] = {}
     for item in data.trials:

@@ -40,7 +40,7 @@ from campaign.result import (
 )
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
-from campaign.units import Angle, Frequency
+from campaign.units import Angle, Frequency, in_words
 
 OWN = ("amplitude",)
 PER_CYCLE = 400
@@ -276,7 +276,7 @@ def _panel(place: Place, display: str) -> Panel:
 def _amplitude(amplitude: float, display: str) -> str:
     if display == "urad":
         return f"± {amplitude * 1e6:.3g} µrad"
-    return f"± {amplitude * 1e3:.3g} mrad"
+    return f"± {in_words(amplitude, 'rad', 'mrad')}"
 
 
 EXPERIMENT = Experiment(

@@ -44,10 +44,11 @@ from campaign.identification.stabilization_error import over_trials
 from campaign.identification.threshold import Threshold
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import pointing_high_pass
 from campaign.result import Figure, Finding, Result, Value
 from campaign.signals import Sine
 from campaign.trial import Task, TrialRequest
-from campaign.units import Angle, AngularAcceleration, Frequency
+from campaign.units import Angle, AngularAcceleration, Frequency, in_words
 
 CHANGES = (-0.8, -0.65, -0.5, -0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8)
 
@@ -201,8 +202,9 @@ def _analyse(data: TestData) -> Result:
     limit = Threshold(options.threshold if ratio is None else ratio * unchanged.value, ratio)
     if unchanged.value > limit.value:
         notes.append(
-            f"The error is {unchanged.value * 1e3:.3g} mrad with the unchanged model, already "
-            f"beyond the threshold of {limit.value * 1e3:.3g} mrad; no change has a meaning then."
+            f"The error is {in_words(unchanged.value, 'rad', 'mrad')} with the unchanged model, "
+            f"already beyond the threshold of {in_words(limit.value, 'rad', 'mrad')}; no change "
+            "has a meaning then."
         )
     judged = judge(responses, limit)
     told: dict[str, Value] = {
@@ -227,7 +229,7 @@ def _analyse(data: TestData) -> Result:
             findings,
             limit.value,
             SYMBOLS,
-            bench_of(measured[0].trial).controller.pointing_high_pass,
+            pointing_high_pass(bench_of(measured[0].trial)),
         ),
     )
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -31,6 +32,7 @@ from campaign.experiments.results.stabilization_figures import stabilization_fig
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
 from campaign.experiments.shared.comparisons import compared, preload_of
+from campaign.experiments.shared.found_trials import hull_sine
 from campaign.experiments.shared.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
 from campaign.experiments.shared.pointing_error import (
     error_of,
@@ -46,9 +48,10 @@ from campaign.identification.stabilization_error import BLOCKS, LOST, over_trial
 from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import pointing_high_pass
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Recording, Task, Trial, TrialRequest
+from campaign.trial import Offered, Recording, Task, Trial, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
 
 SAMPLES_PER_CYCLE = 10
@@ -106,6 +109,15 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
     )
     note = f"{options.cycles} cycles measured after {options.settle_cycles} to settle"
     yield TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
+
+
+def _found(options: StabilizationOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The swinging hull of a recording that nobody planned."""
+    request = hull_sine(offered, options.settle_cycles)
+    compensated = request.task.model_copy(update={"compensation": options.compensation})
+    yield replace(
+        request, task=compensated, can_use=_can_use(options), windows=windows_of(compensated)
+    )
 
 
 def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion) -> TrialRequest:
@@ -186,7 +198,7 @@ def _analyse(data: TestData) -> Result:
         findings += [Finding.of(cell, told) for cell in told_of if isinstance(cell, Estimate)]
         rows.append({**told, **row})
     firsts = [group[0] for group in groups.values()]
-    high_pass = bench_of(firsts[0].trial).controller.pointing_high_pass if firsts else 0.0
+    high_pass = pointing_high_pass(bench_of(firsts[0].trial)) if firsts else 0.0
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
     findings += compared(errors)
     figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
@@ -279,6 +291,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     fit=fitting.base_motion,
+    recorded=_found,
     measure=_measure,
     requires={POINTING_ERROR: "the stabilization error"},
     can_use={

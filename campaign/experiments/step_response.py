@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError, field_validator
 
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
@@ -22,10 +22,15 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
+from campaign.experiments.shared.found_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.identification.intervals import of_repeats
 from campaign.identification.sampled import where_it_scatters
-from campaign.identification.step_response import reached, step_characteristics
+from campaign.identification.step_response import (
+    NOT_SETTLED,
+    StepCharacteristics,
+    step_characteristics,
+)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (
@@ -43,26 +48,31 @@ from campaign.result import (
     Value,
 )
 from campaign.signals import Polyline
-from campaign.trial import Recording, Task, Tree, Trial, TrialRequest
+from campaign.trial import Offered, Recording, Task, Tree, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 SHOWN = 2.5
 """The figure shows the step up to this many settling times."""
 
 
+LEAST_REST = 0.01
+"""s of standstill before a step."""
+
+
 class StepResponseOptions(Options):
     """Options of a step response test."""
 
-    step: AngularRate = Field(default=float(np.deg2rad(1.0)), gt=0)
-    """Height of the step of the rate command."""
-    ramp: Time = Field(default=0.005, gt=0)
-    """How long the command takes to rise: a jump would break any limit of acceleration."""
+    step: AngularRate = float(np.deg2rad(1.0))
+    """Height of the step of the rate command; negative: downwards, or to the negative side."""
+    ramp: Time = Field(default=0.005, ge=0)
+    """How long the command takes to rise: a jump would break any limit of acceleration, so 0 is
+    for recordings only."""
     linear: bool = True
     """Without the bench's friction, as the loop was tuned; false: as it is. Friction can be taken
     away from a simulated bench only."""
     compensation: str = "none"
     """Compensation method, by its name on the bench; none for none."""
-    rest: Time = Field(default=0.1, ge=0.01)
+    rest: Time = Field(default=0.1, ge=LEAST_REST)
     """Standstill before the step."""
     duration: Time = Field(default=1.0, gt=0)
     """From the start of the step to the end of the trial."""
@@ -73,8 +83,17 @@ class StepResponseOptions(Options):
     position: Angle = 0.0
     """Angle of the load relative to the hull at the start."""
 
+    @field_validator("step")
+    @classmethod
+    def _is_one(cls, step: float) -> float:
+        if step == 0.0:
+            raise ValueError("a step of zero is none")
+        return step
+
 
 def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest]:
+    if options.ramp == 0.0:
+        raise ValueError("a jump of the command breaks any limit of acceleration; give it a ramp")
     if options.ramp > 0.1 * options.duration:
         raise ValueError("a ramp of over a tenth of the duration is no step; shorten ramp")
     stop = options.rest + options.duration
@@ -107,22 +126,42 @@ def _windows(options: StepResponseOptions) -> Iterator[Window]:
     yield Window(ANSWER, options.rest, options.rest + options.duration)
 
 
+def _found(options: StepResponseOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The step of a recording that nobody planned."""
+    request = step_found(offered, (REST, ANSWER))
+    if float(str(request.options["rest"])) < LEAST_REST:
+        raise ValueError(
+            f"{COMMAND}: its step comes within {1e3 * LEAST_REST:g} ms of its begin; "
+            "the standstill before it is needed too"
+        )
+    yield request
+
+
 def _answer(trial: Trial) -> Window:
-    windows = trial.windows or _windows(_options(trial))
-    return next(window for window in windows if window.name == ANSWER)
+    """The window that all follows in: the one named so, or else from the step on."""
+    options = _options(trial)
+    named = [window for window in trial.windows if window.name == ANSWER]
+    return (named or [each for each in _windows(options) if each.name == ANSWER])[0]
 
 
 def _options(trial: Trial) -> StepResponseOptions:
-    return StepResponseOptions.model_validate(trial.options, context={"si": True})
+    """Of a trial. Raises ValueError, in words for a reader, where they are none of such a test."""
+    try:
+        return StepResponseOptions.model_validate(trial.options, context={"si": True})
+    except ValidationError as error:
+        wrong = ", ".join(str(each["loc"][0]) for each in error.errors() if each["loc"])
+        raise ValueError(f"these options fit no step response: {wrong}") from None
+
+
+def _characteristics(trial: Trial, recording: Recording) -> StepCharacteristics:
+    options, start = _options(trial), _answer(trial).start
+    rate = recording[GYRO_RATE]
+    return step_characteristics(recording.time, rate, start, options.step, options.band)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Rise, settling, overshoot and what error stays; without those that were not seen."""
-    options = _options(data.trial)
-    recording = data.recording()
-    found = step_characteristics(
-        recording.time, recording[GYRO_RATE], _answer(data.trial).start, options.step, options.band
-    )
+    found = _characteristics(data.trial, data.recording())
     values = ((name, float(getattr(found, name)), unit) for name, unit in QUANTITIES)
     return tuple(
         Estimate(name, value, unit, reason=ONE_STEP)
@@ -132,7 +171,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 ONE_STEP = "it is of one step: repeats would show how it scatters"
-NOT_SEEN = "not every step was seen to do that before its recording ended"
+NOT_SEEN = "not every step was seen to do that"
 
 
 def _without_friction(bench: Bench) -> Tree:
@@ -144,7 +183,7 @@ def _without_friction(bench: Bench) -> Tree:
 class Step:
     """One step and what it says: time from the step, rate and command, shape (n,), SI.
 
-    The command is None where it was not recorded.
+    The command is None where it was not recorded; `level` is the rate (rad/s) before the step.
     """
 
     place: dict[str, Value]
@@ -153,7 +192,9 @@ class Step:
     time: Array
     rate: Array
     command: Array | None
+    level: float
     options: StepResponseOptions
+    rise_from: float
     found: Mapping[str, Estimate]
 
     def value(self, name: str) -> float:
@@ -163,8 +204,15 @@ class Step:
 
 def _evaluate(data: TrialData, paths: list[str]) -> Step:
     options = _options(data.trial)
-    found = metrics(data, _measure)
-    recording: Recording = data.recording()  # for the figure
+    recording: Recording = data.recording()  # for the figure, and for why there is no number
+    again = _characteristics(data.trial, recording)
+    found = dict(metrics(data, _measure))
+    for name, unit in QUANTITIES:
+        if name not in found:
+            reason = again.reasons.get(name, NOT_SEEN)
+            found[name] = Estimate.without_interval(name, math.nan, unit, reason)
+    rate, start = recording[GYRO_RATE], _answer(data.trial).start
+    before = rate[(recording.time < start) & np.isfinite(rate)]
     place = conditions(data, "compensation", "linear")
     words = ["linear loop" if options.linear else "with friction"]
     if options.compensation != "none" or "compensation" in paths:
@@ -176,10 +224,12 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
         place,
         label,
         "measured" if plain else label,
-        recording.time - _answer(data.trial).start,
-        recording[GYRO_RATE],
+        recording.time - start,
+        rate,
         recording[COMMAND] if COMMAND in recording.channels else None,
+        float(np.mean(before)) if before.size else 0.0,
         options,
+        again.rise_from - start,
         found,
     )
 
@@ -210,12 +260,7 @@ def _analyse(data: TestData) -> Result:
         )
     if not steps:
         return Result(notes=tuple(notes))
-    notes += [
-        f"{step.label[0].upper()}{step.label[1:]}: the rate does not stay within "
-        f"{100 * step.options.band:g} % of the step."
-        for step in steps
-        if not math.isfinite(step.value("settling_time"))
-    ]
+    notes += [note for step in steps for note in _notes(step)]
     tables = (_table(steps, [path for path in paths if path not in ("linear", "compensation")]),)
     options, settings = steps[0].options, Settings.of(data, StepResponseOptions)
     return Result(
@@ -227,11 +272,31 @@ def _analyse(data: TestData) -> Result:
     )
 
 
+def _notes(step: Step) -> Iterator[str]:
+    """What of a step has no number, and why."""
+    label = f"{step.label[0].upper()}{step.label[1:]}"
+    for name, what in UNSEEN.items():
+        reason = step.found[name].reason
+        if math.isfinite(step.value(name)):
+            continue
+        if reason == NOT_SETTLED:
+            band = f"{100 * step.options.band:g} %"
+            yield f"{label}: the rate does not stay within {band} of the step."
+        else:
+            yield f"{label}: no {what}: {reason}."
+
+
+UNSEEN = {"rise_time": "rise time", "settling_time": "settling time", "overshoot": "overshoot"}
+"""What a step may not show, in words."""
+
+
 def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
     """Mean of a characteristic over repeated steps, with the interval of their scatter."""
     values = [step.value(name) for step in repeats]
     if not all(map(math.isfinite, values)):
-        return Estimate.without_interval(name, math.nan, unit, NOT_SEEN)
+        reasons = {step.found[name].reason for step in repeats if math.isnan(step.value(name))}
+        why = reasons.pop() if len(reasons) == 1 else NOT_SEEN
+        return Estimate.without_interval(name, math.nan, unit, why)
     return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
 
 
@@ -265,14 +330,15 @@ def _figure(steps: list[Step]) -> Figure:
     times = [step.value("settling_time") for step in steps]
     settled = [time for time in times if math.isfinite(time)]
     end = min(SHOWN * max(settled), first.options.duration) if settled else first.options.duration
-    height = first.options.step
+    height, level = first.options.step, first.level
+    ends = sorted(level + height * (1 + sign * first.options.band) for sign in (-1, 1))
     curves = []
     if first.command is not None:
         curves.append(Curve(first.time, first.command, "command", "reference", "thin"))
     curves += [Curve(step.time, step.rate, step.label, step.series) for step in steps]
     band = 100 * first.options.band
     marks = [
-        Mark(f"±{band:g} %", y=height * (1 - 0.01 * band), until=height * (1 + 0.01 * band)),
+        Mark(f"±{band:g} %", y=ends[0], until=ends[1]),
         *_marks(first),
     ]
     marked = f" Marked are numbers of: {first.label}." if len(steps) > 1 and marks[1:] else ""
@@ -298,23 +364,18 @@ def _figure(steps: list[Step]) -> Figure:
 def _marks(step: Step) -> Iterator[Mark]:
     """Rise, overshoot and settling of one step, where they were seen."""
     rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
-    height = step.options.step
-    if math.isfinite(rise):
-        before = step.rate[step.time < 0]
-        zero = float(np.mean(before)) if before.size else 0.0
-        start = reached(step.time, (step.rate - zero) / height, RISE_FROM)
+    if math.isfinite(rise + step.rise_from):
+        start = step.rise_from
         yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
     if over > 0:
-        peak = int(np.nanargmax(step.rate))
+        # Only after the step: noise before it may lie as far out.
+        share = np.where(step.time >= 0, step.rate / step.options.step, np.nan)
+        peak = int(np.nanargmax(share))
         label = f"overshoot {100 * over:.3g} %"
         x, y = float(step.time[peak]), float(step.rate[peak])
         yield Mark(label, x=x, y=y, point=True, series=step.series)
     if math.isfinite(settled):
         yield Mark(f"settled {_time(settled)}", x=settled, series=step.series)
-
-
-RISE_FROM = 0.1
-"""Share of the step from which on the rise time counts."""
 
 
 def _time(seconds: float) -> str:
@@ -329,6 +390,8 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=_measure,
     fit=fitting.step_response,
+    recorded=_found,
+    windows=(REST, ANSWER),
     perturbs_bench=True,
     requires={GYRO_RATE: "the response"},
     can_use={COMMAND: "command in the figure"},

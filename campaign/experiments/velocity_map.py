@@ -13,10 +13,12 @@ from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.friction_map.choice import STAGE
 from campaign.experiments.friction_map.figures import example_figure, fit_figure, map_figure
 from campaign.experiments.friction_map.fits import fit_map
+from campaign.experiments.friction_map.found import stretches_found
 from campaign.experiments.friction_map.pilot import PilotedMapOptions, settled_enough, trials
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.runs import (
     CAN_USE,
+    DIRECTIONS,
     OWN,
     REQUIRED,
     settling_notes,
@@ -94,4 +96,6 @@ EXPERIMENT = Experiment(
     requires=REQUIRED,
     can_use={COMMAND: "command in the figure of one point", **CAN_USE},
     stages=(STAGE,),
+    recorded=stretches_found,
+    windows=tuple(DIRECTIONS),
 )

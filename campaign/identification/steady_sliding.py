@@ -1,7 +1,8 @@
 """Friction torque of steady sliding from one window of a recording.
 
 At constant rate the drive does nothing but overcome friction (Equation 4.1 without acceleration):
-the mean drive torque, less J times the residual acceleration, is one point of a velocity map.
+the mean drive torque, less J times the residual acceleration, is one point of a velocity map. Where
+J is not known, what the residual acceleration takes stays in it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from campaign.estimate import Estimate
 from campaign.identification.intervals import of_series
 from campaign.identification.least_squares import Array
 from campaign.identification.ripple import LEAST_PERIODS, harmonics_of
+
+METHOD = "mean drive torque less J times the residual acceleration, deviation from 10 batches"
+WITHOUT_INERTIA = "mean drive torque with what the residual acceleration takes, from 10 batches"
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ def steady_sliding(
     rate: Array,
     torque: Array,
     angle: Array | None,
-    inertia: float,
+    inertia: float | None,
     periods: float | None = None,
 ) -> SteadySliding:
     """Rate and friction torque of a settled window.
@@ -56,7 +60,7 @@ def steady_sliding(
     Args:
         time, rate, torque: s, rad/s, N m; shape (n,).
         angle: where the load is (rad), shape (n,); None where nobody recorded it.
-        inertia: J (kg m²).
+        inertia: J (kg m²); None where nobody knows it.
         periods: of the ripple per revolution, where known.
 
     Raises ValueError for fewer than 3 samples.
@@ -78,7 +82,7 @@ def steady_sliding(
             noise = torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
     of_rate = of_series("rate", rate, "rad/s")
     of_torque = of_series("friction_torque", noise, "N m")
-    mean = float(torque.mean()) - inertia * slope
+    mean = float(torque.mean()) - (inertia or 0.0) * slope
     spread = float(np.std(torque))
     about = rate - rate.mean() - slope * clock
     of_slope = float(np.sqrt(about @ about / max(len(time) - 2, 1) / (clock @ clock)))
@@ -86,7 +90,7 @@ def steady_sliding(
     if error is None:
         told = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
         return SteadySliding(of_rate, told, spread, slope, 1.0, first, last)
-    both = math.hypot(error, inertia * of_slope)
+    both = math.hypot(error, (inertia or 0.0) * of_slope)
     wide = (of_torque.high or 0.0) - of_torque.value
     half = wide * both / error if error > 0 else 0.0
     told = Estimate(
@@ -96,7 +100,7 @@ def steady_sliding(
         mean - half,
         mean + half,
         of_torque.level,
-        "mean drive torque less J times the residual acceleration, deviation from 10 batches",
+        METHOD if inertia is not None else WITHOUT_INERTIA,
         standard_error=both,
         freedom=of_torque.freedom,
     )

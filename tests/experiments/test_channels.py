@@ -182,11 +182,17 @@ def without_columns(table: Table, names: set[str]) -> Any:
     return plain(replace(table, rows=tuple(rows), columns=tuple(columns)))
 
 
+ONLY_RECORDED = {"motion"}
+"""Nothing executes these; what they do without a channel is tried on recordings of their own."""
+
+
 @pytest.mark.parametrize("kind", experiments())
 def test_every_experiment_declares_channels_of_the_vocabulary(kind: str) -> None:
     experiment = experiments()[kind]
     assert experiment.requires or kind == "move"
     assert {*experiment.requires, *experiment.can_use} <= set(VOCABULARY)
+    if kind in ONLY_RECORDED:
+        return
     assert kind in {case.kind for case in CASES}
     for name in experiment.can_use:
         assert (kind, name) in LOSSES

@@ -68,7 +68,8 @@ def test_every_number_has_an_interval_or_says_why_not(case: Case) -> None:
 
 
 def test_every_kind_is_looked_at() -> None:
-    assert {case.kind for case in CASES} == set(experiments())
+    # Nothing executes a motion: `test_motion` looks at its numbers.
+    assert {case.kind for case in CASES} | {"motion"} == set(experiments())
 
 
 BARE = Finding("gain", 2.0, "dB", {})

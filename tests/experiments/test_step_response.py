@@ -65,7 +65,23 @@ def test_the_command_keeps_to_the_acceleration_limit() -> None:
     assert not margin.broken
 
 
-def test_a_ramp_that_is_no_step_is_refused() -> None:
-    options: dict[str, Any] = {"ramp": "0.5 s"}
-    with pytest.raises(ValueError, match="shorten ramp"):
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"ramp": "0.5 s"}, "shorten ramp"),
+        ({"ramp": "0 s"}, "jump"),
+        ({"step": "0 deg/s"}, "step of zero"),
+    ],
+)
+def test_a_ramp_that_is_no_step_is_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
         trials(KIND, bench(), options)
+
+
+def test_a_planned_step_downwards_is_the_mirror_image() -> None:
+    up, down = (
+        analyse(KIND, execute(trials(KIND, bench(), {"step": step})))
+        for step in ("1 deg/s", "-1 deg/s")
+    )
+    for name in ("rise_time", "settling_time", "overshoot"):
+        assert finding(down, name).value == pytest.approx(finding(up, name).value, rel=1e-3)

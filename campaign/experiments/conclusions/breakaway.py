@@ -29,7 +29,11 @@ OF_RAMP = ("direction", "statistic", "position", "measurement")
 
 
 def breakaway_conclusions(
-    findings: Sequence[Finding], rates: Sequence[float], settings: Settings
+    findings: Sequence[Finding],
+    rates: Sequence[float],
+    settings: Settings,
+    *,
+    inertia_known: bool = True,
 ) -> tuple[Conclusion, ...]:
     """Of the means over positions, and of the range of positions.
 
@@ -38,6 +42,8 @@ def breakaway_conclusions(
     findings = [_marked(each, findings) for each in findings]
     means = _top([each for each in findings if each.conditions.get("statistic") == "mean"])
     torques = of(means, TORQUE)
+    if not torques and not inertia_known:
+        return (conclusion("No breakaway torque can be told, for the inertia is not known"),)
     if not torques:
         return (conclusion("No ramp came to a breakaway torque"),)
     ramp = _ramps(rates)

@@ -106,7 +106,7 @@ class Settings:
     @classmethod
     def of(cls, data: TestData, options: type[Options]) -> Settings:
         """Of an experiment's options, and of what the test sweeps of the bench."""
-        known = {info.name: info.quantity for info in describe(options) if info.quantity}
+        known = {info.name: info.quantity.here for info in describe(options) if info.quantity}
         for item in data.trials[:1]:
             for path in item.trial.point:
                 quantity = _of_bench(bench_of(item.trial), path)
@@ -150,7 +150,9 @@ def _of_bench(bench: Options, path: str) -> Quantity | None:
         table = table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
     if not isinstance(table, Options):
         return None
-    return next((info.quantity for info in describe(type(table)) if info.name == keys[-1]), None)
+    found = (info.quantity for info in describe(type(table)) if info.name == keys[-1])
+    quantity = next(found, None)
+    return quantity and quantity.here
 
 
 def name_of(path: str) -> str:

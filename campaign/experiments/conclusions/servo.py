@@ -165,7 +165,7 @@ def step_conclusions(
         (words, Amount(each.known, display))
         for name, (words, display) in STEP.items()
         for each in of(findings, name)
-        if name != "steady_state_error" or not abs(each.value) < NEGLIGIBLE * step
+        if name != "steady_state_error" or not abs(each.value) < NEGLIGIBLE * abs(step)
     ]
     share = setting(band, "", "percent")
     notes = (" (rise from 10 to 90 %, settling to ", share, " of the step)")

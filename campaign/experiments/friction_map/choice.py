@@ -38,6 +38,7 @@ from campaign.identification.map_design import curves_around, telling_speeds
 from campaign.identification.stribeck import PARAMETERS
 from campaign.physics.bench import Bench
 from campaign.trial import TrialRequest
+from campaign.units import angle_here, in_words
 
 FINER = 3
 """speeds to choose among for each of `points`."""
@@ -168,8 +169,8 @@ def _speeds(
     offered = offered[apart > ROUNDING]  # a repeat would be averaged with what it repeats
     candidates = np.array([speed for speed in offered if _fits(float(speed), options, longer)])
     if not len(candidates) or not len(measured):
-        angle = np.rad2deg(longer.settle_angle)
-        raise ValueError(f"friction asks to settle for {angle:.3g} deg, and no run has room for it")
+        angle = angle_here(longer.settle_angle)
+        raise ValueError(f"friction asks to settle for {angle}, and no run has room for it")
     chosen = telling_speeds(curves, measured, candidates, options.points - SPEEDS)
     return tuple(chosen.tolist())
 
@@ -192,14 +193,14 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: MapFit
     told = (
         f"where it tells most after a pilot: Ts {found['static_torque']:.3g} N·m, "
         f"Tc {found['coulomb_torque']:.3g} N·m, "
-        f"vs {np.rad2deg(found['stribeck_velocity']):.3g} deg/s, "
+        f"vs {in_words(found['stribeck_velocity'], 'rad/s', 'deg/s')}, "
         f"δ {found['stribeck_exponent']:.2g}"
     )
-    settle, window = (np.rad2deg(angle) for angle in (longer.settle_angle, longer.window_angle))
+    settle, window = (angle_here(angle) for angle in (longer.settle_angle, longer.window_angle))
     if longer.settle_angle > options.settle_angle:
-        told += f"; settled for {settle:.3g} deg, as its reversals ask for"
+        told += f"; settled for {settle}, as its reversals ask for"
     if longer.window_angle > options.window_angle:
-        told += f"; averaged over {window:.3g} deg, for the ripple's period"
+        told += f"; averaged over {window}, for the ripple's period"
     return told
 
 

@@ -211,7 +211,10 @@ def _misfit(fits: Mapping[str, DirectionFit]) -> str:
 
 def example_figure(data: TestData) -> tuple[Figure, ...]:
     """The time history of one point: the middle one of the first map."""
-    measured = list(data.completed())
+    # A stretch that was found in a recording has one direction, and no start of its own.
+    measured = [
+        item for item in data.completed() if windows_of(item.trial).keys() >= DIRECTIONS.keys()
+    ]
     if not measured:
         return ()
     item = measured[len(measured) // 2]

@@ -108,7 +108,8 @@ def fit_map(points: Iterable[MapPoint], bench: Bench) -> MapFits:
         )
         by_speed = {p.speed: p for p in averaged}
         moved = [sign * by_speed[speed].acceleration for speed in sorted(by_speed, key=abs)]
-        shift[name] = bench.axis.inertia * np.array(moved)
+        # Without an inertia the part is unknown, whatever stands here: `with_systematic`.
+        shift[name] = (bench.axis.inertia or 0.0) * np.array(moved)
     return MapFits(tuple(sorted(kept, key=lambda p: p.speed)), ripples, fits, shift, bench)
 
 

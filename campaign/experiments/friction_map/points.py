@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.axis_kind import unit_here
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
@@ -22,6 +23,7 @@ from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.physics.bench import Bench
 from campaign.result import Array
 from campaign.trial import Recording
+from campaign.units import shown_here
 
 UNSTEADY = 0.25
 """Share of its mean by which the rate of a window may change, or be uncertain."""
@@ -47,6 +49,8 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
     bench, windows, recording = bench_of(data.trial), windows_of(data.trial), data.recording()
     found: list[Estimate] = []
     for name in DIRECTIONS:
+        if name not in windows:  # a stretch that was found, of one direction
+            continue
         own = windows[name]
         whole = windows.get(WHOLE.format(name), own)
         ripple = _ripple(_Samples.of(recording, whole), bench)
@@ -83,11 +87,14 @@ class _Samples:
 
 
 def _ripple(cut: _Samples, bench: Bench) -> Harmonic | None:
-    """The ripple that the run shows, at the period that the bench tells or else at its own."""
-    if len(cut.time) < 3 or cut.angle is None:
+    """The ripple that the run shows, at the period that the bench tells or else at its own.
+
+    None where the inertia is not known: friction's ripple and what it makes of the rate are one.
+    """
+    inertia = bench.axis.inertia
+    if len(cut.time) < 3 or cut.angle is None or inertia is None:
         return None
     angle, rate, torque = cut.angle, cut.rate, cut.torque
-    inertia = bench.axis.inertia
     periods = told_periods(bench) or dominant_periods(angle, rate, torque, inertia)
     if periods is None or periods * abs(float(np.mean(rate))) > 2.0 * np.pi * FASTEST:
         return None
@@ -171,13 +178,24 @@ def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint]
     kept = [point for point in points if point.is_steady]
     left = [replace(p, rule=f"{p.rule}; not steady") for p in points if not p.is_steady]
     if left:
-        speeds = ", ".join(f"{np.rad2deg(point.speed):.3g}" for point in left)
+        speeds = ", ".join(f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in left)
         notes.append(
             f"{len(left)} of {len(points)} points are left out of the fit, for the load did not "
-            f"slide steadily in their windows ({speeds} deg/s): raise settle_angle, max_time or "
-            "the integral gain of the rate loop, or begin at a higher speed."
+            f"slide steadily in their windows ({speeds} {unit_here('deg/s')}): raise settle_angle, "
+            "max_time or the integral gain of the rate loop, or begin at a higher speed."
         )
     return kept, left
+
+
+def _unknown_inertia(points: Sequence[MapPoint], bench: Bench) -> Iterator[str]:
+    """What a map leaves in its torques, and does not find, where the bench states no inertia."""
+    if bench.axis.inertia is None and points:
+        most = float(np.rad2deg(max(abs(point.acceleration) for point in points)))
+        yield (
+            f"The bench '{bench.name}' does not say axis.inertia: the torque that accelerates the "
+            f"load, by up to {most:.2g} deg/s² in these windows, is not taken out of friction, and "
+            "no ripple over position is looked for."
+        )
 
 
 def points_of(items: Iterable[TrialData], bench: Bench, notes: list[str]) -> list[MapPoint]:
@@ -188,6 +206,7 @@ def points_of(items: Iterable[TrialData], bench: Bench, notes: list[str]) -> lis
             found += map_points(item, bench)
         except ValueError as error:
             notes.append(f"{item.trial.label} has no points: {error}.")
+    notes += _unknown_inertia(found, bench)
     return found
 
 
@@ -198,9 +217,12 @@ def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
     windows = windows_of(data.trial)
     speed = speed_of(data.trial)
     for name, sign in DIRECTIONS.items():
+        if name not in windows:
+            continue
         torque, acceleration = found[f"friction_torque_{name}"], found[f"acceleration_{name}"].value
         torque = with_systematic(torque, bench, TORQUE_CONSTANT, torque.value)
-        torque = with_systematic(torque, bench, INERTIA, bench.axis.inertia * acceleration)
+        # Of an inertia that nobody knows this is a part of unknown size.
+        torque = with_systematic(torque, bench, INERTIA, (bench.axis.inertia or 0.0) * acceleration)
         ripple = None
         if f"ripple_periods_{name}" in found:
             words = ("periods", "cosine", "sine", "error", "centre", "travel")

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Window
 from campaign.experiments.interface import bench_of, validated
@@ -21,7 +22,15 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.signals import Polyline
 from campaign.trial import Role, Task, Trial, TrialRequest, canonical_json
-from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
+from campaign.units import (
+    Angle,
+    AngularAcceleration,
+    AngularRate,
+    Frequency,
+    Time,
+    angle_here,
+    rate_here,
+)
 
 SMALLEST_WINDOW = 10
 """samples: fewer say nothing about a mean and a slope."""
@@ -86,11 +95,12 @@ def map_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
         if min(options.speeds) <= 0:
             raise ValueError("speeds are positive; each is run in both directions")
         return options.speeds
-    # In round numbers of degrees, as they are written: the last bits are those of a list.
-    low, high = (round(float(np.rad2deg(v)), 12) for v in (options.slowest, options.fastest))
+    # In round numbers, as they are written: the last bits are those of a list.
+    unit = 1e-3 if is_linear() else float(np.deg2rad(1.0))
+    low, high = (round(v / unit, 12) for v in (options.slowest, options.fastest))
     if high < low:
         raise ValueError("fastest must not be below slowest")
-    return tuple(float(v) for v in np.deg2rad(np.geomspace(low, high, options.points)))
+    return tuple(float(v) for v in np.geomspace(low, high, options.points) * unit)
 
 
 @dataclass(frozen=True)
@@ -169,6 +179,8 @@ def windows_of(trial: Trial) -> dict[str, Window]:
 
 def rule_of(trial: Trial) -> str:
     """What set the length of the trial's window, in words."""
+    if trial.task.mode == "recorded":
+        return "found in the recording"
     run, own = _replanned(trial), windows_of(trial)["positive"]
     # Runs of a pilot, and those that follow it, have other windows than the options tell.
     return run.rule if math.isclose(own.stop - own.start, run.window) else "the pilot"
@@ -198,9 +210,9 @@ def settling_advice(rig: Rig, settled: float) -> str:
     needed = MEMORIES * memory + turned
     if settled >= needed * (1.0 - ROUNDING):
         return ""
-    wanted, known, lag = (np.rad2deg(angle) for angle in (needed, memory, turned))
-    integral = f", and the loop's integral turns round in {lag:.2g} deg" if turned else ""
-    return f"settle for {wanted:.2g} deg or more: Ts/sigma0 is {known:.3g} deg{integral}"
+    wanted, lag = (angle_here(angle, ".2g") for angle in (needed, turned))
+    integral = f", and the loop's integral turns round in {lag}" if turned else ""
+    return f"settle for {wanted} or more: Ts/sigma0 is {angle_here(memory)}{integral}"
 
 
 def plan_run(speed: float, options: VelocityMapOptions) -> Run:
@@ -213,7 +225,7 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     room = cruise - settle
     if room <= 0:
         raise ValueError(
-            f"at {np.rad2deg(speed):.4g} deg/s the run lasts {max(cruise, 0):.3g} s at constant "
+            f"at {rate_here(speed, '.4g')} the run lasts {max(cruise, 0):.3g} s at constant "
             f"speed but takes {settle:.3g} s to settle; raise max_travel, max_time or "
             "acceleration, or drop that speed"
         )
@@ -232,12 +244,15 @@ def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
     told: dict[str, list[float]] = {}
     rigs: dict[str, Rig] = {}
     for trial in trials:
+        if trial.task.mode == "recorded":  # nobody here decided how long it settled
+            continue
         key = canonical_json(trial.bench)
         rig = rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
         if advice := settling_advice(rig, settled_angle(trial)):
-            told.setdefault(advice, []).append(float(np.rad2deg(speed_of(trial))))
+            told.setdefault(advice, []).append(speed_of(trial))
     for advice, speeds in told.items():
-        yield f"At {min(speeds):.3g} to {max(speeds):.3g} deg/s: {advice}."
+        low, high = rate_here(min(speeds)), rate_here(max(speeds))
+        yield f"At {low.split()[0]} to {high}: {advice}."
 
 
 def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
@@ -252,11 +267,11 @@ def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[Tr
     """A trial of the run for each angle to start from. ValueError for too few samples."""
     if run.window * options.sample_rate < SMALLEST_WINDOW:
         raise ValueError(
-            f"at {np.rad2deg(run.speed):.4g} deg/s the window of {run.window:.3g} s holds fewer "
+            f"at {rate_here(run.speed, '.4g')} the window of {run.window:.3g} s holds fewer "
             f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
         )
     (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
-    told = f"window {run.window:.3g} s, {np.rad2deg(run.window * run.speed):.3g} deg: {run.rule}"
+    told = f"window {run.window:.3g} s, {angle_here(run.window * run.speed)}: {run.rule}"
     advice = settling_advice(rig, run.speed * run.settle)
     many = bool(options.start_angles)
     for start_angle in _starts(options):

@@ -17,6 +17,7 @@ from campaign.identification.sampled import where_it_scatters
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.identification.velocity_map import MODELS, DirectionFit, Model, correlation, doubts
 from campaign.result import Cell, Column, Finding, Table, Value
+from campaign.units import angle_here
 
 FITTED: tuple[Model, ...] = ("free", "2")
 """Models whose parameters are findings."""
@@ -201,10 +202,10 @@ def _ripple(fits: MapFits, direction: str) -> str:
             f"{100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} runs, was taken "
             f"out of all points; {short} windows are shorter than its period"
         )
-    least = np.rad2deg(min(abs(point.speed) * point.window for point in points))
+    least = angle_here(min(abs(point.speed) * point.window for point in points), ".2g")
     return (
         "no ripple over position was found in runs long enough to show one; if friction has one, "
-        f"windows that are shorter than its period (the shortest is {least:.2g} deg) see it at "
+        f"windows that are shorter than its period (the shortest is {least}) see it at "
         "one place: start_angles averages it"
     )
 

@@ -5,7 +5,6 @@ Only of what the bench describes: where friction is not described nothing is war
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 from campaign.experiments.friction_map.runs import (
@@ -21,6 +20,7 @@ from campaign.identification.ripple import FASTEST, LEAST_PERIODS
 from campaign.identification.stribeck import PARAMETERS
 from campaign.physics.bench import Bench
 from campaign.physics.true_values import stribeck_parameters
+from campaign.units import angle_here, rate_here
 
 LEAST_RUNS = 2
 """that have to show a ripple whose period is known, for it to be taken out of all points."""
@@ -55,8 +55,8 @@ def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
     if velocity > 0 and below < FEWEST_BELOW:
         yield (
             f"{below} of {len(runs)} speeds are below the Stribeck velocity of "
-            f"{_degrees(velocity)} deg/s: static_torque is extrapolated; run {FEWEST_BELOW} or "
-            f"more below it, from {_degrees(0.1 * velocity)} deg/s on"
+            f"{rate_here(velocity)}: static_torque is extrapolated; run {FEWEST_BELOW} or "
+            f"more below it, from {rate_here(0.1 * velocity)} on"
         )
 
 
@@ -66,7 +66,7 @@ def _none_far_above(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
     far = FAR * max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
     if far > 0 and not any(run.speed > far for run in runs):
         yield (
-            f"no speed is above {FAR:g} times the Stribeck velocity, {_degrees(far)} deg/s: "
+            f"no speed is above {FAR:g} times the Stribeck velocity, {rate_here(far)}: "
             "coulomb_torque is extrapolated; run one or more above that"
         )
 
@@ -93,24 +93,20 @@ def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> I
     showing = [run for run in slow if run.settled * run.speed >= LEAST_PERIODS * period]
     if not short or len(showing) >= LEAST_RUNS:
         return
-    told = f"a period of friction's ripple, {_degrees(period)} deg"
+    told = f"a period of friction's ripple, {angle_here(period)}"
     if options.max_travel < period:
         yield (
-            f"max_travel of {_degrees(options.max_travel)} deg is shorter than {told}: every run "
+            f"max_travel of {angle_here(options.max_travel)} is shorter than {told}: every run "
             "sees it at one place; raise it, or write two start_angles half a period apart"
         )
         return
     yield (
         f"at {_range(short)} windows are shorter than {told}, and it cannot be taken out: of the "
-        f"runs below {_degrees(FASTEST * period)} deg/s {len(showing)} span one, and {LEAST_RUNS} "
+        f"runs below {rate_here(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
         "have to; raise max_travel or max_time, or write two start_angles half a period apart"
     )
 
 
 def _range(speeds: Sequence[float]) -> str:
-    low, high = _degrees(min(speeds)), _degrees(max(speeds))
-    return f"{low} deg/s" if low == high else f"{low} to {high} deg/s"
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.3g}"
+    low, high = rate_here(min(speeds)), rate_here(max(speeds))
+    return high if low == high else f"{low.split()[0]} to {high}"

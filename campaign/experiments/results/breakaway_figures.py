@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaign.axis_kind import is_linear
 from campaign.estimate import Estimate
 from campaign.experiments.results.breakaway_means import Ramps
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
@@ -229,10 +230,14 @@ def _positions(ramps: Ramps) -> Axis:
     step = -(-len(angles) // NAMED)
     # At most every other angle has its name: two panels share the width.
     step = max(step, 2) if len(angles) > NAMED // 2 else step
-    names = tuple(
-        (angle, f"{np.rad2deg(angle):.4g}°".replace("-", "−")) for angle in angles[::step]
-    )
+    names = tuple((angle, _place(angle)) for angle in angles[::step])
     return Axis("Position", "rad", "rad", places=(*names, (_behind(angles), "mean")))
+
+
+def _place(position: float) -> str:
+    if is_linear():
+        return setting(position, "rad", "deg")
+    return f"{np.rad2deg(position):.4g}°".replace("-", "−")
 
 
 def _mean(ramps: Ramps, means: Mapping[str, Estimate], quantity: str) -> Iterator[Curve]:

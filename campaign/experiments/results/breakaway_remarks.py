@@ -9,6 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.experiments.results.breakaway_means import MEASURED, Ramps
+from campaign.units import angle_here, rate_here
 
 FEW_COUNTS = 10.0
 """of the encoder in presliding: an angle of fewer shows no curve."""
@@ -37,8 +38,9 @@ def remarks(ramps: Ramps) -> Iterator[str]:
 
 def _inertia(ramps: Ramps) -> Iterator[str]:
     found = [abs(each.value) for each in ramps.values("peak_acceleration")]
-    if found:
-        size = 0.01 * float(np.mean(found)) * bench_of(ramps.trials[0].trial).axis.inertia
+    inertia = bench_of(ramps.trials[0].trial).axis.inertia
+    if found and inertia is not None:
+        size = 0.01 * float(np.mean(found)) * inertia
         yield f"An inertia that is 1 % off moves the breakaway torque by {size:.2g} N·m."
 
 
@@ -50,7 +52,7 @@ def _encoder(ramps: Ramps) -> Iterator[str]:
     yield (
         f"Presliding spans {float(np.median(spans)) / count:.2g} counts of the encoder: σ0 rests "
         "on the gyro alone. An angle sensor that is to show presliding needs counts of "
-        f"{np.rad2deg(float(np.median(spans)) / FEW_COUNTS):.2g} deg or finer."
+        f"{angle_here(float(np.median(spans)) / FEW_COUNTS, '.2g')} or finer."
     )
 
 
@@ -94,7 +96,7 @@ def _unfinished(ramps: Ramps) -> Iterator[str]:
         rate = float(str(ramps.trials[0].trial.options["sliding_rate"]))
         yield (
             "Friction was still rising when ramps ended: their breakaway torque is a bound. Choose "
-            f"a sliding_rate of {np.rad2deg(4.0 * rate):.2g} deg/s or more."
+            f"a sliding_rate of {rate_here(4.0 * rate, '.2g')} or more."
         )
 
 

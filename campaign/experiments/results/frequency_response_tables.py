@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.experiments.interface import TrialData
 from campaign.identification.elastic_mode import elastic_mode
 from campaign.identification.frequency_response import Response
 from campaign.identification.servo import Crossing, ServoCharacteristics, change
 from campaign.result import Cell, Column, Finding, Table, Value
+from campaign.signals import Sine
+from campaign.units import rate_here
 
 
 @dataclass(frozen=True)
@@ -222,6 +225,7 @@ def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
         found, highest = sweep.found, sweep.response.frequency[-1]
         if found is None:
             continue
+        yield from _slow_note(sweep)
         gain = found.crossing(found.gain_margin)
         width = found.bandwidth
         if width.kind == "number" and math.isnan(width.value):
@@ -244,6 +248,32 @@ def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
                 "interval is the hull of several fits; a sweep that reaches the crossing tells "
                 "it to a tenth of a decibel."
             )
+
+
+def _slow_note(sweep: Sweep) -> Iterator[str]:
+    """Where a loop does not follow its slowest command: its unit or a sign may be wrong."""
+    response = sweep.response
+    lowest, level = float(response.frequency[0]), float(response.level[0])
+    phase, unsure = float(response.phase[0]), float(response.relative_error[0])
+    gain_off = abs(level) > FOLLOWS + SURELY * 20.0 / math.log(10.0) * unsure
+    turned = abs(phase) > 0.5 * math.pi + SURELY * unsure
+    if not gain_off and not turned:
+        return
+    check = [
+        *(["the units of command and rate"] if gain_off else []),
+        *(["the signs of both"] if turned else []),
+    ]
+    yield (
+        f"With {sweep.label} the response at the lowest frequency, {lowest:.4g} Hz, has "
+        f"{level:.3g} dB and {math.degrees(phase):.3g}°. A loop follows slow commands at about "
+        f"0 dB and 0°: unless the sweep begins above its bandwidth, check {' and '.join(check)}."
+    )
+
+
+FOLLOWS = 20.0 * math.log10(2.0)
+"""dB by which the gain at the lowest frequency may be off before that is worth a word."""
+SURELY = 3.0
+"""standard deviations beyond that."""
 
 
 def quality_note(sweeps: list[Sweep]) -> Iterator[str]:
@@ -294,3 +324,22 @@ def modes(
         "what the fit leaves over.",
     )
     return table, tuple(findings), tuple(notes)
+
+
+def falling_amplitude(group: Sequence[TrialData]) -> Iterator[str]:
+    """A sentence where limits lowered the amplitude of a rate command along the sweep."""
+    sines = [i.trial.task.command for i in group if i.trial.task.mode == "rate"]
+    full = [s for s in sines if isinstance(s, Sine)]
+    if not full:
+        return
+    largest = max(sine.amplitude for sine in full)
+    lowered = [sine for sine in full if sine.amplitude < largest * (1 - 1e-9)]
+    if lowered:
+        first = min(lowered, key=lambda sine: sine.frequency)
+        least = max(lowered, key=lambda sine: sine.frequency)
+        yield (
+            f"The command's amplitude was {rate_here(largest)} below "
+            f"{first.frequency:.4g} Hz; from there on its acceleration was kept, down to "
+            f"{rate_here(least.amplitude)} at {least.frequency:.4g} Hz. Where friction "
+            "matters, other amplitudes give other responses."
+        )

@@ -16,6 +16,7 @@ from campaign.identification.sine_amplitude import amplitude
 from campaign.identification.stabilization_error import over_blocks, over_trials
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete, control_rate
 from campaign.result import Array
 from campaign.signals import Sine
 from campaign.trial import Outcome, Recording
@@ -69,12 +70,13 @@ def own_observer(bench: Bench, name: str) -> tuple[float, float | None]:
     observer = bench.compensation[name]
     if observer.method != "observer":
         raise ValueError(f"'{name}' is no disturbance observer: its method is '{observer.method}'")
-    return theory.corner_frequency(bench, observer.gain, observer.inertia), observer.inertia
+    known = complete(bench, "the theory of an observer")
+    return theory.corner_frequency(known, observer.gain, observer.inertia), observer.inertia
 
 
 def is_noisy(bench: Bench) -> bool:
     """Whether its gyro has noise that a sampled controller sees."""
-    return bench.controller.sample_rate is not None and bench.sensors.gyro.noise > 0
+    return control_rate(bench) is not None and bench.sensors.gyro.noise > 0
 
 
 def _corner(data: TrialData) -> float:
@@ -84,6 +86,10 @@ def _corner(data: TrialData) -> float:
 def _inertia(data: TrialData, bench: Bench) -> float | None:
     """The inertia that the observer assumes (kg m^2)."""
     return own_observer(bench, str(data.trial.options["observer"]))[1]
+
+
+def _bench(data: TrialData) -> CompleteBench:
+    return complete(bench_of(data.trial), "the theory of an observer")
 
 
 def measure(data: TrialData) -> list[Estimate]:
@@ -96,7 +102,7 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
     if measured == "error":
         yield error_of(cut, task)
         if FRICTION_TORQUE in cut.channels:
-            bench = bench_of(data.trial)
+            bench = _bench(data)
             value = predicted_error(cut, bench, _corner(data), _inertia(data, bench))
             yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY)
     elif measured == "noise" and LOAD_RATE in cut.channels:
@@ -114,7 +120,7 @@ def gain_of(corner: float, group: Sequence[TrialData]) -> Gain:
     by_kind: dict[str, list[TrialData]] = {"error": [], "noise": [], "rejection": []}
     for item in completed:
         by_kind[str(item.trial.point["measured"])].append(item)
-    bench = bench_of(group[0].trial)
+    bench = _bench(group[0])
     inertia = _inertia(group[0], bench)
     return Gain(
         corner=corner,
@@ -139,7 +145,7 @@ def _together(group: Sequence[TrialData], name: str) -> Estimate | None:
 
 
 def _rejections(
-    group: Sequence[TrialData], bench: Bench, corner: float, inertia: float | None
+    group: Sequence[TrialData], bench: CompleteBench, corner: float, inertia: float | None
 ) -> Iterator[Rejection]:
     by_frequency: dict[float, list[TrialData]] = {}
     for item in group:
@@ -153,7 +159,7 @@ def _rejections(
 
 
 def predicted_error(
-    recording: Recording, bench: Bench, corner: float, inertia: float | None
+    recording: Recording, bench: CompleteBench, corner: float, inertia: float | None
 ) -> float:
     """Error (rad, 1 sigma) that Eq. 5.4 makes of the friction of a recording of whole cycles.
 

@@ -15,6 +15,7 @@ from campaign.experiments.shared.pointing_error import rate_of
 from campaign.identification.relative_rate import RelativeRate, relative_rate
 from campaign.result import Array, Axis, Curve, Mark, Panel
 from campaign.trial import Recording
+from campaign.units import angle_here, rate_here
 
 TIME = Axis("Time", "s", "s")
 RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
@@ -213,7 +214,7 @@ def _zoom_panel(name: str, shown: Shown, zoom: Zoom) -> Panel:
         marks.append(Mark(label, x=slow.start, until=slow.stop, series=name))
     title = method_label(name)
     if np.isfinite(shown.farthest):
-        title += f": {_degrees(shown.farthest)} deg/s off"
+        title += f": {rate_here(shown.farthest, '.2g')} off"
     return Panel(time, rate, curves, title, marks)
 
 
@@ -231,10 +232,6 @@ def _away_panel(shown: Mapping[str, Shown], zoom: Zoom) -> Iterator[Panel]:
 
 def _time(seconds: float) -> str:
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
-
-
-def _degrees(angle: float) -> str:
-    return f"{np.rad2deg(angle):.2g}"
 
 
 def _filter_words(whole: RelativeRate, shown: Sequence[Shown]) -> Iterator[str]:
@@ -260,7 +257,7 @@ def _how(rate: RelativeRate) -> str:
         return ""
     return (
         f"the slope of a line through {_time(rate.window)} of the encoder's samples, a filter "
-        f"that delays nothing and tells {_degrees(rate.finest)} deg/s apart"
+        f"that delays nothing and tells {rate_here(rate.finest, '.2g')} apart"
     )
 
 
@@ -270,8 +267,8 @@ def _slow_words(shown: Sequence[Shown], zoom: Zoom) -> str:
         return ""
     held = _slow(shown[0].time, shown[0].held, zoom)
     beside = f"; a load held still is for {held.words}" if held else ""
-    limit = _degrees(SLOW * zoom.height)
-    return f"Shaded: while the load is slower than {limit} deg/s relative to the hull{beside}."
+    limit = rate_here(SLOW * zoom.height, ".2g")
+    return f"Shaded: while the load is slower than {limit} relative to the hull{beside}."
 
 
 def _blind_words(first: Recording, shown: Sequence[Shown], zoom: Zoom) -> str:
@@ -288,5 +285,6 @@ def _blind_words(first: Recording, shown: Sequence[Shown], zoom: Zoom) -> str:
     time = (int(np.argmax(after)) + int(np.argmax(before))) / rate_of(first)
     return (
         f"For {_time(time)} around the reversal the hull moves by less than one count of the "
-        f"encoder ({_degrees(count)} deg): whether the load sticks in that time cannot be seen."
+        f"encoder ({angle_here(count, '.2g')}): whether the load sticks in that time cannot be "
+        "seen."
     )

@@ -13,6 +13,7 @@ from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import ends
 from campaign.identification.threshold import Threshold
 from campaign.result import Axis, Curve, Figure, Mark, Panel, Value
+from campaign.units import in_words
 
 
 def thresholds_figure(
@@ -131,4 +132,4 @@ def _marks(one: Judged, limit: Threshold) -> Iterator[Mark]:
 
 
 def _milliradians(angle: float) -> str:
-    return f"{1e3 * angle:.3g} mrad"
+    return in_words(angle, "rad", "mrad")

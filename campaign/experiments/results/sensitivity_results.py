@@ -18,6 +18,7 @@ from campaign.result import (
     Table,
     Value,
 )
+from campaign.units import in_words
 
 SYMBOLS = {
     "bristle_stiffness": "σ0",
@@ -164,7 +165,8 @@ def sensitivity_table(judged: Sequence[Judged], limit: Threshold) -> Table:
     """A row for each parameter, the most important first."""
     return Table(
         key="sensitivity",
-        title=f"Change of each parameter at which the error passes {limit.value * 1e3:.3g} mrad",
+        title=f"Change of each parameter at which the error passes "
+        f"{in_words(limit.value, 'rad', 'mrad')}",
         columns=(
             Column("symbol", "Parameter"),
             Column("parameter", "Name"),

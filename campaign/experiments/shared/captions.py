@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from campaign.axis_kind import unit_here
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import TrialData
 from campaign.text import pretty_unit
@@ -12,9 +13,13 @@ from campaign.units import convert
 
 
 def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
-    """A number that was found, for a caption, `1.50 N·m`, from SI to the unit that is shown."""
+    """A number that was found, for a caption, `1.50 N·m`, from SI to the unit that is shown.
+
+    Units here and below are those of a rotary axis; told is what stands for them (`axis_kind`).
+    """
     if not math.isfinite(value):
         return "an unknown size"
+    unit, display = unit_here(unit), unit_here(display)
     shown = convert(value, unit, display or unit)
     large = abs(float(f"{shown:.{digits}g}")) >= 10.0**digits  # 999.7 is 1000
     text = f"{shown:.0f}" if large else f"{shown:#.{digits}g}".rstrip(".")
@@ -23,6 +28,7 @@ def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
 
 def setting(value: float, unit: str, display: str = "") -> str:
     """A number that was set, for a caption, `1.5 N·m`: no digits that nobody has set."""
+    unit, display = unit_here(unit), unit_here(display)
     return _with_unit(f"{convert(value, unit, display or unit):.4g}", display or unit)
 
 

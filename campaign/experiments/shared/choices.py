@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from campaign.axis_kind import unit_here
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.rig import Rig
 from campaign.units import convert, factor
@@ -52,7 +53,7 @@ def share(limit: str, part: float) -> str:
 
 def nice(value: float, unit: str, digits: int = 2, *, up: bool = False) -> float:
     """SI value with few digits in the unit that people read; towards zero, or away from it."""
-    si = SI.get(unit, unit)
+    si, unit = unit_here(SI.get(unit, unit)), unit_here(unit)
     shown = float(convert(value, si, unit))
     if shown == 0.0 or not math.isfinite(shown):
         return value
@@ -63,4 +64,4 @@ def nice(value: float, unit: str, digits: int = 2, *, up: bool = False) -> float
 
 
 SI = {"deg": "rad", "deg/s": "rad/s", "deg/s^2": "rad/s^2"}
-"""Display units used here and what they are inside; the others are SI."""
+"""Display units used here, of a rotary axis, and what they are inside; the others are SI."""

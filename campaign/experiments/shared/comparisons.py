@@ -11,8 +11,10 @@ from campaign.result import Finding, Value
 
 def preload_of(data: TrialData) -> dict[str, Value]:
     """The condition `average_friction` (N m), where the bench has an adjustable preload."""
-    preload = bench_of(data.trial).gear.preload
-    return {} if preload is None else {"average_friction": preload.torque}
+    gear = bench_of(data.trial).gear
+    if gear is None or gear.preload is None:
+        return {}
+    return {"average_friction": gear.preload.torque}
 
 
 def compared(errors: Sequence[Finding]) -> Iterator[Finding]:

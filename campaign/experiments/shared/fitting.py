@@ -12,12 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from campaign.axis_kind import is_linear
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.choices import Choices, Reasons, nice, share
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate, inertia_of, limits_of, require
+from campaign.units import angle_here, rate_here
 
 DEG = math.pi / 180.0
+MILLIMETRE = 1e-3
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
@@ -39,21 +43,27 @@ PEAK = 1.8
 """times the static torque: where a ramp or a torque sine ends."""
 
 
+def usual(degrees: float) -> float:
+    """A usual size (SI): what is a degree where axes turn is a millimetre where they travel."""
+    return degrees * (MILLIMETRE if is_linear() else DEG)
+
+
 def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Travel, ramps, settling, windows, speeds and times of a friction-velocity map."""
-    rig, limits, choices = Rig(bench), bench.limits, Choices(options)
+    require(bench, ("limits", "controller.rate"), "a plan of runs at constant speed")
+    rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
     allowed = _longest_run(limits.duration, options.rest)
     longest = min(MINUTE, allowed)
     own = options.speeds
     travel = choices.least(
-        "max_travel", "deg", {"a usual size": 60 * DEG, share("angle", 0.8): 1.6 * limits.angle}
+        "max_travel", "deg", {"a usual size": usual(60), share("angle", 0.8): 1.6 * limits.angle}
     )
     acceleration = choices.least(
         "acceleration",
         "deg/s^2",
         {
-            "a usual size": 300 * DEG,
+            "a usual size": usual(300),
             "half of what torque and friction leave": 0.5 * rig.acceleration(0.7 * limits.rate),
         },
     )
@@ -83,20 +93,20 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         },
     )
     memory = rig.presliding
-    usual = {"a usual size; friction is not described": 0.75 * DEG}
+    undescribed = {"a usual size; friction is not described": usual(0.75)}
     turned = rig.unwinding
     known = memory and {
-        f"{SETTLED:.0f} times Ts/σ0 of {memory / DEG:.2g} deg, once the loop's integral has turned "
-        f"round in {turned / DEG:.2g} deg": SETTLED * memory + turned
+        f"{SETTLED:.0f} times Ts/σ0 of {angle_here(memory, '.2g')}, once the loop's "
+        f"integral has turned round in {angle_here(turned, '.2g')}": SETTLED * memory + turned
     }
     slow = {} if own else {"half of what slow speeds turn": 0.5 * longest * SLOWEST * fastest}
     settle = choices.least(
         "settle_angle",
         "deg",
-        {"a quarter of the travel": 0.25 * travel, **slow, **(known or usual)},
+        {"a quarter of the travel": 0.25 * travel, **slow, **(known or undescribed)},
     )
     period = rig.ripple_period
-    wide = {"a period of the ripple": 1.05 * period} if period else {"a usual size": 5 * DEG}
+    wide = {"a period of the ripple": 1.05 * period} if period else {"a usual size": usual(5)}
     window = choices.least("window_angle", "deg", {"half of the travel": 0.5 * travel, **wide})
     choices.sample_rate(rig)
     if own:
@@ -116,7 +126,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     warm = choices.least(
         "warm_up_speed",
         "deg/s",
-        {"a usual size": 20 * DEG, "half of the fastest speed": 0.5 * fastest},
+        {"a usual size": usual(20), "half of the fastest speed": 0.5 * fastest},
     )
     run = min(max_time, travel / warm + warm / acceleration)
     _warm_up_cycles(choices, run, limits.duration)
@@ -166,7 +176,9 @@ def _slowest(
 ) -> float:
     """Lowest rate (rad/s): where the curve bends, above the gyro's noise, in the time there is."""
     vs = rig.stribeck_velocity
-    bend = {"a thirtieth of the Stribeck velocity": vs / 30} if vs else {"a usual size": 0.05 * DEG}
+    bend = (
+        {"a thirtieth of the Stribeck velocity": vs / 30} if vs else {"a usual size": usual(0.05)}
+    )
     reasons = {
         **bend,
         "fifty times the gyro's noise in a second": 50
@@ -180,7 +192,7 @@ def _slowest(
 
 def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Positions, height and slope of torque ramps, and what counts as sliding."""
-    rig, limits, choices = Rig(bench), bench.limits, Choices(options)
+    rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
     sliding = _sliding(rig, options)
     reach = _reach(rig, options, max(sliding.values()))
@@ -215,10 +227,11 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     """
     if "sliding_rate" in options.model_fields_set:
         return {"as written": options.sliding_rate}
-    vs, limits, noise = rig.stribeck_velocity, rig.bench.limits, 6.0 * rig.rate_noise
+    vs, limits, noise = rig.stribeck_velocity, rig.limits, 6.0 * rig.rate_noise
+    usual_rate = 0.3 * MILLIMETRE if is_linear() else 0.005
     wanted = {
         "six deviations of the gyro's noise": noise,
-        **({"a fifth of the Stribeck velocity": 0.2 * vs} if vs else {"a usual size": 0.005}),
+        **({"a fifth of the Stribeck velocity": 0.2 * vs} if vs else {"a usual size": usual_rate}),
     }
     allowed = {
         share("rate", SLIDING): SLIDING * limits.rate,
@@ -229,8 +242,8 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
         return wanted
     if allowed[why] < noise:
         raise ValueError(
-            f"within its limits a load slides at {allowed[why] / DEG:.2g} deg/s at most, and six "
-            f"deviations of the gyro's noise are {noise / DEG:.2g} deg/s: raise the limits of "
+            f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and six "
+            f"deviations of the gyro's noise are {rate_here(noise, '.2g')}: raise the limits of "
             "angle or rate, or write sliding_rate"
         )
     return {why: allowed[why]}
@@ -238,18 +251,18 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
 
 def _reach(rig: Rig, options: Any, sliding: float) -> float:
     """How far from zero (rad) a ramp may begin: it creeps, gives way, and has to be stopped."""
-    limit, creep = rig.bench.limits.angle, 2.0 * (rig.presliding or 0.0)
+    limit, creep = rig.limits.angle, 2.0 * (rig.presliding or 0.0)
     if creep > 0.5 * limit and "positions" not in options.model_fields_set:
         raise ValueError(
-            f"a load creeps {creep / DEG:.2g} deg before friction gives way, more than half of the "
-            f"angle limit of {limit / DEG:.2g} deg: raise it, or write positions"
+            f"a load creeps {angle_here(creep, '.2g')} before friction gives way, more than half "
+            f"of the angle limit of {angle_here(limit, '.2g')}: raise it, or write positions"
         )
-    return max(min(45 * DEG, 0.75 * limit, limit - RUN_OUT * sliding - creep), 0.0)
+    return max(min(usual(45), 0.75 * limit, limit - RUN_OUT * sliding - creep), 0.0)
 
 
 def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Amplitudes within the limits, and frequencies from where they fit to where the loop ends."""
-    rig, limits, choices = Rig(bench), bench.limits, Choices(options)
+    rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     amplitude, torque = options.amplitude, options.torque
     if options.loop == "closed":
         vs = rig.stribeck_velocity or 0.0
@@ -257,7 +270,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "amplitude",
             "deg/s",
             {
-                "a usual size, ten Stribeck velocities at least": max(30 * DEG, 10 * vs),
+                "a usual size, ten Stribeck velocities at least": max(usual(30), 10 * vs),
                 share("rate", 0.5): 0.5 * limits.rate,
             },
         )
@@ -268,7 +281,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         torque = choices.least("torque", "N m", {**friction, **drive})
     if {"lowest", "highest", "step", "frequencies"} & options.model_fields_set:
         return choices.told
-    control = bench.controller.sample_rate
+    control = control_rate(bench)
     highest = 100.0 if control is None else 0.35 * control
     swing = 0.7 * (limits.angle - abs(options.position))
     if swing <= 0:
@@ -284,7 +297,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     if options.loop == "closed":
         lowest[f"its swing is {share('angle', 0.7)}"] = amplitude / (2 * math.pi * swing)
     else:
-        free = torque / bench.axis.inertia
+        free = torque / inertia_of(bench, "the swing of a free load")
         lowest[f"its swing is {share('angle', 0.7)}"] = math.sqrt(free / swing) / (2 * math.pi)
         lowest[f"its rate is {share('rate', 0.7)}"] = free / (0.7 * limits.rate * 2 * math.pi)
     why = max(lowest, key=lambda reason: lowest[reason])
@@ -305,13 +318,13 @@ def base_motion(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Acceleration of a sinusoidal base motion whose swing and rate the bench can follow."""
     if getattr(getattr(options, "motion", None), "kind", "sine") != "sine":
         return {}
-    rig, limits, choices = Rig(bench), bench.limits, Choices(options)
+    rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     omega = 2 * math.pi * _periods_in_time(choices, MOST * limits.duration)
     choices.least(
         "acceleration",
         "deg/s^2",
         {
-            "a usual size": 18 * DEG,
+            "a usual size": usual(18),
             f"its swing is {share('angle', 0.6)}": 0.6 * limits.angle * omega**2,
             f"its rate is {share('rate', 0.6)}": 0.6 * limits.rate * omega,
             share("acceleration", 0.6): 0.6 * limits.acceleration,
@@ -342,8 +355,8 @@ def _periods_in_time(choices: Choices, longest: float) -> float:
 
 def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Height and ramp of a step of the rate command, above the gyro's noise."""
-    rig, limits, choices = Rig(bench), bench.limits, Choices(options)
-    drive = 0.5 * min(limits.acceleration, rig.torque / bench.axis.inertia)
+    rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
+    drive = 0.5 * min(limits.acceleration, rig.accelerated_by(rig.torque))
     room = limits.angle - abs(options.position)
     if room <= 0:
         raise ValueError(NO_ROOM)
@@ -352,7 +365,7 @@ def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         "deg/s",
         {
             "a usual size, fifty deviations of the gyro's noise at least": max(
-                1 * DEG, 50 * rig.rate_noise
+                usual(1), 50 * rig.rate_noise
             ),
             share("rate", 0.3): 0.3 * limits.rate,
             f"its way is {share('angle', 0.6)}": 0.6 * room / options.duration,
@@ -377,5 +390,5 @@ def presliding(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         return {}
     choices = Choices(options)
     sizes = tuple(nice(part * memory, "rad") for part in (0.125, 0.25, 0.5, 1.0, 2.0))
-    choices.take("amplitudes", sizes, f"an eighth to twice Ts/σ0 of {memory / DEG:.2g} deg")
+    choices.take("amplitudes", sizes, f"an eighth to twice Ts/σ0 of {angle_here(memory, '.2g')}")
     return choices.told

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
+from campaign.axis_kind import is_linear
 from campaign.experiments.shared.motion_series import kind_of, motion_signal, read_series
 from campaign.options import Options, TextFile
 from campaign.physics.ship_motion import ShipRoll, roll_acceleration
@@ -41,7 +43,9 @@ class SeriesMotion(Options):
     """Beginning of the series that is not measured, for the transient to pass."""
 
     @model_validator(mode="after")
-    def _readable(self) -> SeriesMotion:
+    def _readable(self, info: ValidationInfo) -> SeriesMotion:
+        if isinstance(info.context, Mapping) and info.context.get("si"):
+            return self  # it was read once, and here nobody need know of which axis
         TIME.parse(f"1 {self.time}")
         kind_of(self.value)
         if self.file.text is not None:
@@ -94,6 +98,12 @@ class ShipMotion(Options):
     """Beginning that is not measured."""
     duration: Time = Field(default=300.0, gt=0)
     """What is measured."""
+
+    @model_validator(mode="after")
+    def _of_an_axis_that_turns(self) -> ShipMotion:
+        if is_linear():
+            raise ValueError("a ship rolls about an axis, and the axis of this bench is linear")
+        return self
 
     def signal(self) -> tuple[MultiSine, float, float]:
         """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.axis_kind import words_here
 from campaign.signals import Array, Polyline
 from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME
 
@@ -25,14 +26,19 @@ Kind = Literal["angle", "rate", "acceleration"]
 
 
 def kind_of(unit: str) -> Kind:
-    """What a column in `unit` measures. Raises ValueError naming the units there are."""
+    """What a column in `unit` measures, on the axis that is meant; an angle may be a position.
+
+    Raises ValueError naming the units there are.
+    """
     for kind, quantity in KINDS.items():
         try:
             quantity.parse(f"1 {unit}")
         except ValueError:
             continue
         return kind  # type: ignore[return-value]
-    known = "; ".join(f"{kind}: {', '.join(q.accepts)}" for kind, q in KINDS.items())
+    known = "; ".join(
+        f"{words_here(kind)}: {', '.join(q.here.accepts)}" for kind, q in KINDS.items()
+    )
     raise ValueError(f"{unit!r} is no unit of a motion; allowed are {known}")
 
 

@@ -9,7 +9,14 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from campaign.physics.bench import Bench
+from campaign.physics.bench import Bench, LimitsOptions
+from campaign.physics.complete import (
+    IncompleteBenchError,
+    control_rate,
+    lacking,
+    limits_of,
+    rate_gains_of,
+)
 from campaign.physics.friction import friction_models
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
@@ -18,6 +25,9 @@ from campaign.physics.loops_used import loops_of
 
 SLOW = 1e-9
 """rad/s; friction at this rate is that of the onset of sliding."""
+LOOP_TIME = "how long the rate loop takes to settle"
+SIMPLE_LOOP = ("axis.inertia", "motor.torque_constant", "gear.ratio")
+"""What the pace of the rate loop follows from, besides its gain."""
 MOST = 0.9
 """of a limit that an experiment may use up by its own choice."""
 
@@ -73,22 +83,42 @@ class Rig:
     def unwinding_from(self, static_torque: float) -> float:
         """The same for a static torque (N m) that was found.
 
-        From -Ts to Ts: 2 Ts / (N Kt Ki); 0 without an integral, which then never breaks it away.
+        From -Ts to Ts: 2 Ts / (N Kt Ki); 0 without an integral, which then never breaks it away,
+        and where nobody says how large it is.
         """
-        gain = self.bench.torque_per_current * self.bench.controller.rate.integral_gain
+        controller, per_ampere = self.bench.controller, self.bench.torque_per_current
+        if controller is None or controller.rate is None or per_ampere is None:
+            return 0.0
+        gain = per_ampere * controller.rate.integral_gain
         return 2.0 * static_torque / gain if gain > 0 else 0.0
 
     @property
+    def limits(self) -> LimitsOptions:
+        """Raises IncompleteBenchError where the bench has none: nobody plans a motion then."""
+        return limits_of(self.bench)
+
+    @property
     def torque(self) -> float:
-        """What the limits of torque and current leave the drive (N m)."""
-        limits = self.bench.limits
-        return min(limits.torque, limits.current * self.bench.torque_per_current)
+        """What the limits of torque and current leave the drive (N m).
+
+        The current counts where the bench says how much torque an ampere is.
+        """
+        limits, per_ampere = self.limits, self.bench.torque_per_current
+        return min(limits.torque, math.inf if per_ampere is None else limits.current * per_ampere)
+
+    def accelerated_by(self, torque: float) -> float:
+        """What a torque (N m) does to a free load (rad/s^2), beside a limit of acceleration.
+
+        Infinite where nobody says how heavy the load is: that limit alone counts then.
+        """
+        return math.inf if self.bench.axis.inertia is None else torque / self.bench.axis.inertia
 
     def acceleration(self, rate: float) -> float:
         """Largest (rad/s^2) that limits and friction leave up to `rate` (rad/s), with a margin."""
         left = MOST * self.torque - worst_friction(self.bench, rate)
-        limits = self.bench.limits
-        return max(0.0, MOST * min(limits.acceleration, left / self.bench.axis.inertia))
+        if left <= 0.0:
+            return 0.0
+        return MOST * min(self.limits.acceleration, self.accelerated_by(left))
 
     @property
     def rate_noise(self) -> float:
@@ -99,15 +129,28 @@ class Rig:
     @property
     def sample_rate(self) -> float:
         """Of a recording (Hz): 1 kHz, or the controller's where that is lower."""
-        return min(1000.0, self.bench.controller.sample_rate or 1000.0)
+        return min(1000.0, control_rate(self.bench) or 1000.0)
 
     @cached_property
     def loop_time(self) -> float:
-        """How long (s) the rate loop takes to forget: ten of its slower time constants."""
-        gains = self.bench.controller.rate
+        """How long (s) the rate loop takes to forget: ten of its slower time constants.
+
+        By its crossover, or what follows from inertia and gain where the bench says too little for
+        that. Raises IncompleteBenchError where it does not even say the gains.
+        """
+        gains = rate_gains_of(self.bench, LOOP_TIME)
         integral = gains.integral_gain
         slow = gains.proportional / integral if integral > 0 else 0.0
         loop = dict(loops_of(self.bench, "none", "rate")).get("sliding")
         crossovers = loop.crossovers if isinstance(loop, LoopMargins) else ()
-        fast = 1.0 / min(crossovers) if crossovers else 0.0
+        fast = 1.0 / min(crossovers) if crossovers else self._response_time(gains.proportional)
         return 10.0 * max(fast, min(slow, 1.0))
+
+    def _response_time(self, proportional: float) -> float:
+        """J / (N Kt Kpv) (s): of a loop whose motor is not known; 0 where all of it is known."""
+        inertia, per_ampere = self.bench.axis.inertia, self.bench.torque_per_current
+        if not lacking(self.bench):
+            return 0.0  # a loop without a crossover
+        if inertia is None or per_ampere is None:
+            raise IncompleteBenchError.of(self.bench, lacking(self.bench, SIMPLE_LOOP), LOOP_TIME)
+        return inertia / (per_ampere * proportional)

@@ -22,9 +22,11 @@ BENCH = "bench."
 def quantity_of(path: str, trial: Trial, options: type[Options]) -> Quantity | None:
     """What a swept number is; None for a number without unit, and for anything else."""
     if path.startswith(BENCH):
-        found = number_at(bench_of(trial), path.removeprefix(BENCH))
-        return found[1] if found else None
-    return next((info.quantity for info in describe(options) if info.name == path), None)
+        at = number_at(bench_of(trial), path.removeprefix(BENCH))
+        return at[1] if at else None
+    found = (info.quantity for info in describe(options) if info.name == path)
+    quantity = next(found, None)
+    return quantity and quantity.here
 
 
 def name_of(path: str) -> str:

@@ -1,0 +1,246 @@
+"""Recorded motions: friction of their steady stretches, and what is said where it does not follow.
+
+Recordings are made here from a rigid axis with known friction, and reach the analysis by import.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import campaign
+from campaign.cli.import_command import import_recordings
+from campaign.errors import ExitCode
+from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.motion import EXPERIMENT
+from campaign.result import Result
+from tests.experiments.test_every_number import lacking
+
+RATE = 200.0
+
+
+def strokes(speeds: list[float], cruise: float = 1.5, rest: float = 0.3) -> np.ndarray:
+    """Rate of trapezoidal moves (rad/s), shape (n,)."""
+    parts = []
+    for speed in speeds:
+        up = np.linspace(0.0, speed, round(0.2 * RATE), endpoint=False)
+        hold = np.full(round(cruise * RATE), speed)
+        parts += [np.zeros(round(rest * RATE)), up, hold, up[::-1]]
+    return np.concatenate(parts)
+
+
+EVERY = [s * v for v in (0.2, 0.8, 0.4, 0.6, 0.3) for s in (1.0, -1.0)]
+
+
+def recorded(
+    folder: Path,
+    rate: np.ndarray,
+    torque: np.ndarray,
+    *,
+    kind: str = "rotary",
+    columns: str = "",
+    options: str = "",
+    entry: str = "",
+    extra: dict[str, np.ndarray] | None = None,
+) -> Any:
+    """A run of one recording; `columns`, `options` and `entry` are further lines of the mapping."""
+    extra = extra or {}
+    time = np.arange(len(rate)) / RATE
+    table = np.column_stack([time, np.cumsum(rate) / RATE, rate, torque, *extra.values()])
+    heading = ",".join(["t", "q", "v", "m", *extra])
+    np.savetxt(folder / "a.csv", table, delimiter=",", header=heading, comments="", fmt="%.9g")
+    unit, force = ("rad", "N m") if kind == "rotary" else ("m", "N")
+    (folder / "rig.toml").write_text(
+        f'schema = 3\nname = "rig"\n[axis]\nname = "axis"\nkind = "{kind}"\n'
+    )
+    (folder / "m.toml").write_text(
+        f"""
+schema = 2
+published = "none"
+[columns.c.time]
+column = "t"
+unit = "s"
+[columns.c.relative_angle]
+column = "q"
+unit = "{unit}"
+[columns.c.relative_rate]
+column = "v"
+unit = "{unit}/s"
+[columns.c.drive_torque]
+column = "m"
+unit = "{force}"
+{columns}
+[[test]]
+name = "any"
+kind = "motion"
+bench = "./rig.toml"
+{options}
+[[test.recording]]
+file = "a.csv"
+{entry}
+"""
+    )
+    code = import_recordings(
+        [str(folder / "m.toml")],
+        folder / "r",
+        only=(),
+        changes=(),
+        workers=1,
+        report=False,
+        sign=None,
+    )
+    assert code is ExitCode.DONE
+    return campaign.open(next((folder / "r").glob("*.nxs")))
+
+
+def found(run: Any, quantity: str, direction: str = "") -> Any:
+    table = run.results.findings
+    rows = table[table.quantity == quantity]
+    rows = rows[rows.direction == direction] if direction else rows
+    return rows.iloc[0]
+
+
+def result(run: Any) -> Result:
+    data = TestData("any", "motion", run.archive.trials[0].trial.options, tuple(run.archive.trials))
+    return result_of(EXPERIMENT, data)
+
+
+def notes(run: Any) -> str:
+    return " ".join(result(run).notes)
+
+
+def friction(rate: np.ndarray, coulomb: float = 2.0, viscous: float = 0.5, noise: float = 0.02):
+    rng = np.random.default_rng(8)
+    return coulomb * np.sign(rate) + viscous * rate + noise * rng.normal(size=len(rate))
+
+
+def test_friction_of_both_directions(tmp_path: Path):
+    rate = strokes(EVERY * 2)
+    run = recorded(tmp_path, rate, friction(rate))
+    for direction in ("positive", "negative"):
+        for quantity, true in (("coulomb_torque", 2.0), ("viscous_friction", 0.5)):
+            row = found(run, quantity, direction)
+            assert row.low <= true <= row.high
+            assert row.high - row.low < 0.1
+    # Of an axis whose inertia nobody knows it is said that it is in no interval.
+    assert "inertia" in str(found(run, "coulomb_torque", "positive").systematic)
+
+
+def test_a_load_that_drives_the_axis_costs_no_direction(tmp_path: Path):
+    """Gravity of 4 N m: the drive holds back on the way down, and still friction is there."""
+    rate = strokes(EVERY * 2)
+    run = recorded(tmp_path, rate, friction(rate) + 4.0)
+    row = found(run, "constant_torque")
+    assert row.low <= 4.0 <= row.high
+    assert {"positive", "negative"} <= set(run.results.findings.direction)
+    assert "gravity or an offset" in notes(run)
+
+
+def test_drift_that_goes_with_speed_is_told(tmp_path: Path):
+    rate = strokes(sorted(EVERY, key=abs))
+    assert "changes with time" in notes(recorded(tmp_path, rate, friction(rate)))
+
+
+def test_many_stretches_are_looked_at_over_all_of_the_recording(tmp_path: Path):
+    """Friction doubles half way: the mean of 500 strokes is that of all of them."""
+    rate = strokes([0.3, -0.3] * 250, cruise=0.5, rest=0.1)
+    torque = np.where(np.arange(len(rate)) < len(rate) / 2, 1.0, 2.0) * friction(rate, viscous=0.0)
+    run = recorded(tmp_path, rate, torque)
+    assert found(run, "friction_torque", "positive").value == pytest.approx(3.0, abs=0.05)
+    assert "of 500 steady stretches" in notes(run)
+
+
+def test_strokes_that_are_alike_have_wider_intervals(tmp_path: Path):
+    """Running-in: each stroke is like the one before it."""
+    rng = np.random.default_rng(3)
+    rate = strokes([0.3, -0.3] * 40, cruise=0.5, rest=0.1)
+    level = np.zeros(80)
+    for k in range(1, 80):
+        level[k] = 0.9 * level[k - 1] + 0.1 * rng.normal()
+    each = np.repeat(level, len(rate) // 80)
+    run = recorded(tmp_path, rate, (2.0 + each) * np.sign(rate))
+    row = found(run, "friction_torque", "positive")
+    plain = 2 * np.std(level[::2]) / np.sqrt(40)
+    assert row.high - row.low > 3 * plain
+    assert row.low <= 2.0 <= row.high
+
+
+def test_windows_that_are_named_are_used(tmp_path: Path):
+    rate = strokes(EVERY)
+    entry = 'windows = { one = ["0.6 s", "1.6 s"], two = ["2.8 s", "3.8 s"] }'
+    run = recorded(tmp_path, rate, friction(rate), entry=entry)
+    table = next(t for t in result(run).tables if t.key.startswith("steady"))
+    assert [round(row["first"], 2) for row in table.rows] == [0.6, 2.8]
+
+
+def test_lost_samples_cost_no_stretch(tmp_path: Path):
+    rate = strokes(EVERY * 2)
+    torque = friction(rate)
+    torque[::37] = np.nan
+    run = recorded(tmp_path, rate, torque)
+    row = found(run, "coulomb_torque", "positive")
+    assert row.low <= 2.0 <= row.high
+
+
+LOADED = '[columns.c.normal_load]\ncolumn = "n"\nunit = "N"\n'
+
+
+def test_friction_over_normal_load_of_a_linear_axis(tmp_path: Path):
+    rng = np.random.default_rng(4)
+    rate = strokes([0.05, -0.05] * 6)
+    load = 10.0 + 0.05 * rng.normal(size=len(rate))
+    torque = 0.12 * load * np.sign(rate) + 0.001 * rng.normal(size=len(rate))
+    columns = LOADED + 'times = "1 N/N"\nuncertainty = "0.1 N/N"\n'
+    run = recorded(tmp_path, rate, torque, kind="linear", columns=columns, extra={"n": load})
+    row = found(run, "friction_coefficient")
+    assert row.value == pytest.approx(0.12, rel=0.01)
+    # A load that is known to 10 % makes a coefficient that is no better known.
+    assert row.high - row.low > 2 * 0.15 * 0.12
+
+
+def test_friction_over_normal_load_needs_a_radius_where_the_axis_turns(tmp_path: Path):
+    rate = strokes([0.3, -0.3] * 6)
+    load = np.full(len(rate), 10.0) + 0.01 * np.sin(np.arange(len(rate)))
+    torque = 0.12 * 0.03 * load * np.sign(rate)
+    torque = torque + 1e-5 * np.random.default_rng(1).normal(size=len(rate))
+    (tmp_path / "without").mkdir()
+    (tmp_path / "with").mkdir()
+    run = recorded(tmp_path / "without", rate, torque, columns=LOADED, extra={"n": load})
+    assert "friction_coefficient" not in set(run.results.findings.quantity)
+    assert "`radius`" in notes(run)
+    run = recorded(
+        tmp_path / "with",
+        rate,
+        torque,
+        columns=LOADED,
+        options='radius = "30 mm"',
+        extra={"n": load},
+    )
+    assert found(run, "friction_coefficient").value == pytest.approx(0.12, rel=0.01)
+
+
+def test_every_number_has_an_interval_or_says_why_not(tmp_path: Path):
+    rate = strokes([*EVERY, 0.2, -0.2])
+    load = 10.0 + 0.05 * np.random.default_rng(4).normal(size=len(rate))
+    reference = np.cumsum(rate) / RATE
+    columns = LOADED + '[columns.c.reference]\ncolumn = "r"\nunit = "m"\n'
+    extra = {"n": load, "r": reference}
+    run = recorded(tmp_path, rate, friction(rate), kind="linear", columns=columns, extra=extra)
+    told = result(run)
+    assert not lacking(told)
+    assert {"recordings", "friction-lines", "steady-stretches"} <= {t.key for t in told.tables}
+    titles = [panel.title for figure in told.figures for panel in figure.panels]
+    for title in ("Reference less position", "Normal load", "Friction over normal load"):
+        assert title in titles
+
+
+def test_what_is_not_recorded_is_left_out(tmp_path: Path):
+    """Only a rate and a torque: no position, no tracking error, no load, and nothing fails."""
+    rate = strokes(EVERY * 2)
+    run = recorded(tmp_path, rate, friction(rate))
+    trial = run.archive.trials[0].trial
+    assert trial.can_use == ("relative_angle",)
+    assert not lacking(result(run))
