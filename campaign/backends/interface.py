@@ -65,11 +65,16 @@ class Backend(Protocol):
 
 
 @runtime_checkable
-class StoppedOutside(Protocol):
-    """What a backend does besides when others can switch its bench off: see `PanicStop`."""
+class Introduced(Protocol):
+    """What a backend does besides when others ask whose bench it is."""
 
     def introduce(self, run: str) -> None:
-        """Told the name of the run before entering, for whoever asks who holds the bench."""
+        """Told the name of the run before entering: the same when it is resumed."""
+
+
+@runtime_checkable
+class StoppedOutside(Introduced, Protocol):
+    """What a backend does besides when others can switch its bench off: see `PanicStop`."""
 
     def panic_stop(self) -> PanicStop | None:
         """The stop that keeps the bench off now, or None. Asked at any time between trials.
@@ -172,8 +177,13 @@ class BackendKind:
         live: whether it moves something, in the time of the wall clock: `campaign run` then asks
             before the first motion, a person confirms operator steps, pauses are waited for, and
             a bench that falls silent in mid-trial is made safe.
+        by_hand: whether a person executes the trials, and nothing here moves anything: operator
+            steps and pauses are a person's as with a live one, but nobody counts how long nothing
+            is heard.
         stopped_outside: whether others can switch its bench off: it is a `StoppedOutside`, too.
         several: whether several trials may be executed at a time (`--workers`).
+        needs: what it needs of a bench, as dotted paths (`motor.resistance`); a protocol with a
+            bench that lacks some is refused, with all of them named.
         simulates: whether it runs the engine of `campaign.physics`, which is compiled at its first
             start.
     """
@@ -184,6 +194,8 @@ class BackendKind:
     open: Callable[[Options], Backend]
     source: Source
     live: bool = False
+    by_hand: bool = False
     stopped_outside: bool = False
     several: bool = False
     simulates: bool = False
+    needs: tuple[str, ...] = ()

@@ -21,7 +21,6 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
-from campaign.archive.layout.story import read_lines
 from campaign.archive.reading.damage_words import in_one_line, in_words, lost_trials
 from campaign.archive.reading.sound_samples import whole_recording
 from campaign.backends.interface import BackendKind, Source, StopFlag
@@ -225,7 +224,7 @@ class ReplayBackend:
 
 def _lost(run: RunReader) -> Iterator[_Lost]:
     """The trials that were executed to their end and cannot be read, as far as a plan has them."""
-    finished = read_lines(run.journal.encode()).finished
+    finished = run.story.finished
     for number, damage in sorted(lost_trials(run).items()):
         if number in finished and finished[number].outcome is Outcome.INTERRUPTED:
             continue
@@ -240,6 +239,7 @@ def _asked_of_bench(trial: Trial) -> dict[str, Any]:
     """
     task = Task.model_dump(trial.task, mode="json", exclude=_NOT_ASKED)
     asked: dict[str, Any] = {"bench": _normalised(canonical_json(trial.bench)), "task": task}
+    asked |= {"recording": trial.recording} if trial.recording else {}
     return asked | ({"truth": trial.truth} if trial.truth else {})
 
 

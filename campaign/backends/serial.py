@@ -10,8 +10,10 @@ from typing import Literal
 
 from pydantic import Field
 
+from campaign.axis_kind import AxisKind, Sides, sides_in
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.backends.motion import BaseMotion, EmulatedMotion
+from campaign.channels import VOCABULARY, axis_of, info
 from campaign.errors import BackendError, UsageError
 from campaign.link.collect import Collector
 from campaign.link.connection import Connection
@@ -205,7 +207,8 @@ class SerialBackend:
             self._motion.load(task.base_acceleration, task.duration)
         self._trials += 1
         number = self._trials
-        recorder.start(tuple(map(_info, channels)))
+        sides = sides_in(trial.bench)
+        recorder.start(tuple(_info(channel, task.mode, sides) for channel in channels))
         collector = Collector(session, number, rate, channels, recorder, task.duration)
         if stop() or self._urgent.is_set():
             session.command(Clear())
@@ -346,10 +349,16 @@ class SerialBackend:
             return False
 
 
-def _info(channel: Channel) -> ChannelInfo:
-    return ChannelInfo(
+def _info(channel: Channel, mode: str, sides: Sides) -> ChannelInfo:
+    """A channel as the controller describes it; it need not know that its axis is linear."""
+    told = ChannelInfo(
         channel.name, channel.unit, channel.label, channel.display_unit, channel.measured
     )
+    axis = axis_of(channel.name, sides)
+    if axis is AxisKind.ROTARY or channel.name not in VOCABULARY:
+        return told
+    as_rotary = info(channel.name, mode)
+    return info(channel.name, mode, axis=axis) if told.unit == as_rotary.unit else told
 
 
 def _state(safe: bool) -> SafeState:
@@ -371,5 +380,6 @@ BACKEND = BackendKind(
     open=_open,
     source=Source.HARDWARE,
     live=True,
+    needs=("limits",),
     stopped_outside=True,
 )

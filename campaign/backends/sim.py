@@ -11,14 +11,15 @@ from pydantic import Field
 from campaign.backends.interface import BackendKind, Source, StopFlag, TrialCost
 from campaign.backends.simulated_trial import (
     CHANNELS,
-    COMMANDS,
     MEASURED,
     OUTPUTS,
     SimulatedTrial,
+    announced,
 )
 from campaign.backends.step_check import StepCheck
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import PURPOSES, CompleteBench, IncompleteBenchError, complete
 from campaign.physics.truth import simulated
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Array, Ending, Recorder, SafeState, Tree, Trial
@@ -27,7 +28,7 @@ from campaign.units import Time
 if TYPE_CHECKING:  # the engine takes its time to be imported
     from campaign.physics.lanes import Lane
 
-__all__ = ["BACKEND", "CHANNELS", "COMMANDS", "SimBackend", "SimOptions"]
+__all__ = ["BACKEND", "CHANNELS", "SimBackend", "SimOptions", "announced"]
 
 MOST_BENCHES = 64
 """Benches that are kept validated: trials of a test mostly share one."""
@@ -64,9 +65,9 @@ class SimBackend:
 
     def __init__(self, options: SimOptions) -> None:
         self._options = options
-        self._benches: dict[int, tuple[Tree, Bench]] = {}
+        self._benches: dict[int, tuple[Tree, CompleteBench]] = {}
         self._truths: dict[str, Tree] = {}
-        self._simulated: dict[tuple[int, str], Bench] = {}
+        self._simulated: dict[tuple[int, str], CompleteBench] = {}
         self._known: dict[str, _Known] = {}
         self._groups: dict[Hashable, Hashable] = {}
         self.timing: Timing = UNTIMED
@@ -92,7 +93,10 @@ class SimBackend:
         """Why this backend cannot execute `trial`, or None."""
         if trial.truth and trial.truth not in self._truths:
             return f"its truth {trial.truth[:12]} is not here; it is archived with the run"
-        bench, name = self._bench(trial), trial.task.compensation
+        try:
+            bench, name = self._bench(trial), trial.task.compensation
+        except IncompleteBenchError as error:
+            return str(error)
         if name != "none" and name not in bench.compensation:
             return f"bench {bench.name!r} has no compensation {name!r}"
         try:
@@ -184,7 +188,7 @@ class SimBackend:
             bench = self._simulated_instead(trial, stated) if trial.truth else stated
             return Lane.of(bench, trial.task, trial.seed, longest_step, stated)
 
-    def _simulated_instead(self, trial: Trial, stated: Bench) -> Bench:
+    def _simulated_instead(self, trial: Trial, stated: CompleteBench) -> CompleteBench:
         """The truth under the software of the stated bench."""
         key = (id(trial.bench), trial.truth)  # the tree is kept as long as this is
         bench = self._simulated.get(key)
@@ -192,10 +196,11 @@ class SimBackend:
             bench = self._simulated[key] = simulated(self._truths[trial.truth], stated)
         return bench
 
-    def _bench(self, trial: Trial) -> Bench:
+    def _bench(self, trial: Trial) -> CompleteBench:
         kept = self._benches.get(id(trial.bench))  # it is kept, and so is its id
         if kept is None:
-            kept = trial.bench, Bench.model_validate(trial.bench, context={"si": True})
+            bench = Bench.model_validate(trial.bench, context={"si": True})
+            kept = trial.bench, complete(bench, "the backend 'sim'")
             if len(self._benches) >= MOST_BENCHES:
                 self._benches.clear()
                 self._simulated.clear()
@@ -219,4 +224,5 @@ BACKEND = BackendKind(
     source=Source.SIMULATION,
     several=True,
     simulates=True,
+    needs=tuple(PURPOSES),
 )

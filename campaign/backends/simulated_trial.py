@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from campaign.axis_kind import Sides
 from campaign.backends.interface import StopFlag
 from campaign.backends.step_check import StepCheck
 from campaign.channels import (
@@ -20,12 +22,13 @@ from campaign.channels import (
     POINTING_ERROR,
     RELATIVE_ANGLE,
     RELATIVE_RATE,
+    axis_of,
     info,
 )
 from campaign.physics.base_motion import base_rate
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.physics.limit_watch import LimitWatch
-from campaign.trial import Array, Ending, Event, Outcome, Recorder, Task
+from campaign.trial import Array, ChannelInfo, Ending, Event, Outcome, Recorder, Task
 
 CHANNELS = tuple(
     info(name)
@@ -48,9 +51,6 @@ CHANNELS = tuple(
 MEASURED = tuple(channel for channel in CHANNELS if channel.measured)
 """What a rig would have, too."""
 
-COMMANDS = {mode: info(COMMAND, mode) for mode in ("rate", "torque", "prescribed", "spring")}
-"""What the command channel holds, by the mode of the task."""
-
 OUTPUTS = (
     GYRO_RATE,
     RELATIVE_RATE,
@@ -64,12 +64,17 @@ OUTPUTS = (
 """The channels that the engine's outputs are, in the order of its rows."""
 
 
+def announced(names: Sequence[str], mode: str, sides: Sides) -> tuple[ChannelInfo, ...]:
+    """What the channels are, of a bench with these sides and of a task with this mode."""
+    return tuple(info(name, mode, axis=axis_of(name, sides)) for name in names)
+
+
 class SimulatedTrial:
     """Takes the outputs of the engine until the trial ends."""
 
     def __init__(
         self,
-        bench: Bench,
+        bench: CompleteBench,
         task: Task,
         samples: int,
         recorder: Recorder,
@@ -93,8 +98,8 @@ class SimulatedTrial:
         channels = CHANNELS if told else MEASURED
         self._rows = [CHANNELS.index(channel) for channel in channels]
         names = [channel.name for channel in channels]
-        self._watch = LimitWatch(bench.limits, task.sample_rate, names)
-        recorder.start((COMMANDS[task.mode], *channels[1:]))
+        self._watch = LimitWatch(bench.limits, task.sample_rate, names, bench.sides)
+        recorder.start(announced(names, task.mode, bench.sides))
 
     def take(self, time: Array, out: Array, half: Array | None = None) -> Ending | None:
         """The next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); None: it goes on.

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.machine_code import (
     WIDTHS,
     Made,
@@ -136,8 +136,8 @@ class FirstStart:
         self.processor = time.thread_time()
 
 
-def _benches() -> list[Bench]:
-    return [load_bench(name) for name in shipped_benches()]
+def _benches() -> list[CompleteBench]:
+    return [complete(load_bench(name)) for name in shipped_benches()]
 
 
 def _lines(width: int) -> Iterator[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import ValidationError
 
+from campaign.axis_kind import sides_in
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import WATCHED, LimitWatch
 from campaign.trial import Array, Ending, Fault, Outcome, Task, Trial
@@ -44,7 +45,7 @@ def make_watch(trial: Trial, names: Sequence[str]) -> tuple[LimitWatch | None, t
         limits = LimitsOptions.model_validate(tree, context={"si": True})
     except ValidationError:
         return None, tuple(each.limit for each in WATCHED)
-    watch = LimitWatch(limits, trial.task.sample_rate, names)
+    watch = LimitWatch(limits, trial.task.sample_rate, names, sides_in(trial.bench))
     return watch, watch.unwatched
 
 

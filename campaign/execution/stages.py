@@ -18,6 +18,7 @@ from campaign.archive import ArchivedTrial
 from campaign.archive.layout.followed import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
 from campaign.archive.reading.measured import Measure
+from campaign.axis_kind import each_speaking_of
 from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
@@ -163,7 +164,9 @@ class Stages:
         if not _on_benches_of(trials, archived):
             raise UsageError("its trials were executed on different benches")
         data = TestData(first.test, first.kind, first.options, archived)
-        requests = declared.trials(options_of(experiment, first.options), bench_of(first), data)
+        bench = bench_of(first)
+        asked = declared.trials(options_of(experiment, first.options), bench, data)
+        requests = each_speaking_of(bench.sides, asked)
         return follow(stage, experiment, requests, first, self._next, self._refusal)
 
     def _measured(self, trial: TrialData) -> TrialData:

@@ -1,0 +1,370 @@
+"""A rig that nothing here can reach: trials are handed out as files, recordings handed in.
+
+A person plays what lies in a folder on whatever controller there is, and puts the recording beside
+it. That is read by the layout of a mapping, held against what was asked, and refused by name or
+recorded as on any hardware. See `docs/handover.md`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, JsonValue, field_validator
+
+from campaign.backends.handover import checks
+from campaign.backends.handover.columns import first_mapping, layout_of, read_layouts
+from campaign.backends.handover.excitation import (
+    excitation,
+    facts_of,
+    write_csv,
+    write_mat,
+)
+from campaign.backends.handover.judging import Refused, as_asked, not_completed
+from campaign.backends.handover.pages import (
+    Row,
+    attempt_page,
+    columns_file,
+    first_page,
+    manifest,
+)
+from campaign.backends.handover.places import (
+    MANIFEST,
+    PAGE,
+    RETURNED,
+    Attempt,
+    Came,
+    Places,
+    Verdict,
+    came_by,
+    new_folder,
+    read_json,
+    write_text,
+)
+from campaign.backends.handover.returned import (
+    ColumnsError,
+    OtherRateError,
+    Returned,
+    read_returned,
+)
+from campaign.backends.interface import BackendKind, Source, StopFlag
+from campaign.errors import ProtocolError, UsageError
+from campaign.importing.described import file_used
+from campaign.importing.describing import DefectError, MappingError
+from campaign.importing.interface import RecordingError
+from campaign.importing.made import sufficient
+from campaign.importing.mapping import Layout
+from campaign.link.refusal import Refusal
+from campaign.options import Options
+from campaign.physics.limit_watch import WATCHED
+from campaign.plain_text import json_text
+from campaign.trial import Ending, Event, Fault, Outcome, Recorder, SafeState, Trial, canonical_json
+from campaign.units import Time
+
+GLANCE = 0.2
+"""s between two looks into a folder."""
+BLOCK = 1000
+"""samples that are recorded between two looks at the stop flag."""
+WEEK = 604800.0
+CLIPPING = "clipping"
+"""What a layout accepts of a channel that is meant to be at its limit."""
+DEFECTS = {"sign": "wrong sign", "factor": "wrong scale", CLIPPING: "clipped"}
+"""What a recording is refused as, by the defect that was found when it was read."""
+NOT_IN_PROGRESS = "The run is not in progress now: what is handed in is read when it is resumed."
+
+
+class FilesOptions(Options):
+    """Options of a hand-over."""
+
+    folder: str = ""
+    """Where trials are handed out and recordings come back; `--handover` is short for it."""
+    mapping: str = ""
+    """The file whose `[columns.NAME]` say what the columns of recordings are; absent: the
+    protocol's own, or else `columns.toml` in the folder, of which a first version is written."""
+    columns: str = ""
+    """Which of them all recordings are read by; absent: the one there is, or the one that is
+    called as the test, or as the mode of the task."""
+    wait: Time = Field(default=WEEK, ge=0)
+    """How long a recording is waited for; then, and at once with 0 s, the run ends as interrupted,
+    and `campaign resume` goes on when it is back."""
+    ahead: int = Field(default=100, ge=0, le=100_000)
+    """How many trials are handed out beyond the one that is due."""
+    settle: Time = Field(default=5.0, gt=0, le=3600)
+    """How long the files of a recording must not have changed, where nobody has marked it done."""
+    motion: Literal["none", "table"] = "none"
+    """What moves the hull: nothing, or a table that plays the column `base_acceleration`."""
+
+    @field_validator("folder", "mapping")
+    @classmethod
+    def _absolute(cls, path: str) -> str:
+        return str(Path(path).resolve()) if path else ""
+
+
+class FilesBackend:
+    """Hands trials out, and takes their recordings in. One trial at a time."""
+
+    def __init__(self, options: FilesOptions) -> None:
+        self._options = options
+        self._folder = Path(options.folder)
+        self._places = Places(self._folder)
+        self._refusal = Refusal(
+            base_motion=options.motion == "table",
+            remedy="`--set backend.motion=table` says that a table does as the files say",
+        )
+        self._trials: dict[int, Trial] = {}
+        self._came: dict[str, Came] = {}
+        self._run = ""
+        self._begun = False
+
+    def introduce(self, run: str) -> None:
+        """The folder belongs to this run."""
+        self._run = run
+
+    def __enter__(self) -> FilesBackend:
+        if not self._options.folder:
+            raise UsageError("the backend 'files' needs a folder: --handover FOLDER")
+        self._places.check_owner(self._run)
+        if self._mapping.exists() or self._options.mapping:
+            read_layouts(self._mapping)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._begun:
+            self._list("", NOT_IN_PROGRESS)
+
+    def refuses(self, trial: Trial) -> str | None:
+        """Why no rig could execute `trial`, or None."""
+        why = self._refusal(trial)
+        if why is None:
+            self._trials[trial.number] = trial
+        return why
+
+    def channels(self, trial: Trial) -> frozenset[str] | None:
+        """Those that the layout names, and those that follow; None while there is no layout."""
+        if not self._options.mapping and not (self._options.folder and self._mapping.exists()):
+            return None
+        try:
+            known = read_layouts(self._mapping)
+            layout = layout_of(trial, known, self._options.columns, self._mapping)
+        except ProtocolError:
+            return None  # said when it is entered
+        return sufficient(layout.channels, facts_of(trial))
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Hand `trial` out, wait for its recording, hold it against what was asked, record it."""
+        self._trials.setdefault(trial.number, trial)
+        self._begin()
+        attempt = self._hand_out(trial)
+        self._hand_out_ahead(trial)
+        self._list(trial.name, f"Waiting for the recording of {attempt.name}.")
+        files = self._wait_for(attempt, stop)
+        if isinstance(files, Ending):
+            return files
+        used = _digests(files)
+        told: dict[str, JsonValue] = {
+            "handed_in": ", ".join(used),
+            "handover_attempt": attempt.number,
+            "safe_state_by": "whoever handed it in",
+        }
+        try:
+            layout = layout_of(
+                trial, read_layouts(self._mapping), self._options.columns, self._mapping
+            )
+            read_by = hashlib.sha256(canonical_json(layout.tree()).encode()).hexdigest()
+            self._check_whose(trial, attempt, used, read_by)
+            recording = self._taken(trial, files, layout)
+        except (ProtocolError, MappingError, ColumnsError) as error:
+            reason = f"the hand-over: the recording of {attempt.name} is not understood: {error}"
+            return Ending(Outcome.INTERRUPTED, reason, telemetry=told)
+        except Refused as refused:
+            reason = str(refused.found)
+            self._judge(attempt, Verdict(reason, used, read_by))
+            if refused.recording is not None:
+                _record(refused.recording, recorder, lambda: False)  # as evidence
+            return Ending(Outcome.FAULT, reason, fault=Fault.RECORDING, telemetry=told)
+        self._judge(attempt, Verdict(not_completed(trial, recording), used, read_by))
+        if not _record(recording, recorder, stop):
+            return Ending(Outcome.INTERRUPTED, "stopped by the operator", telemetry=told)
+        return Ending(Outcome.COMPLETED, telemetry=told)
+
+    def make_safe(self) -> SafeState:
+        """Nothing here moves anything. Who hands a recording in says that the rig is at rest."""
+        return SafeState.CONFIRMED
+
+    # Handing out
+
+    @property
+    def _mapping(self) -> Path:
+        return Path(self._options.mapping) if self._options.mapping else self._places.columns
+
+    def _begin(self) -> None:
+        if self._begun:
+            return
+        self._places.claim(self._run)
+        if not self._mapping.exists() and not self._options.mapping:
+            write_text(self._mapping, first_mapping(list(self._trials.values())))
+        self._came = self._places.came()
+        self._begun = True
+
+    def _hand_out_ahead(self, trial: Trial) -> None:
+        later = sorted(number for number in self._trials if number > trial.number)
+        for number in later[: self._options.ahead]:
+            if not self._places.attempts(number):
+                self._hand_out(self._trials[number])
+
+    def _hand_out(self, trial: Trial) -> Attempt:
+        """The attempt that is due, with all its files."""
+        attempt, is_out = self._places.next_attempt(trial)
+        if is_out:
+            return attempt
+        series = excitation(trial)
+        verdicts = [each.verdict for each in self._places.attempts(trial.number)]
+        before = [verdict.reason for verdict in verdicts if verdict and verdict.reason]
+        mapping = columns_file(self._mapping, self._folder)
+        with new_folder(attempt.folder) as folder:
+            write_csv(series, folder / "excitation.csv")
+            write_mat(series, trial, attempt.number, folder / "excitation.mat")
+            tree = manifest(trial, attempt, self._run, series, before)
+            write_text(folder / MANIFEST, json_text(tree) + "\n")
+            write_text(folder / PAGE, attempt_page(trial, attempt, series, before, mapping))
+            (folder / RETURNED).mkdir()
+        return attempt
+
+    def _list(self, due: str, state: str) -> None:
+        """The page of all trials, as they are now."""
+        rows = []
+        for number in sorted({*self._trials, *self._places.trials()}):
+            attempts = self._places.attempts(number)
+            known = self._trials.get(number)
+            rows.append(Row.of_trial(known, attempts) if known else Row.of_manifest(attempts))
+        mapping = columns_file(self._mapping, self._folder)
+        write_text(self._folder / PAGE, first_page(self._run, rows, due, state, mapping))
+
+    # Waiting
+
+    def _wait_for(self, attempt: Attempt, stop: StopFlag) -> list[Path] | Ending:
+        """The files of the recording once all of it is there, or why nobody waits any more."""
+        began = time.monotonic()
+        seen: list[tuple[str, int, int]] = []
+        since = began
+        while not stop():
+            files, now = attempt.files, time.monotonic()
+            if files and attempt.is_marked:
+                return attempt.files  # what was there before the mark is all of it
+            state = _state(files)
+            if state != seen:
+                seen, since = state, now
+            if files and now - since >= self._options.settle:
+                return files
+            if not files and now - began >= self._options.wait:
+                where = attempt.returned.relative_to(self._folder).as_posix()
+                return Ending(Outcome.INTERRUPTED, f"the hand-over: nothing is back yet in {where}")
+            time.sleep(min(GLANCE, self._options.settle))
+        return Ending(Outcome.INTERRUPTED, "stopped by the operator while the rig had the trial")
+
+    # Taking in
+
+    def _taken(self, trial: Trial, files: Sequence[Path], layout: Layout) -> Returned:
+        """The recording, if it is what was asked. Raises Refused, and what reading raises."""
+        wanted = {*trial.requires, *trial.can_use, *(each.channel for each in WATCHED)}
+        others = [each for number, each in sorted(self._trials.items()) if number != trial.number]
+        accepted = {n for n, column in layout.channels.items() if CLIPPING in column.accept}
+        try:
+            recording = read_returned(trial, files, layout, wanted)
+        except OtherRateError as error:
+            raise Refused(checks.Found("another rate", str(error))) from None
+        except RecordingError as error:
+            raise Refused(checks.Found("unreadable", str(error))) from None
+        except DefectError as error:
+            name = DEFECTS.get(error.kind, error.kind)
+            raise Refused(checks.Found(name, str(error))) from None
+        except MappingError as error:
+            if error.of_columns:
+                raise
+            raise Refused(checks.Found("no even clock", str(error))) from None
+        return as_asked(trial, recording, others, accepted)
+
+    def _check_whose(
+        self, trial: Trial, attempt: Attempt, used: Mapping[str, str], read_by: str
+    ) -> None:
+        """Raises Refused for files that came back for another attempt.
+
+        What was refused may come once more for its own trial, when the columns were wrong and have
+        been corrected: then the rig need not do it again.
+        """
+        for name, digest in used.items():
+            came = self._came.get(digest)
+            if came is None or came.attempt == attempt.name:
+                continue
+            if came.trial == trial.number and came.columns != read_by:
+                continue
+            told = f"{name} is, to the last byte, what came back for {came.attempt}"
+            raise Refused(checks.Found("the same file", told))
+        said = read_json(attempt.returned / MANIFEST)
+        if said is not None and said.get("fingerprint") != trial.fingerprint:
+            told = f"the manifest beside it is that of {said.get('name')}"
+            raise Refused(checks.Found("another trial", told))
+
+    def _judge(self, attempt: Attempt, verdict: Verdict) -> None:
+        attempt.judge(verdict)
+        self._came |= came_by(attempt, verdict)
+
+
+def _record(recording: Returned, recorder: Recorder, stop: StopFlag) -> bool:
+    """Whether all of it was recorded: a stop ends it, and the recording is there for a resume."""
+    recorder.start(recording.channels)
+    for remark in recording.remarks:
+        recorder.event(Event(0.0, remark))
+    count = len(recording.time)
+    edges = {0, count, *(np.flatnonzero(np.diff(recording.lost)) + 1), *range(0, count, BLOCK)}
+    for first, end in pairwise(sorted(edges)):
+        if stop():
+            return False
+        if recording.lost[first]:
+            recorder.lost(recording.time[first:end])
+        else:
+            recorder.append(recording.time[first:end], recording.samples[:, first:end])
+    return True
+
+
+def _digests(files: Sequence[Path]) -> dict[str, str]:
+    """SHA-256 by name; empty for a file that cannot be read, which is told when it is opened."""
+    found = {}
+    for path in files:
+        try:
+            found[path.name] = file_used(path, path.name).sha256
+        except RecordingError:
+            found[path.name] = ""
+    return found
+
+
+def _state(files: Sequence[Path]) -> list[tuple[str, int, int]]:
+    """By what it is seen that a file has changed."""
+    found = []
+    for path in files:
+        try:
+            about = path.stat()
+        except OSError:
+            continue
+        found.append((path.name, about.st_size, about.st_mtime_ns))
+    return found
+
+
+def _open(options: Options) -> FilesBackend:
+    return FilesBackend(FilesOptions.model_validate(options.model_dump(), context={"si": True}))
+
+
+BACKEND = BackendKind(
+    name="files",
+    summary="any rig, by hand: trials are handed out as files, and recordings handed in",
+    options=FilesOptions,
+    open=_open,
+    source=Source.HARDWARE,
+    by_hand=True,
+    needs=("limits",),
+)

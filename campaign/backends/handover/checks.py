@@ -1,0 +1,293 @@
+"""Whether what came back is what was asked. Pure: series in, the first thing that is wrong out.
+
+A command that was recorded has to be the one that was asked, sample by sample. Motion is only held
+against it by its sign and its size: how well a rig follows is what an experiment finds out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.channels import (
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    JOINT_TORQUE,
+    MOTOR_CURRENT,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
+from campaign.trial import Array, Task
+
+TOLERANCE = 0.02
+"""of the RMS of a command: more is another command."""
+HELD = 2
+"""samples by which a command may be late: a controller holds each of its own."""
+AGAINST = -0.3
+"""Correlation (about zero) below which something runs the other way round."""
+ALIKE = 0.9
+"""Correlation above which two series have one shape."""
+LOUDER = 5.0
+"""Factor by which a motion may be larger or smaller than what was asked: friction takes a part."""
+FLAT = 8
+"""samples at one extreme value, at least, that are a clipped series."""
+SHARE = 0.005
+"""of a recording that they are, at least."""
+LONG = 0.05
+"""of a recording that a series stands still while what it is to bring about changes."""
+CHANGE = 0.1
+"""of the RMS of the command that it changes by."""
+LEVELS = 50
+"""between the extremes; of a series with fewer nobody can tell whether it is clipped."""
+AT_LIMIT = 0.98
+"""of a bench's limit, from which a series is held by the limit itself."""
+
+RATES = (RELATIVE_RATE, GYRO_RATE)
+TORQUES = (DRIVE_TORQUE, MOTOR_CURRENT, JOINT_TORQUE)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is wrong with a recording: its name, and what was seen."""
+
+    name: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.text}"
+
+
+def wrong_length(task: Task, samples: int, stopped: bool) -> Found | None:
+    """A recording that ends too soon; `stopped`: at the rate that ends its trial."""
+    wanted = task.duration * task.sample_rate
+    if stopped or samples >= wanted - 1:
+        return None
+    had = samples / task.sample_rate
+    share = f"{samples / wanted:.0%} of it"
+    return Found(
+        "too short", f"it lasts {had:.6g} s and was asked to last {task.duration:.6g} s ({share})"
+    )
+
+
+def wrong_start(task: Task, angle: Array, within: float) -> Found | None:
+    """A trial that began elsewhere: `angle` (n,) as recorded, `within` what it may be off by."""
+    off = float(angle[0]) - task.start_angle
+    if abs(off) <= within:
+        return None
+    return Found(
+        "another place",
+        f"{RELATIVE_ANGLE} begins at {angle[0]:.6g} instead of {task.start_angle:.6g}; 'offset' of "
+        "its column is for an encoder that has its zero elsewhere",
+    )
+
+
+def wrong_command(
+    got: Array, asked: Array, rate: float, others: Mapping[str, Array]
+) -> Found | None:
+    """Why a recorded command is not the one that was asked; both (n,), at `rate` (Hz).
+
+    `others`: what was asked of other trials, by name.
+    """
+    size = _rms(asked)
+    if size == 0.0:
+        worst = float(np.max(np.abs(got)))
+        largest = max((float(np.max(np.abs(o))) for o in others.values()), default=0.0)
+        if worst <= TOLERANCE * largest or worst == 0.0:
+            return None
+        return Found("another command", f"nothing was to be commanded, and {worst:.6g} was")
+    if _off(got, asked) <= TOLERANCE:
+        return None
+    if _rms(got) <= TOLERANCE * size:
+        return Found("no command", "nothing was commanded in all of the recording")
+    if _off(-got, asked) <= TOLERANCE:  # before its delay: out and back is back and out, later
+        return Found("wrong sign", "the command is the negative of what was asked")
+    lag = _lag(asked, got)
+    if abs(lag) > HELD and _off(got, asked, lag, lag) <= TOLERANCE:
+        word = "late" if lag > 0 else "early"
+        told = f"the command is {word} by {abs(lag) / rate:.4g} s ({abs(lag)} samples)"
+        return Found(word, f"{told}; the recording begins with the excitation")
+    for name, other in others.items():
+        if len(other) == len(asked) and _off(got, other) <= TOLERANCE < _off(asked, other):
+            return Found("another trial", f"the command is that of {name}")
+    scale = float(got @ asked / (asked @ asked))
+    if scale != 0.0 and _off(got / scale, asked) <= TOLERANCE:
+        what = "wrong sign and scale" if scale < 0 else "wrong scale"
+        return Found(what, f"the command is {_factor(scale)} times what was asked")
+    off = np.abs(got - asked)
+    first = int(np.argmax(off > 10 * TOLERANCE * size)) or int(np.argmax(off))
+    return Found(
+        "another command",
+        f"the command is {got[first]:.6g} instead of {asked[first]:.6g} at {first / rate:.4g} s, "
+        f"and off by {_off(got, asked):.0%} of its size in all",
+    )
+
+
+def late_by(got: Array, asked: Array) -> int:
+    """Samples, within `HELD`, by which a command fits best."""
+    return min(range(-HELD, HELD + 1), key=lambda lag: (_off(got, asked, lag, lag), abs(lag)))
+
+
+def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> Found | None:
+    """What moves against what was asked, or is far larger or smaller. `series` by channel, (n,)."""
+    still = task.base_acceleration.shape == "zero"
+    for name in _following(task, still=still):
+        if name in series and (found := _against_command(name, series[name], asked)) is not None:
+            return found
+    if RELATIVE_RATE in series and RELATIVE_ANGLE in series:
+        angle = series[RELATIVE_ANGLE] - series[RELATIVE_ANGLE][0]
+        turned = np.cumsum(series[RELATIVE_RATE]) / task.sample_rate
+        if _correlation(angle, turned) < AGAINST and _rms(turned) > 0.1 * _rms(angle):
+            return Found("wrong sign", f"{RELATIVE_ANGLE} runs against {RELATIVE_RATE}")
+    if still and RELATIVE_RATE in series:
+        for name in TORQUES[:2]:
+            if name in series and _brakes(series[name], series[RELATIVE_RATE]):
+                told = f"{name} brakes in both directions what it is to move"
+                return Found("wrong sign", told)
+    return None
+
+
+def clipped(
+    task: Task, series: Mapping[str, Array], asked: Array, limits: Mapping[str, float]
+) -> Found | None:
+    """A torque or current that stays at one extreme value while it would have gone on.
+
+    Told from one that is steady by how it gets there, as steeply as before and then not at all; or
+    by what it is to bring about, which changes all the while.
+    `limits` of the bench, by channel: what stands at its limit is held by the bench itself.
+    """
+    left = asked - series[RELATIVE_RATE] if RELATIVE_RATE in series else None
+    left = asked if task.mode == "torque" else left
+    for name in TORQUES:
+        if name not in series:
+            continue
+        for sign in (1.0, -1.0):
+            values = sign * series[name]
+            runs = _runs_at_top(values)
+            if not (_cut_off(values, runs) or _of_no_effect(runs, left, len(values), asked)):
+                continue
+            level, count = series[name][runs[0][0]], sum(end - begin for begin, end in runs)
+            if abs(level) >= AT_LIMIT * limits.get(name, np.inf):
+                continue
+            told = f"{name} stays at {level:.6g} for {count} of {len(series[name])} samples"
+            return Found("clipped", f"{told}, while the trial goes on")
+    return None
+
+
+def _following(task: Task, *, still: bool) -> tuple[str, ...]:
+    """The channels that have the command's sign.
+
+    A rate that follows a sine may be late by half a period for good reason, and the rate relative
+    to a hull that moves is not the one that is commanded.
+    """
+    if task.mode == "torque":
+        return (DRIVE_TORQUE,) if task.compensation == "none" else ()
+    if task.command.shape in ("sine", "multisine"):
+        return ()
+    return RATES if still else (GYRO_RATE,)
+
+
+def _against_command(name: str, got: Array, asked: Array) -> Found | None:
+    if _rms(asked) == 0.0 or _rms(got) == 0.0:
+        return None
+    alike = _correlation(got, asked)
+    if alike < AGAINST:
+        return Found("wrong sign", f"{name} runs against the command (correlation {alike:.2f})")
+    scale = float(got @ asked / (asked @ asked))
+    if alike > ALIKE and not 1 / LOUDER <= scale <= LOUDER:
+        return Found("wrong scale", f"{name} is {_factor(scale)} times what was commanded")
+    return None
+
+
+def _brakes(torque: Array, rate: Array) -> bool:
+    """Whether a torque is against the motion in both directions: friction never is a motor."""
+    fast = 0.2 * float(np.max(np.abs(rate)))
+    out, back = rate > fast, rate < -fast
+    if not (fast and out.any() and back.any()):
+        return False
+    size = 0.3 * _rms(torque)
+    return bool(np.mean(torque[out]) < -size and np.mean(torque[back]) > size)
+
+
+def _runs_at_top(values: Array) -> list[tuple[int, int]]:
+    """Begin and end of the stretches at the upper extreme; none where that is no large value."""
+    top, span = float(np.max(values)), float(np.ptp(values))
+    if span == 0.0 or top < 0.5 * float(np.max(np.abs(values))):
+        return []
+    at_top = values >= top - 1e-9 * span
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_top, [False]]).astype(int)))
+    both = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(begin, end) for begin, end in both if begin >= 3 and end - begin >= FLAT]
+
+
+def _cut_off(values: Array, runs: Sequence[tuple[int, int]]) -> bool:
+    """Whether the series rises to its top as steeply as before, and stays there at once."""
+    if sum(end - begin for begin, end in runs) < max(1.0, SHARE * len(values)):
+        return False
+    top, span = float(np.max(values)), float(np.ptp(values))
+    steps = np.abs(np.diff(values))
+    quantum = float(np.min(steps[steps > 1e-9 * span], initial=span))
+    if quantum > span / LEVELS:
+        return False
+    slopes = [(top - float(values[begin - 3])) / 3 for begin, _ in runs]
+    return any(
+        slope > 2 * quantum and slope * (end - begin) > 0.05 * span
+        for slope, (begin, end) in zip(slopes, runs, strict=True)
+    )
+
+
+def _of_no_effect(
+    runs: Sequence[tuple[int, int]], left: Array | None, count: int, asked: Array
+) -> bool:
+    """Whether what is left to do changes during the longest run, and the series does not."""
+    if not runs or left is None:
+        return False
+    begin, end = max(runs, key=lambda run: run[1] - run[0])
+    quarter = (end - begin) // 4
+    if end - begin < LONG * count or quarter < 1:
+        return False
+    change = np.mean(left[end - quarter : end]) - np.mean(left[begin : begin + quarter])
+    return bool(abs(change) > CHANGE * _rms(asked))
+
+
+def _lag(asked: Array, got: Array) -> int:
+    """Samples by which `got` is later than `asked`, where both are most alike."""
+    size = 1 << (len(asked) + len(got) - 1).bit_length()
+    spectrum = np.fft.rfft(got, size) * np.conj(np.fft.rfft(asked, size))
+    alike = np.fft.irfft(spectrum, size)
+    best = int(np.argmax(alike))
+    return best if best < size // 2 else best - size
+
+
+def _off(got: Array, asked: Array, first: int = -HELD, last: int = HELD) -> float:
+    """RMS of the difference over the RMS of what was asked, at the best lag of first to last."""
+    size = _rms(asked)
+    found = []
+    for lag in range(first, last + 1):
+        a = asked[max(0, -lag) : len(asked) - max(0, lag)]
+        b = got[max(0, lag) : len(got) - max(0, -lag)]
+        found.append(_rms(b - a) / size if len(a) else np.inf)
+    return float(min(found))
+
+
+def _correlation(a: Array, b: Array) -> float:
+    """About zero; 0 where one of them is nothing."""
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size else 0.0
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+_FACTORS = (("degrees and radians", 180 / np.pi), ("rpm and rad/s", 30 / np.pi), ("milli", 1e3))
+
+
+def _factor(scale: float) -> str:
+    """A factor with what it may come from."""
+    for name, value in _FACTORS:
+        for known in (value, 1 / value):
+            if abs(abs(scale) / known - 1.0) < TOLERANCE:
+                return f"{scale:.5g} ({name}?)"
+    return f"{scale:.5g}"

@@ -1,0 +1,90 @@
+"""What a trial asks of a rig, as series: the command over time, and the motion of the hull."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from campaign.channels import COMMAND, AxisKind, info
+from campaign.importing.made import RigFacts
+from campaign.importing.rig_facts import rig_facts
+from campaign.physics.base_motion import base_rate
+from campaign.physics.bench import Bench
+from campaign.trial import Array, Task, Trial
+
+
+@dataclass(frozen=True)
+class Series:
+    """One column of an excitation: `name` in `unit` (SI), `values` of shape (n,)."""
+
+    name: str
+    unit: str
+    values: Array
+
+    @property
+    def heading(self) -> str:
+        """As the CSV file has it."""
+        return f"{self.name} ({self.unit})"
+
+
+def samples_of(task: Task) -> int:
+    """How many samples a trial has that lasts its whole duration."""
+    return max(2, round(task.duration * task.sample_rate))
+
+
+def axis_of(trial: Trial) -> AxisKind:
+    """How the axis moves, as the trial's bench says it."""
+    axis = trial.bench.get("axis")
+    kind = axis.get("kind", AxisKind.ROTARY) if isinstance(axis, dict) else AxisKind.ROTARY
+    return AxisKind(str(kind))
+
+
+def facts_of(trial: Trial) -> RigFacts:
+    """What of the trial's bench makes one channel of another; nothing where there is no bench."""
+    try:
+        return rig_facts(Bench.model_validate(trial.bench, context={"si": True}))
+    except ValidationError:
+        return RigFacts()
+
+
+def excitation(trial: Trial) -> Sequence[Series]:
+    """Time, command and, where the hull is to move, its acceleration and rate."""
+    task, axis = trial.task, axis_of(trial)
+    time = np.arange(samples_of(task)) / task.sample_rate
+    unit = info(COMMAND, task.mode, axis=axis).unit
+    series = [Series("time", "s", time), Series(COMMAND, unit, task.command.sample(time))]
+    if task.base_acceleration.shape != "zero":
+        rate = info("base_rate", axis=axis).unit
+        moved = task.base_acceleration
+        series.append(Series("base_acceleration", f"{rate}^2", moved.sample(time)))
+        series.append(Series("base_rate", rate, base_rate(moved, time)))
+    return series
+
+
+def write_csv(series: Sequence[Series], path: Path) -> None:
+    """A line per sample with every digit that a float needs, units in the heading."""
+    rows = zip(*(each.values.tolist() for each in series), strict=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(each.heading for each in series) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+def write_mat(series: Sequence[Series], trial: Trial, attempt: int, path: Path) -> None:
+    """MAT version 5, numbers only: a column per series, and what of the trial is a number."""
+    from scipy.io import savemat
+
+    task = trial.task
+    numbers = {
+        "trial": trial.number,
+        "attempt": attempt,
+        "sample_rate": task.sample_rate,
+        "duration": task.duration,
+        "start_angle": task.start_angle,
+    }
+    variables = {name: float(number) for name, number in numbers.items()}
+    columns = {each.name: each.values for each in series}
+    savemat(path, {**variables, **columns}, do_compression=True, oned_as="column")

@@ -1,0 +1,112 @@
+"""What a recording that came back is found to be: what was asked, or refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from pydantic import ValidationError
+
+from campaign.backends.handover import checks
+from campaign.backends.handover.returned import Returned
+from campaign.channels import COMMAND, DRIVE_TORQUE, MOTOR_CURRENT, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.physics.bench import LimitsOptions
+from campaign.physics.limit_watch import LimitWatch
+from campaign.trial import Trial
+
+START = 0.02
+"""of the angle limit, by which a trial may begin beside where it was asked to."""
+LIMITED = {DRIVE_TORQUE: "torque", MOTOR_CURRENT: "current"}
+"""The limit of a bench that holds a torque, by channel."""
+
+
+class Refused(Exception):  # noqa: N818 - of a recording, not of this program
+    """A recording that is not what was asked.
+
+    Attributes:
+        recording: what there is of it, None when it cannot be read.
+    """
+
+    def __init__(self, found: checks.Found, recording: Returned | None = None) -> None:
+        self.found = found
+        self.recording = recording
+        super().__init__(str(found))
+
+
+def as_asked(
+    trial: Trial, recording: Returned, others: Sequence[Trial], may_clip: Collection[str] = ()
+) -> Returned:
+    """The recording as it is archived. Raises Refused when it is not what was asked.
+
+    Args:
+        others: trials whose recording it could be instead.
+        may_clip: channels that may stand at their limit.
+    """
+    task = trial.task
+    recording, stopped = _until_stopped(trial, recording)
+    asked = task.command.sample(recording.time)
+    if found := checks.wrong_length(task, len(recording.time), stopped):
+        raise Refused(found, recording)
+    good = ~recording.lost
+    series = {name: values[good] for name, values in recording.by_name.items()}
+    for name, values in series.items():
+        if not np.isfinite(values).all():
+            first = int(np.argmax(~np.isfinite(recording[name]) & good))
+            told = f"{name} has no value at {recording.time[first]:.6g} s"
+            raise Refused(checks.Found("undefined", told), recording)
+    if not good.any():
+        raise Refused(checks.Found("undefined", "all of its samples are missing"), recording)
+    asked = asked[good]
+    found, limits = None, _limits(trial)
+    if limits is not None and RELATIVE_ANGLE in series:
+        found = checks.wrong_start(task, series[RELATIVE_ANGLE], START * limits.angle)
+    if found is None and COMMAND in series:
+        theirs = {
+            other.name: other.task.command.sample(recording.time)[good]
+            for other in others
+            if other.task.mode == task.mode
+        }
+        found = checks.wrong_command(series[COMMAND], asked, task.sample_rate, theirs)
+    found = found or checks.wrong_motion(task, series, asked)
+    unlimited = {name: values for name, values in series.items() if name not in may_clip}
+    found = found or checks.clipped(task, unlimited, asked, _torque_limits(trial))
+    if found is not None:
+        raise Refused(found, recording)
+    return recording
+
+
+def _until_stopped(trial: Trial, recording: Returned) -> tuple[Returned, bool]:
+    """Up to the sample at which the rate ends the trial, and whether there is one."""
+    bound = trial.task.stop_rate
+    if bound is None or RELATIVE_RATE not in recording.by_name:
+        return recording, False
+    beyond = np.abs(recording[RELATIVE_RATE]) > bound
+    if not beyond.any():
+        return recording, False
+    return recording.cut(int(np.argmax(beyond)), "the rate that ends the trial was reached"), True
+
+
+def _limits(trial: Trial) -> LimitsOptions | None:
+    try:
+        return LimitsOptions.model_validate(trial.bench.get("limits"), context={"si": True})
+    except ValidationError:
+        return None
+
+
+def _torque_limits(trial: Trial) -> dict[str, float]:
+    """By channel, the limit of the bench that may hold it."""
+    limits = _limits(trial)
+    return {name: float(getattr(limits, key)) for name, key in LIMITED.items()} if limits else {}
+
+
+def not_completed(trial: Trial, recording: Returned) -> str:
+    """Why the recorder will not take it for completed, in words; empty where it will."""
+    if recording.lost.any():
+        return f"lost samples: {int(recording.lost.sum())} of its samples are missing"
+    limits = _limits(trial)
+    if limits is None:
+        return ""
+    names = [channel.name for channel in recording.channels]
+    watch = LimitWatch(limits, trial.task.sample_rate, names)
+    violation = watch.look(recording.time, recording.samples)
+    return f"limit: {violation.text}" if violation else ""

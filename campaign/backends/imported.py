@@ -1,0 +1,105 @@
+"""Recordings that were made elsewhere, served from their files: `campaign import`.
+
+A trial says itself where its samples come from, and this reads them. A file that is not what it was
+when the plan was made ends its trial as a fault.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from contextlib import ExitStack
+
+import numpy as np
+
+from campaign.backends.interface import BackendKind, Source, StopFlag
+from campaign.importing.described import Described
+from campaign.importing.interface import RecordingError
+from campaign.importing.opened import OpenedFiles
+from campaign.importing.reader import RecordingReader, paths_unchanged
+from campaign.options import Options
+from campaign.trial import Ending, Event, Fault, Outcome, Recorder, SafeState, Trial
+
+
+class ImportOptions(Options):
+    """The import has no options: trials say where their samples lie."""
+
+
+class ImportBackend:
+    """Serves trials whose `recording` describes files."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        # Several trials may lie in one file, which is opened and read once by each thread.
+        self._kept = threading.local()
+
+    def __enter__(self) -> ImportBackend:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+    def refuses(self, trial: Trial) -> str | None:
+        """Why `trial` has no recording to be served from, or None."""
+        return None if trial.recording else "nothing was recorded elsewhere for it"
+
+    def channels(self, trial: Trial) -> frozenset[str]:
+        """Those that its files have, and those that are made of them."""
+        return frozenset(each.name for each in _described(trial).channels)
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Copy the samples of the trial's files, as its description says."""
+        described = _described(trial)
+        try:
+            reader = RecordingReader(described, self._opened(described))
+            recorder.start(tuple(each.info for each in described.channels))
+            for remark in described.remarks:
+                recorder.event(Event(0.0, remark))
+            for time, samples, lost in reader.blocks():
+                if stop():
+                    return Ending(Outcome.INTERRUPTED, "stopped by the operator")
+                for first, end in _stretches(lost):
+                    if lost[first]:
+                        recorder.lost(time[first:end])
+                    else:
+                        recorder.append(time[first:end], samples[:, first:end])
+        except RecordingError as error:
+            return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
+        return Ending(Outcome.COMPLETED)
+
+    def make_safe(self) -> SafeState:
+        """Nothing here moves."""
+        return SafeState.CONFIRMED
+
+    def _opened(self, described: Described) -> OpenedFiles:
+        key = (described.files, described.table, described.channels, described.clock)
+        if getattr(self._kept, "key", None) != key:
+            opened = OpenedFiles(paths_unchanged(described))
+            self._stack.push(opened)
+            self._kept.key, self._kept.opened = key, opened
+        opened_files: OpenedFiles = self._kept.opened
+        return opened_files
+
+
+def _described(trial: Trial) -> Described:
+    return Described.model_validate(trial.recording, context={"si": True})
+
+
+def _stretches(lost: np.ndarray) -> list[tuple[int, int]]:
+    """Begin and end of stretches that are all lost, or not at all."""
+    edges = [0, *(np.flatnonzero(lost[1:] != lost[:-1]) + 1).tolist(), len(lost)]
+    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
+
+
+def _open(options: Options) -> ImportBackend:
+    return ImportBackend()
+
+
+BACKEND = BackendKind(
+    name="import",
+    summary="recordings made elsewhere, as a mapping describes them",
+    options=ImportOptions,
+    open=_open,
+    source=Source.RECORDING,
+    several=True,
+)
