@@ -9,10 +9,10 @@ from pydantic import ValidationError
 
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
-from campaign.archive.layout.story import read_lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of_test
 from campaign.archive.reading.sound_samples import Trials, without_damaged
+from campaign.axis_kind import BOTH_ROTARY, Sides
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.physics.bench import Bench
@@ -62,6 +62,11 @@ class AnalysedTest:
     damaged: tuple[Damage, ...] = ()
     source: str = ""
     provenance: Provenance = NOTHING_ALTERED
+
+    @property
+    def sides(self) -> Sides:
+        """How its bench moves; of no bench as most do."""
+        return self.bench.sides if self.bench else BOTH_ROTARY
 
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
@@ -249,7 +254,7 @@ def _gone_on(run: RunReader, test: str) -> str:
     """
     numbers = {archived.trial.number for archived in run.trials_of(test)}
     changed = False
-    for entry in read_lines(run.journal.encode()).entries:
+    for entry in run.story.entries:
         if isinstance(entry, RunResumed):
             changed = any(_is_of_bench(change, test) for change in entry.changes)
         elif isinstance(entry, TrialFinished) and changed and entry.trial in numbers:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from campaign.comparing.difference import in_unit
 from campaign.comparing.judging import Pair, Verdict
 from campaign.comparing.overlays import Letters
-from campaign.comparing.words import condition_words
+from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER, Look
-from campaign.text import pretty_unit, quantity_words
+from campaign.text import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +47,7 @@ def draw_changes(pairs: Sequence[Pair]) -> str | None:
         names = row_names(shown)
         for row, pair in enumerate(shown):
             _draw_change(ax, pair, row, limit)
-            told = f"{quantity_words(pair.quantity)} · {names[row]}".removesuffix(" · ")
+            told = f"{name_here(pair.test, pair.quantity)} · {names[row]}".removesuffix(" · ")
             _name(ax, row, told, bold=pair.verdict is Verdict.DIFFERENT)
         if limit > FAR:
             ax.set_xscale("symlog", linthresh=LINEAR, linscale=1.0)
@@ -132,7 +132,7 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
         _name(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
     _rows(ax, len(pairs))
-    words = quantity_words(first.quantity)
+    words = name_here(first.test, first.quantity)
     label = words[:1].upper() + words[1:]
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
 

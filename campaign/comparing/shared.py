@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from campaign.access.analysis import AnalysedTest
+from campaign.axis_kind import speaking_of, words_here
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.physics.known import number_at
 from campaign.physics.truth import value_at
@@ -29,13 +30,15 @@ def shared_sources(
         return frozenset()
     if one.bench is None or other.bench is None or one.bench.name != other.bench.name:
         return frozenset()
-    return frozenset(
+    shared = [
         source
         for path, source in SOURCES.items()
         if _known(one, path) is not None
         and _known(one, path) == _known(other, path)
         and _true(one, path, plants) == _true(other, path, other_plants)
-    )
+    ]
+    with speaking_of(one.sides):  # as the estimates of its analysis call them
+        return frozenset(map(words_here, shared))
 
 
 def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:

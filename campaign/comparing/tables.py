@@ -13,10 +13,10 @@ from campaign.comparing.comparison import Against, size_of
 from campaign.comparing.difference import BOUNDS, in_unit
 from campaign.comparing.draws import common_draws
 from campaign.comparing.judging import Pair, Verdict
-from campaign.comparing.words import condition_words
+from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import interval, pretty_unit, quantity_words
+from campaign.text import interval, pretty_unit
 
 JUDGED = (Verdict.DIFFERENT, Verdict.BEYOND_BOUND, Verdict.NOT_SHOWN)
 
@@ -111,7 +111,8 @@ def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
 def name_of(pair: Pair) -> str:
     """`coulomb torque, direction positive`."""
     words = condition_words(pair.test, pair.conditions)
-    return f"{quantity_words(pair.quantity)}, {words}" if words else quantity_words(pair.quantity)
+    name = name_here(pair.test, pair.quantity)
+    return f"{name}, {words}" if words else name
 
 
 def number_of(estimate: Estimate, unit: str) -> str:
@@ -233,7 +234,7 @@ def _alone(
         {
             "run": letter,
             "test": test.name,
-            "quantity": quantity_words(finding.quantity),
+            "quantity": name_here(test, finding.quantity),
             "conditions": condition_words(test, finding.conditions),
             "value": finding.known,
             "unit": pretty_unit(finding.unit),

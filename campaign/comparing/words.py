@@ -7,13 +7,21 @@ from collections.abc import Iterator, Mapping
 from typing import Any, get_args
 
 from campaign.access.analysis import AnalysedTest
+from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.physics.known import number_at
 from campaign.result import Finding, Value
-from campaign.text import number, pretty_unit
+from campaign.text import number, pretty_unit, quantity_words
 from campaign.units import TORQUE, Quantity, convert
 
-DISPLAY = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+DISPLAY = {
+    "rad": "deg",
+    "rad/s": "deg/s",
+    "rad/s^2": "deg/s^2",
+    "m": "mm",
+    "m/s": "mm/s",
+    "m/s^2": "mm/s^2",
+}
 """What is shown in place of an SI unit where no table of the test says anything else."""
 BENCH = "bench."
 """Before a swept value of the bench."""
@@ -42,12 +50,20 @@ def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:
     return ", ".join(told)
 
 
+def name_here(test: AnalysedTest, quantity: str) -> str:
+    """What a quantity is called of the axis of the test's bench: `breakaway force`."""
+    with speaking_of(test.sides):
+        return quantity_words(quantity)
+
+
 def option_quantity(test: AnalysedTest, name: str) -> Quantity | None:
     """What an option of the test's experiment measures; `speed` is one of the option `speeds`."""
     fields = test.experiment.options.model_fields if test.experiment else {}
     for path in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
         if path in fields:
-            return next(_quantities((*fields[path].metadata, fields[path].annotation)), None)
+            hints = (*fields[path].metadata, fields[path].annotation)
+            quantity = next(_quantities(hints), None)
+            return quantity and quantity.of(test.sides)
     return None
 
 
@@ -70,7 +86,9 @@ def plain(value: Any, quantity: Quantity | None = None) -> str:
 
 def _value(test: AnalysedTest, name: str, value: Value) -> str:
     if isinstance(value, float):
-        quantity = option_quantity(test, name) or OF_NO_OPTION.get(name)
+        quantity = option_quantity(test, name)
+        if quantity is None and name in OF_NO_OPTION:
+            quantity = OF_NO_OPTION[name].of(test.sides)
         if quantity is None and name.startswith(BENCH) and test.bench is not None:
             found = number_at(test.bench, name.removeprefix(BENCH))
             quantity = None if found is None else found[1]

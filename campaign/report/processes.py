@@ -29,7 +29,7 @@ from campaign.trial import Tree
 
 WORTHWHILE = 200
 """Trials from which on more processes than one take less time than they cost to begin."""
-PRELOADED = ("campaign.report.processes", "matplotlib.backends.backend_svg", "scipy.stats")
+PRELOADED = ("campaign.report.preloaded",)
 """What every process needs, imported once for all of them."""
 LARGE = 50_000_000
 """Bytes of a sealed run from which on it probably has as many trials."""
@@ -79,8 +79,8 @@ class Workers:
     run: RunReader
     pool: ProcessPoolExecutor | None = None
 
-    def found(self, *, measure_anew: bool) -> dict[str, Found]:
-        """What the analysis of each test finds, by test.
+    def found(self, *, measure_anew: bool) -> Mapping[str, Found]:
+        """What the analysis of each test finds, by test; it is waited for where it is asked for.
 
         Only with the experiments of this installation: an object that somebody made cannot be told
         to another process.
@@ -88,8 +88,7 @@ class Workers:
         # The most trials first, so that none is left with a long one at the end.
         tests = sorted(self.run.header.tests, key=lambda test: -len(self._trials_of(test)))
         begun = self._begun({name_of(test): (_find, test, measure_anew) for test in tests})
-        found = {name: _result(future) for name, future in begun.items()}
-        return {name: each for name, each in found.items() if each is not None}
+        return _Awaited(begun)
 
     def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
         """Begin to draw; what is returned waits for a drawing, and has none that cannot be made."""
@@ -108,6 +107,25 @@ class Workers:
                 for key, call in work.items():
                     begun[key] = self.pool.submit(*call)
         return begun
+
+
+@dataclass(frozen=True, eq=False)
+class _Awaited(Mapping[str, Found]):
+    """What processes find; what one died of is missing."""
+
+    begun: Mapping[str, Future[Any]]
+
+    def __getitem__(self, name: str) -> Found:
+        found: Found | None = _result(self.begun[name])
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, future in self.begun.items() if _result(future) is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 def _result(future: Future[Any]) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -13,7 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from campaign.access.analysis import Found
 from campaign.archive import open_run
+from campaign.archive.reading import run_reader
 from campaign.experiments import experiments
 from campaign.report import processes
 from campaign.report.build import render
@@ -21,6 +24,7 @@ from campaign.report.content.document import Document, document_of
 from campaign.report.page.drawings import drawings_of
 from campaign.report.processes import workers
 from campaign.resources import templates_folder
+from campaign.result import Result
 from tests.system.user import campaign, environment, write
 
 PROTOCOL = """
@@ -88,6 +92,56 @@ def test_what_was_found_is_told_once_and_the_page_is_the_same(archive: Path, cou
     assert (html, folder.files) == page_of(archive, 1)
 
 
+def test_what_is_found_is_waited_for_when_it_is_asked_for(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until then, whoever asks for it has time for something else."""
+    begun: list[Future[object]] = []
+
+    def begin(*_: object) -> Future[object]:
+        begun.append(Future())
+        return begun[-1]
+
+    monkeypatch.setattr(processes.ProcessPoolExecutor, "submit", begin)
+    with workers(open_run(archive), 2) as two:
+        found = two.found(measure_anew=False)
+        assert len(begun) == 2
+        for each in begun:
+            each.set_result(Found(Result(), (), "", ()))
+        assert set(found) == {"calm", "steps"}
+
+
+def test_the_journal_is_parsed_once_for_a_report(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = open_run(archive)
+    parsed: list[bytes] = []
+    original = run_reader.read_lines
+    monkeypatch.setattr(
+        run_reader, "read_lines", lambda content: (parsed.append(content), original(content))[1]
+    )
+    document_of(run, experiments())
+    assert parsed == [run.journal.encode()]
+
+
+def test_what_processes_need_is_imported_before_they_begin() -> None:
+    """Experiments of the program and all that draws, in the process that the others are made of."""
+    code = (
+        "import sys, campaign.report.preloaded\n"
+        "from campaign.experiments import experiments\n"
+        "before = set(sys.modules)\n"
+        "shipped = [n for n in experiments() if experiments().plug_in(n) is None]\n"
+        "assert len(shipped) > 10\n"
+        "all(experiments()[name] for name in shipped)\n"
+        "import matplotlib.figure, matplotlib.projections, scipy.stats\n"
+        "import campaign.report.drawing.margins, campaign.report.processes\n"
+        "print(sorted(set(sys.modules) - before))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+    assert [importlib.util.find_spec(name) is not None for name in processes.PRELOADED] == [True]
+
+
 def test_a_process_that_dies_costs_no_more_than_time(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +160,7 @@ def test_a_process_that_dies_costs_no_more_than_time(
 STRANDED = """
 import multiprocessing, os, signal, sys, time
 from pathlib import Path
+from campaign.access.analysis import Found
 from campaign.archive import open_run
 from campaign.report.processes import _pool
 

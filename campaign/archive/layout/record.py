@@ -42,6 +42,8 @@ Trees = Mapping[str, Tree]
 _ESTIMATE = TypeAdapter(Estimate)
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
 _DETERMINING = ("bench", "task", "seed")
+_DETERMINING_WHERE_THERE = ("truth", "recording")
+"""Fields of a trial that its fingerprint is made of; the latter count where they are not empty."""
 
 
 class _Part(BaseModel):
@@ -153,8 +155,8 @@ class TrialRecord(_Part):
         field, with a default that old archives do not have.
         """
         tree = {**self.trial, **{name: trees[str(self.trial[name])] for name in SHARED}}
-        truth = {"truth": tree["truth"]} if tree.get("truth") else {}
-        return text_digest(canonical_json({name: tree[name] for name in _DETERMINING} | truth))
+        names = (*_DETERMINING, *(name for name in _DETERMINING_WHERE_THERE if tree.get(name)))
+        return text_digest(canonical_json({name: tree[name] for name in names}))
 
     @cached_property
     def text(self) -> str:

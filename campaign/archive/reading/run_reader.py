@@ -12,6 +12,7 @@ from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import ArchiveError
@@ -93,6 +94,11 @@ class RunReader:
     @property
     def sealed(self) -> bool:
         return self.path.is_file()
+
+    @cached_property
+    def story(self) -> Lines:
+        """What the journal says, line by line."""
+        return read_lines(self.journal.encode())
 
     @cached_property
     def sha256(self) -> str:

@@ -19,6 +19,7 @@ import h5py
 from h5py import h5f, h5o, h5p
 
 from campaign.archive.writing import hdf5
+from campaign.axis_kind import BOTH_ROTARY, AxisKind, Sides, sides_in, speaking_of, unit_here
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -87,6 +88,7 @@ class Described:
 
     name: str
     gains: tuple[tuple[str, float, float], ...]
+    sides: Sides = BOTH_ROTARY
 
     @classmethod
     def of(cls, bench: Tree) -> Described:
@@ -96,7 +98,7 @@ class Described:
             for loop in _GAIN_UNITS
             if isinstance(loops, Mapping) and (found := _parallel_gains(loops.get(loop)))
         )
-        return cls(str(bench.get("name", "")), tuple(gains))
+        return cls(str(bench.get("name", "")), tuple(gains), sides_in(bench))
 
 
 @lru_cache(maxsize=32)
@@ -113,10 +115,12 @@ def _template(bench: Described) -> h5py.File:
         sensor = hdf5.make_group(instrument, name, "NXsensor")
         hdf5.put_text(sensor, "short_name", channel)
     motor = hdf5.make_group(instrument, "motor", "NXactuator")
-    hdf5.put_text(motor, "physical_quantity", "torque")
+    turns = bench.sides.motor is AxisKind.ROTARY
+    hdf5.put_text(motor, "physical_quantity", "torque" if turns else "force")
     for loop, proportional, integral in bench.gains:
         controller = hdf5.make_group(motor, f"{loop}_controller", "NXpid_controller")
-        unit, integral_unit = _GAIN_UNITS[loop]
+        with speaking_of(bench.sides):
+            unit, integral_unit = map(unit_here, _GAIN_UNITS[loop])
         hdf5.put_number(controller, "K_p", proportional, units=unit)
         hdf5.put_number(controller, "K_i", integral, units=integral_unit)
     return file

@@ -113,9 +113,9 @@ def document_of(
 
     `measure_anew`, `found`: as for `analyse_run`.
     """
+    happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
-    happened = incidents(run)
     of_tests = (damage for test in tests for damage in test.damaged)
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
     scoreboard = score(published, [test.evidence() for test in tests])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
-from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.layout.story import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.report.content.drift import drift_figure, drift_table, drifts_of
 from campaign.report.content.low_margins import low_margin_table
@@ -36,7 +36,7 @@ class Incidents:
 
 def incidents(run: RunReader) -> Incidents:
     """What the journal and the trials of a run say of it."""
-    told = read_lines(run.journal.encode())
+    told = run.story
     drifts, problems, damaged = drifts_of(run)
     loops, loop_problems = low_margin_table(run)
     found = [_decisions(told), _steps(told), _attempts(told), _stages(told), _faults(run), loops]

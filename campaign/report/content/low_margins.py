@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from campaign.access.analysis import one_line
 from campaign.archive import RunReader
+from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of, words_here
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
 from campaign.physics.loops_used import LoopUse, loops_used
@@ -29,14 +30,16 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
     rows: list[dict[str, Value]] = []
     problems: list[str] = []
     benches: dict[str, Bench] = {}
-    for test in dict.fromkeys(trial.trial.test for trial in run.trials):
+    sides = {trial.trial.test: sides_in(trial.trial.bench) for trial in run.trials}
+    for test in sides:
         try:
             uses = loops_used(_trials_of(run, test, benches))
         except ValidationError as error:
             problems.append(f"the loops of {test}: {one_line(error)}")
             continue
         low = (use for use in uses if use.margins.low or not use.margins.stable)
-        rows += [{"test": test, **_row(use)} for use in low]
+        with speaking_of(sides[test]):
+            rows += [{"test": test, **_row(use)} for use in low]
     columns = (
         Column("test", "Test"),
         Column("trial", "Trial", exact=True),
@@ -48,7 +51,10 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
         Column("gain", "Gain margin (dB)", reason=COMPUTED),
         Column("growth", "Fastest pole (1/s)", reason=COMPUTED),
     )
-    table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=NOTE)
+    kinds = set(sides.values())
+    with speaking_of(kinds.pop() if len(kinds) == 1 else BOTH_ROTARY):
+        note = words_here(NOTE)
+    table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=note)
     return table, problems
 
 
@@ -65,7 +71,7 @@ def _trials_of(
 
 def _row(use: LoopUse) -> dict[str, Any]:
     margins, stable = use.margins, use.margins.stable
-    mode = " (torque command)" if use.mode == "torque" else ""
+    mode = words_here(" (torque command)") if use.mode == "torque" else ""
     return {
         "trial": use.trial,
         "compensation": use.compensation,

@@ -8,6 +8,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from campaign.axis_kind import each_speaking_of, spoken_of, words_here
 from campaign.channels import COMMAND, UNITS, AxisKind, info
 from campaign.channels import Quantity as PhysicalQuantity
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
@@ -28,7 +29,9 @@ def settings_of(options: BaseModel, without: Sequence[str] = ()) -> Pairs:
     """
     for name, field in type(options).model_fields.items():
         if name not in without:
-            yield from _told(_words(name), getattr(options, name), _quantity(field))
+            quantity = _quantity(field)
+            told = _told(_words(name), getattr(options, name), quantity and quantity.here)
+            yield from told
 
 
 def tree_settings(tree: Tree) -> Pairs:
@@ -54,7 +57,7 @@ def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
     yield "window", f"{start} to {stop} s"
     yield "sample rate", _amount(task.sample_rate, ("Hz", "Hz"))
     if task.start_angle:
-        yield "start angle", _amount(task.start_angle, angle)
+        yield words_here("start angle"), _amount(task.start_angle, angle)
     if task.stop_rate is not None:
         yield "stops at a rate of", _amount(task.stop_rate, rate)
     if task.spring_stiffness:
@@ -106,7 +109,8 @@ def _signal(signal: Signal, unit: tuple[str, str]) -> str:
 
 def _told(label: str, value: Any, quantity: Quantity | None) -> Pairs:
     if isinstance(value, BaseModel):
-        for name, text in settings_of(value):
+        sides = spoken_of().at_motor if getattr(value, "side", "") == "motor" else spoken_of()
+        for name, text in each_speaking_of(sides, settings_of(value)):
             yield f"{label}: {name}", text
     elif isinstance(value, Mapping):
         for name, item in value.items():
@@ -150,7 +154,7 @@ def _per_second(rate: tuple[str, str]) -> tuple[str, str]:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return words_here(name.replace("_", " "))
 
 
 def _quantity_at(options: Any, path: str) -> Quantity | None:
@@ -158,10 +162,14 @@ def _quantity_at(options: Any, path: str) -> Quantity | None:
     name, _, rest = path.partition(".")
     if isinstance(options, Mapping):
         return _quantity_at(options.get(name), rest) if rest else None
+    sides = spoken_of().at_motor if getattr(options, "side", "") == "motor" else spoken_of()
     field = type(options).model_fields.get(name) if isinstance(options, BaseModel) else None
     if field is None:
         return None
-    return _quantity_at(getattr(options, name), rest) if rest else _quantity(field)
+    if rest:
+        return _quantity_at(getattr(options, name), rest)
+    quantity = _quantity(field)
+    return quantity and quantity.of(sides)
 
 
 def _quantity(field: FieldInfo) -> Quantity | None:

@@ -5,10 +5,12 @@ One table for who reads an equation and looks for the number, and for the other 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
+from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, unit_here, words_here
 from campaign.text import pretty_unit
+from campaign.units import OBSERVER_GAIN
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def _signal(symbol: str, meaning: str, unit: str, channel: str = "") -> Symbol:
     return Symbol(symbol, meaning, unit, "Table 5.1", channel=channel)
 
 
-SYMBOLS = (
+SYMBOLS: tuple[Symbol, ...] = (
     _friction("σ₀", "bristle stiffness", "N m/rad", "bristle_stiffness"),
     _friction("σ₁", "bristle damping", "N m s/rad", "bristle_damping"),
     Symbol("z", "mean deflection of the bristles, the state of the model", "rad", "Table 4.2"),
@@ -78,6 +80,38 @@ SYMBOLS = (
     Symbol("T_f", "friction torque", "N m", "Section 5.3", channel="friction_torque"),
     Symbol("K₀", "gain of the observer", "N m s/rad", "Section 5.3", "compensation.observer.gain"),
 )
+
+
+def symbols_for(benches: Iterable[Sides]) -> tuple[Symbol, ...]:
+    """The symbols as they are of the benches of a run; where those differ, each unit there is."""
+    kinds = tuple(dict.fromkeys(benches)) or (BOTH_ROTARY,)
+    return tuple(
+        replace(
+            symbol,
+            meaning=" or ".join(dict.fromkeys(_meaning(symbol, each) for each in kinds)),
+            unit=" or ".join(dict.fromkeys(_unit(symbol, each) for each in kinds)),
+        )
+        for symbol in SYMBOLS
+    )
+
+
+def _own(symbol: Symbol, sides: Sides) -> Sides:
+    """Those of the side that it is about."""
+    return sides.at_motor if symbol.field.startswith("motor.") else sides
+
+
+def _meaning(symbol: Symbol, sides: Sides) -> str:
+    with speaking_of(_own(symbol, sides)):
+        return words_here(symbol.meaning)
+
+
+def _unit(symbol: Symbol, sides: Sides) -> str:
+    if symbol.field == "compensation.observer.gain":
+        return OBSERVER_GAIN.of(sides).si
+    if symbol.field == "gear.ratio" and sides.load is not sides.motor:
+        return "rad/m"
+    with speaking_of(_own(symbol, sides)):
+        return unit_here(symbol.unit)
 
 
 def markdown() -> Iterator[str]:

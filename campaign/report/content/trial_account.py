@@ -13,6 +13,7 @@ from campaign.archive.layout.story import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import trial_number
 from campaign.archive.reading.sound_samples import sound_part
+from campaign.axis_kind import sides_in, speaking_of, words_here
 from campaign.channels import COMMAND
 from campaign.errors import ArchiveError, CampaignError
 from campaign.estimate import Estimate, Window
@@ -28,14 +29,17 @@ from campaign.text import interval, number, pretty_unit
 from campaign.trial import Recording, Role, Tree, Trial
 from campaign.units import convert
 
-SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s"}
+SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s", "m/s^2": "mm/s^2"}
 """Unit of a metric to the one it is shown in; small angles are shown in mrad, others in degrees."""
+COARSE_AND_FINE = {"rad": ("deg", "mrad"), "m": ("mm", "um")}
 SHARES = ("time_stuck",)
 """Metrics that are a share of the time."""
 ONE_STEP = 1.5
 """Sampling steps, rounding included."""
 SMALL = 0.01
 """rad."""
+SMALL_TRAVEL = 1e-4
+"""m."""
 POINT = "Place in the sweep"
 WITHOUT = ("name", "description", "known")
 """Of a bench: what is told elsewhere, or is about it and not of it."""
@@ -82,6 +86,13 @@ def account_of(
     run: RunReader, archived: ArchivedTrial, story: Lines, test: AnalysedTest | None
 ) -> TrialAccount:
     """What there is to say of an executed trial; `story` is the run's journal."""
+    with speaking_of(sides_in(archived.trial.bench)):
+        return _account(run, archived, story, test)
+
+
+def _account(
+    run: RunReader, archived: ArchivedTrial, story: Lines, test: AnalysedTest | None
+) -> TrialAccount:
     trial = archived.trial
     recording, damaged = sound_part(run.path, archived)
     known = [damage for damage in run.damaged if trial_number(damage) == trial.number]
@@ -273,12 +284,14 @@ def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) 
 
 def _metric(found: Estimate) -> Mapping[str, Value]:
     unit = "percent" if found.name in SHARES else SHOWN.get(found.unit, found.unit)
-    if unit == "rad":
-        unit = "mrad" if abs(found.value) < SMALL else "deg"
+    if unit in COARSE_AND_FINE:
+        coarse, fine = COARSE_AND_FINE[unit]
+        small = SMALL if unit == "rad" else SMALL_TRAVEL
+        unit = fine if abs(found.value) < small else coarse
     ends = (found.value, *found.combined)
     value, low, high = (None if e is None else convert(e, found.unit, unit) for e in ends)
     return {
-        "name": found.name.replace("_", " "),
+        "name": words_here(found.name.replace("_", " ")),
         "value": interval(value, low, high),
         "unit": pretty_unit(unit),
         "reason": found.reason,

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunReader
+from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.identification.intervals import student
@@ -52,8 +53,11 @@ def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Tab
     tests = tuple(tests)
     units = units_of(tests, run.header)
     plants = run.header.truth.plants
-    found = ((test.name, _table(test, plants, units[test.name])) for test in tests)
-    return {name: table for name, table in found if table is not None}
+    found = {}
+    for test in tests:
+        with speaking_of(test.sides):
+            found[test.name] = _table(test, plants, units[test.name])
+    return {name: table for name, table in found.items() if table is not None}
 
 
 @dataclass

@@ -16,6 +16,7 @@ from typing import Any
 from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunHeader
 from campaign.physics.bench import Bench
+from campaign.physics.known import number_at
 from campaign.protocol.shapes import Shape, shape_at
 from campaign.report.content.protocol_units import leaves_of, written_units
 from campaign.result import Table
@@ -122,7 +123,14 @@ class TestUnits:
         if keys[0] == "bench":
             root, keys = Bench, keys[1:]
             tree = self.test.bench.model_dump(mode="json") if self.test.bench else {}
-        return None if root is None or not keys else _within(shape_at(root, tree, tuple(keys)))
+            found = self.test.bench and number_at(self.test.bench, ".".join(keys))
+            if found:
+                return found[1]
+        if root is None or not keys:
+            return None
+        quantity = _within(shape_at(root, tree, tuple(keys)))
+        bench = self.test.bench
+        return quantity.of(bench.sides) if quantity and bench else quantity
 
     def _of_column(self, path: str) -> Shown | None:
         """As the analysis tabulates it, where an experiment alone knows what its points are."""
@@ -167,7 +175,7 @@ def _shown(quantity: Quantity, unit: str | None) -> Shown:
     """In the unit that was written, where that is one of the quantity; else in its own."""
     for each in filter(None, (unit, quantity.display)):
         try:
-            return Shown(quantity.si, each, quantity.parse(f"1 {each}"))
+            return Shown(quantity.si, each, quantity.parse_own(f"1 {each}"))
         except ValueError:
             continue
     return Shown(quantity.si, quantity.si, 1.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench
 from campaign.physics.linear_friction import REGIMES, NoLoopError, Regime
 from campaign.physics.loop_margins import LoopMargins, Response, frequency_grid, margins_of
 from campaign.physics.open_loop import open_loop
@@ -53,7 +53,7 @@ class Trace:
     margins: LoopMargins
 
 
-def traces_of(bench: Bench, names: Sequence[str]) -> dict[Regime, list[Trace]]:
+def traces_of(bench: CompleteBench, names: Sequence[str]) -> dict[Regime, list[Trace]]:
     """The rate loop with each compensation, by regime; those without a linear loop are missing."""
     loops: list[tuple[Regime, str, Response, LoopMargins]] = []
     for regime in REGIMES:
@@ -73,14 +73,14 @@ def traces_of(bench: Bench, names: Sequence[str]) -> dict[Regime, list[Trace]]:
     return found
 
 
-def bode_svg(bench: Bench, names: Sequence[str]) -> str:
+def bode_svg(bench: CompleteBench, names: Sequence[str]) -> str:
     """The picture as a complete SVG document for white paper."""
     with canvas(WIDTH, HEIGHT) as sheet:
         _draw(sheet, bench, traces_of(bench, names))
         return to_svg(sheet)
 
 
-def bode_png(bench: Bench, names: Sequence[str]) -> bytes:
+def bode_png(bench: CompleteBench, names: Sequence[str]) -> bytes:
     """The picture as a PNG on white."""
     with canvas(WIDTH, HEIGHT) as sheet:
         _draw(sheet, bench, traces_of(bench, names))
@@ -107,7 +107,7 @@ def _trace(name: str, omega: Array, response: Response, margins: LoopMargins) ->
     return Trace(name, omega / TWO_PI, 20.0 * np.log10(np.abs(value)), phase, margins)
 
 
-def _draw(sheet: Canvas, bench: Bench, traces: Mapping[Regime, Sequence[Trace]]) -> None:
+def _draw(sheet: Canvas, bench: CompleteBench, traces: Mapping[Regime, Sequence[Trace]]) -> None:
     """Magnitude above, phase below, a column per regime."""
     heading = f"Rate loop of {bench.name}, opened at the rate error"
     sheet.suptitle(heading, x=0.008, ha="left", fontsize=10, weight="bold")

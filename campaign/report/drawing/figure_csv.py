@@ -63,7 +63,7 @@ def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[tuple[str, ...]]:
         x, y = decimate(x, y, points) if thinned else (x, y)
         empty = np.full(len(x), np.nan)
         columns = (x, y, empty, empty)
-    return (tuple(map(_text, row)) for row in zip(*columns, strict=False))
+    return zip(*(map(_text, column.tolist()) for column in columns), strict=False)
 
 
 def _names(titles: list[str]) -> list[str]:

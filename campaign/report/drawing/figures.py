@@ -89,8 +89,7 @@ STYLE: dict[Any, Any] = {
     "legend.handlelength": 2.6,
     "lines.linewidth": 1.4,
     "lines.scale_dashes": True,
-    "figure.constrained_layout.use": True,
-    "figure.constrained_layout.h_pad": 0.06,
+    "axes.titley": 1.0,  # not to be searched for, which takes as long as drawing
     "savefig.transparent": True,
     "savefig.dpi": 200,
 }
@@ -143,6 +142,8 @@ def canvas(width: float, height: float) -> Iterator[Canvas]:
     from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
     from matplotlib.figure import Figure as Canvas
 
+    from campaign.report.drawing.margins import Margins
+
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -151,23 +152,21 @@ def canvas(width: float, height: float) -> Iterator[Canvas]:
         size = 72 * width, 72 * height
         measuring = RendererSVG(*size, io.StringIO(), image_dpi=72)  # type: ignore[no-untyped-call]
         FigureCanvasSVG(sheet).get_renderer = lambda: measuring  # type: ignore[attr-defined]
+        sheet.set_layout_engine(Margins())
         yield sheet
 
 
 def to_svg(sheet: Canvas) -> str:
     """The SVG document of a canvas, with nothing in it that changes from run to run.
 
-    Coordinates are rounded to a hundredth of a point: nobody sees more, and a page carries them.
+    Coordinates are cut to a hundredth of a point; `slim` rounds those of curves further.
     """
-    import matplotlib as mpl
-
     engine = sheet.get_layout_engine()
     if engine is not None:
         # Saving would draw everything once in vain before it is drawn, to have the layout computed:
         # even with "none", which leaves a placeholder; only the default can be no engine at all.
         engine.execute(sheet)
-        with mpl.rc_context({"figure.constrained_layout.use": False}):
-            sheet.set_layout_engine(None)
+        sheet.set_layout_engine(None)
     out = io.StringIO()
     sheet.savefig(out, format="svg", metadata=METADATA)
     keep_as_pdf(sheet)

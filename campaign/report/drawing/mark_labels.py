@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
+    from campaign.report.drawing.margins import Margins
+
 SIZE = 8.0
 """Points: the smallest text of a figure."""
 ROW = 10.5
@@ -153,15 +155,18 @@ def _text(
 
 def place_labels(sheet: Canvas, panels: Sequence[Marked]) -> None:
     """Give every label its place, and make room for those outside of their axes."""
+    from campaign.report.drawing.margins import Margins
+
     if not any(each.above or each.beside or each.points for each in panels):
         return
-    _lay_out(sheet)
+    margins = Margins()
+    margins.execute(sheet)
     for each in panels:
         _stack_above(sheet, each)
-    _lay_out(sheet)
-    outside = [_place_points(sheet, each) for each in panels]
-    if any(outside):
-        _lay_out(sheet)  # axes have given way to labels in the margin
+    _lay_out(sheet, margins, [each.ax for each in panels if each.above])
+    outside = [each.ax for each in panels if _place_points(sheet, each)]
+    if outside:
+        _lay_out(sheet, margins, outside)  # axes have given way to labels in the margin
         for each in panels:
             _place_points(sheet, each)
     for each in panels:
@@ -169,10 +174,12 @@ def place_labels(sheet: Canvas, panels: Sequence[Marked]) -> None:
     sheet.set_layout_engine("none")  # what was placed stays where it is
 
 
-def _lay_out(sheet: Canvas) -> None:
-    engine = sheet.get_layout_engine()
-    if engine is not None:
-        engine.execute(sheet)
+def _lay_out(sheet: Canvas, margins: Margins, changed: Sequence[Axes]) -> None:
+    """Make room once more, where the labels of some axes have changed."""
+    for ax in changed:
+        margins.forget(ax)
+    if changed:
+        margins.execute(sheet)
 
 
 def _extent(text: Annotation) -> Bbox:

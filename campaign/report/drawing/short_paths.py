@@ -1,21 +1,37 @@
-"""Paths and numbers of a drawing as short as SVG reads them, to a hundredth of a point."""
+"""Paths and numbers of a drawing as short as SVG reads them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+CURVES = 10
+"""Parts of a point that coordinates are rounded to: a fifth of a pixel on the widest page ..."""
+SIGNS = 100
+"""... and those of a sign, which is round only if they are finer."""
+Whole = NDArray[np.int64]
 
 
-def short_path(text: str) -> str:
-    """The same path with steps in place of places, in hundredths that do not add up to an error."""
+def short_path(text: str, parts: int = CURVES) -> str:
+    """The same path with steps in place of places, in whole parts that do not add up to an error.
+
+    Steps that go on in the same direction are one, which paints the same.
+    """
     if re.search(r"[^MLCQz0-9.\s-]", text):
         return text  # not as matplotlib writes paths
-    parts = re.findall(r"([A-Za-z])([^A-Za-z]*)", text)
+    if re.fullmatch(r"[^CQz]*z?\s*", text):
+        body, closed, _ = text.partition("z")
+        return _straight(body, parts) + closed
+    found = re.findall(r"([A-Za-z])([^A-Za-z]*)", text)
     written: list[str] = []
     here = start = (0, 0)
     last = ""
-    for command, numbers in parts:
-        values = [hundredths(number) for number in numbers.split()]
+    for command, numbers in found:
+        values = [whole(number, parts) for number in numbers.split()]
         points = list(zip(values[::2], values[1::2], strict=True))
         if command == "z":
             written.append("z")
@@ -25,15 +41,52 @@ def short_path(text: str) -> str:
         if command == "L" and points == [here] and not alone:
             continue
         letter, steps = _step(command, here, points)
-        # What follows a move without a letter is a line.
-        same = (letter == last and letter != "m") or (letter, last) == ("l", "m")
-        written.append(_joined(steps) if same else letter + _joined(steps))
-        if same and not written[-1].startswith("-"):
-            written[-1] = " " + written[-1]
+        _write(written, last, letter, steps, parts)
         here = points[-1]
         start = here if command == "M" else start
         last = letter
     return "".join(written)
+
+
+def _straight(text: str, parts: int) -> str:
+    """Moves and lines alone, as all long paths are."""
+    moves = np.array(re.findall("[ML]", text)) == "M"
+    if not len(moves):
+        return ""
+    numbers = np.array(re.sub("[ML]", " ", text).split(), dtype=float)
+    places = np.rint(numbers * parts).astype(np.int64).reshape(-1, 2)
+    steps = np.diff(places, axis=0, prepend=0)
+    after_move = np.concatenate([[False], moves[:-1]])  # a dot, perhaps
+    there = moves | after_move | (steps != 0).any(axis=1)
+    steps, moves, after_move = steps[there], moves[there], after_move[there]
+    (x, y), (x_before, y_before) = steps.T, np.concatenate([[[0, 0]], steps[:-1]]).T
+    onward = (x * y_before == y * x_before) & (x * x_before + y * y_before > 0)
+    first = np.flatnonzero(~onward | moves | after_move)
+    written: list[str] = []
+    last = ""
+    for move, (east, north) in zip(
+        moves[first].tolist(), np.add.reduceat(steps, first).tolist(), strict=True
+    ):
+        if move:
+            letter, step = "m", [east, north]
+        elif not north:
+            letter, step = "h", [east]
+        else:
+            letter, step = ("l", [east, north]) if east else ("v", [north])
+        _write(written, last, letter, step, parts)
+        last = letter
+    return "".join(written)
+
+
+def _write(written: list[str], last: str, letter: str, steps: Sequence[int], parts: int) -> None:
+    # What follows a move without a letter is a line.
+    same = (letter == last and letter != "m") or (letter, last) == ("l", "m")
+    numbers = _joined(steps, parts)
+    if not same:
+        written.append(letter)
+    elif not numbers.startswith("-"):
+        written.append(" ")
+    written.append(numbers)
 
 
 def _step(
@@ -48,21 +101,23 @@ def _step(
     return command.lower(), steps
 
 
-def _joined(values: Sequence[int]) -> str:
+def _joined(values: Sequence[int], parts: int) -> str:
     text = ""
     for value in values:
-        shown = short_number(value)
+        shown = short_number(value, parts)
         text += shown if not text or shown.startswith("-") else f" {shown}"
     return text
 
 
-def hundredths(number: str) -> int:
-    """A number in whole hundredths, in which steps add up without an error."""
-    return round(100 * float(number))
+def whole(number: str, parts: int = CURVES) -> int:
+    """A number in whole parts, in which steps add up without an error."""
+    return round(parts * float(number))
 
 
-def short_number(hundredths: int) -> str:
-    """`12.5`, `-.05`: a number as short as SVG reads it."""
-    whole, rest = divmod(abs(hundredths), 100)
-    text = f"{whole or ''}{f'.{rest:02}'.rstrip('0') if rest else ''}" or "0"
-    return f"-{text}" if hundredths < 0 else text
+@lru_cache(maxsize=8192)
+def short_number(value: int, parts: int = CURVES) -> str:
+    """`12.5`, `-.05`: so many parts as short as SVG reads them."""
+    before, behind = divmod(abs(value), parts)
+    digits = len(str(parts)) - 1
+    text = f"{before or ''}{f'.{behind:0{digits}}'.rstrip('0') if behind else ''}" or "0"
+    return f"-{text}" if value < 0 else text

@@ -1,7 +1,8 @@
 """The same picture in less than half of the bytes: what matplotlib's SVG says more than once.
 
-Coordinates have two decimals (a hundredth of a point), paths go from point to point, ids that
-nothing refers to are gone, and what all children of a group have in common stands at the group.
+Coordinates are rounded to a tenth of a point, those of signs to a hundredth, paths go from point
+to point, ids that nothing refers to are gone, and what all children of a group have in common
+stands at the group.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Set as AbstractSet
 from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape, quoteattr
 
-from campaign.report.drawing.short_paths import hundredths, short_number, short_path
+from campaign.report.drawing.short_paths import CURVES, SIGNS, short_number, short_path, whole
 
 SVG = "http://www.w3.org/2000/svg"
 XLINK = "http://www.w3.org/1999/xlink"
@@ -24,6 +25,8 @@ HEADER = '<?xml version="1.0" encoding="utf-8"?>\n'
 EVERYWHERE = {"stroke-linejoin": "round"}
 """What matplotlib says of all elements in a style sheet, which on a page would be of the page."""
 
+LARGEST_SIGN = 20.0
+"""Points from its middle to its ends; what a band is drawn from lies farther away."""
 OF_TEXT = frozenset({"font-size", "font-family", "font-weight", "font-style", "text-anchor"})
 INHERITED = OF_TEXT | {
     "fill",
@@ -54,8 +57,10 @@ def slim(svg: str) -> str:
     definitions.extend(each for each in defined if each.tag != _tag("style"))
     page = Element(_tag("g"))
     page.extend(_without_defs(root))
-    for element in (*page.iter(), *definitions.iter()):
-        _shorten(element)
+    for element in page.iter():
+        _shorten(element, CURVES)
+    for element in definitions.iter():
+        _shorten(element, SIGNS if _is_sign(element) else CURVES)
     _prune(page)
     _merge(page)
     told = _tell_definitions(page, definitions)
@@ -88,19 +93,25 @@ def _css(style: Style) -> str:
     return ";".join(f"{name}:{value}" for name, value in sorted(style.items()))
 
 
-def _shorten(element: Element) -> None:
-    """Two decimals, paths from point to point, no turns by nothing."""
+def _shorten(element: Element, parts: int) -> None:
+    """So many parts of a point, paths from point to point, no turns by nothing."""
     if "d" in element.attrib:
-        element.set("d", short_path(element.attrib["d"]))
+        element.set("d", short_path(element.attrib["d"], parts))
     for name in _ROUNDED:
         if re.fullmatch(r"-?[\d.]+", element.get(name, "")):
-            element.set(name, short_number(hundredths(element.attrib[name])))
+            element.set(name, short_number(whole(element.attrib[name], parts), parts))
     turned = re.sub(r"rotate\(-?0(?:\.0*)?(?: [^)]*)?\)", "", element.get("transform", "")).strip()
     if "scale" not in turned and "matrix" not in turned:
-        turned = re.sub(r"-?\d*\.\d+", lambda m: short_number(hundredths(m[0])), turned)
+        turned = re.sub(r"-?\d*\.\d+", lambda m: short_number(whole(m[0], parts), parts), turned)
     _set(element, "transform", turned)
     if "style" in element.attrib:
         element.set("style", _css(_style(element)))
+
+
+def _is_sign(defined: Element) -> bool:
+    """Whether it is one of the small things that stand in many places, and no band."""
+    numbers = map(float, re.findall(r"-?\d+(?:\.\d+)?", defined.get("d", "")))
+    return all(abs(number) <= LARGEST_SIGN for number in numbers)
 
 
 def _set(element: Element, name: str, value: str) -> None:

@@ -246,8 +246,9 @@ def _curve(curve: result.Curve) -> data.Curve:
     def shortened(values: Any) -> Any:
         if values is None:
             return None
-        shown = np.asarray(values, dtype=float)[chosen]
-        return tuple(plain(float(f"{each:.{DIGITS}g}")) for each in shown)
+        shown = np.asarray(values, dtype=float)[chosen].tolist()
+        rounded = (float(f"{each:.{DIGITS}g}") for each in shown)
+        return tuple(each if math.isfinite(each) else None for each in rounded)
 
     return data.Curve(
         label=curve.label,

@@ -10,13 +10,14 @@ from shlex import quote
 from typing import Any
 
 from campaign.access.analysis import AnalysedTest, one_line
+from campaign.axis_kind import speaking_of
 from campaign.published.scoreboard import Scoreboard, to_csv
 from campaign.published.values import PublishedTable
 from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
-from campaign.report.content.symbols import SYMBOLS, Symbol
+from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.strips import draw_strips
@@ -161,6 +162,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
         shown,
         problems,
         scored_tables(scoreboard, document.published, places),
+        symbols_for(test.sides for test in document.tests),
     )
 
 
@@ -243,6 +245,17 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
 
 
 def _section(
+    place: int,
+    maker: _Maker,
+    scoreboard: Scoreboard,
+    published: Sequence[PublishedTable],
+    truth: Table | None,
+) -> Section:
+    with speaking_of(maker.test.sides):
+        return _section_of_axis(place, maker, scoreboard, published, truth)
+
+
+def _section_of_axis(
     place: int,
     maker: _Maker,
     scoreboard: Scoreboard,

@@ -10,7 +10,6 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from campaign.archive.layout.story import read_lines
 from campaign.archive.reading.damage_words import in_words
 from campaign.channels import RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.identification.relative_rate import relative_rate
@@ -75,7 +74,7 @@ def trial_pages(
         templates: `trial.html` is filled.
     """
     document = layout.document
-    run, story = document.run, read_lines(document.run.journal.encode())
+    run, story = document.run, document.run.story
     there = {archived.trial.number: archived for archived in run.trials}
     tests = {test.name: test for test in document.tests}
     anchors = {section.test.name: section.anchor for section in layout.sections}
@@ -157,6 +156,9 @@ def legible(recording: Recording, channel: Channel) -> tuple[Array, str]:
     seen = relative_rate(samples, angle, None, held, step, FINEST * largest, longest)
     if not seen.window:
         return samples, ""
-    how = "mean of" if angle is None else "slope of the angle over"
+    how = "mean of"
+    if angle is not None:
+        linear = recording.channels[RELATIVE_ANGLE].unit == "m"
+        how = f"slope of the {'position' if linear else 'angle'} over"
     why = "filtered, for its counts are coarse"
     return seen.values, f"{why}: {how} {number(1e3 * seen.window, 3)} ms"
