@@ -217,7 +217,7 @@ def test_kinds_go_down_to_the_last_table(capsys):
     integral = {
         row[1]: row[3].partition(":")[0] for row in rows if row[0].endswith("rate.integral")
     }
-    assert integral == {"1/s": "With form = ideal", "A/rad": "With form = parallel"}
+    assert integral == {"1/s": "With form = ideal", "A/rad or A/m": "With form = parallel"}
     names = [row[0] for row in rows]
     assert names.count("controller.rate.proportional") == 1  # both forms have it
     assert "friction.NAME.bristle_stiffness" in names

@@ -18,6 +18,7 @@ from campaign.cli.parameters import (
     BackendOption,
     ClearStopOption,
     FromOption,
+    HandoverOption,
     JsonOption,
     LargeOption,
     OnlyOption,
@@ -76,6 +77,7 @@ def plan(
     results: ResultsOption = RESULTS,
     port: PortOption = None,
     source: FromOption = None,
+    handover: HandoverOption = None,
     allow_large: LargeOption = False,
     truth: TruthOption = "",
 ) -> None:
@@ -83,7 +85,7 @@ def plan(
     from campaign.cli.plan import show_plan
     from campaign.cli.prepare import Request, short_settings
 
-    settings = (*(changes or ()), *short_settings(port, source, results))
+    settings = (*(changes or ()), *short_settings(port, source, results, handover))
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
     raise typer.Exit(show_plan(request, results, as_json=as_json))
 
@@ -99,6 +101,7 @@ def run(
     report: ReportOption = False,
     port: PortOption = None,
     source: FromOption = None,
+    handover: HandoverOption = None,
     operator: Annotated[
         str, typer.Option("--operator", metavar="NAME", help="Who is responsible for the run.")
     ] = "",
@@ -134,7 +137,7 @@ def run(
         from campaign.cli.run import Remarks, run_protocol
         from campaign.cli.step_check import SETTING
 
-    settings = (*(changes or ()), *short_settings(port, source, results))
+    settings = (*(changes or ()), *short_settings(port, source, results, handover))
     settings += (SETTING,) if check_step else ()
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
     remarks = Remarks(operator, note, tuple(tags or ()))
@@ -199,6 +202,49 @@ def rerun(
     from campaign.cli.rerun import rerun_trial
 
     raise typer.Exit(rerun_trial(run, trial, results))
+
+
+@app.command("import")
+def import_(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MAPPING",
+            help="A TOML file that says what columns are and which files are which trials; with "
+            "--guess the recordings themselves.",
+            show_default=False,
+        ),
+    ],
+    results: ResultsOption = RESULTS,
+    only: OnlyOption = None,
+    changes: SetOption = None,
+    workers: WorkersOption = None,
+    report: ReportOption = False,
+    guess: Annotated[
+        bool,
+        typer.Option("--guess", help="Print a first mapping of these files, to be corrected."),
+    ] = False,
+    sign: SignOption = None,
+) -> None:
+    """Make a run of recordings from elsewhere; the archive's path is the last line of the output.
+
+    A mapping is a protocol whose tests were executed by another program: docs/import.md.
+    """
+    from campaign.cli.import_command import guess_mapping, import_recordings
+
+    if guess:
+        raise typer.Exit(guess_mapping([Path(each) for each in files]))
+    raise typer.Exit(
+        import_recordings(
+            files,
+            results,
+            only=tuple(only or ()),
+            changes=tuple(changes or ()),
+            workers=workers,
+            report=report,
+            sign=sign,
+        )
+    )
 
 
 @app.command()

@@ -8,12 +8,14 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 from campaign.backends.interface import BackendKind
 from campaign.cli.output import print_note
 from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
+from campaign.options import Options
 from campaign.protocol import PlannedTest
 from campaign.protocol.loop_check import sought_instability
 from campaign.protocol.stages import most_of
@@ -23,6 +25,7 @@ GLANCE = 0.2
 """s between two looks at the stop switch while nobody types."""
 
 ASSUMED = "assumed done (--yes)"
+ON_ITS_PAGE = "told on the page of the trial"
 
 
 class NotStartedError(CampaignError):
@@ -61,6 +64,13 @@ def allow_motion(
         _must_agree("Is the bench clear, and may it move? Type yes to begin: ")
 
 
+def say_by_hand(options: Options) -> None:
+    """Where the person at the rig reads what to do, of a backend whose trials are handed out."""
+    folder = getattr(options, "folder", "")
+    if folder:
+        print_note(f"for the person at the rig: {Path(folder) / 'index.html'}")
+
+
 def _must_agree(question: str) -> None:
     print_note(question)
     if sys.stdin.readline().strip().lower() not in ("yes", "y"):
@@ -76,7 +86,7 @@ def motion_summary(
     limits = {test.name: test.closest for test in tests}
     for name, count in Counter(trial.test for trial in trials).items():
         worst = max(limits.get(name, ()), key=lambda use: use.margin.fraction, default=None)
-        share = f", {worst.margin.fraction:.0%} of the {worst.margin.limit} limit" if worst else ""
+        share = f", {worst.margin.fraction:.0%} of the {worst.margin.called} limit" if worst else ""
         lines.append(f"  {name}: {count} trials{share}")
     for test in tests:
         if test.stages and test.name in {trial.test for trial in trials}:
@@ -89,9 +99,13 @@ def motion_summary(
 
 def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance:
     """Who is asked during a run on this backend, and whether its pauses are waited for."""
-    if not kind.live:
+    if not (kind.live or kind.by_hand):
         return UNATTENDED
-    return Attendance(AssumingOperator() if yes else ConsoleOperator(display.hidden), wait_unless)
+    if yes:
+        return Attendance(AssumingOperator(), wait_unless)
+    if kind.by_hand and not somebody_is_there():
+        return Attendance(ReadingOperator(), wait_unless)
+    return Attendance(ConsoleOperator(display.hidden), wait_unless)
 
 
 class AssumingOperator:
@@ -101,6 +115,14 @@ class AssumingOperator:
         """Shows the step, and takes it for done."""
         print_note(f"before {trial.name}: {step}: {ASSUMED}")
         return ASSUMED
+
+
+class ReadingOperator:
+    """Who executes trials elsewhere, and reads there what to do; nobody is at this terminal."""
+
+    def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
+        """Nobody is asked here."""
+        return ON_ITS_PAGE
 
 
 class ConsoleOperator:

@@ -23,7 +23,9 @@ from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
 from campaign.identification.multi_start import Display, Progress, agreeing
 from campaign.interrupts import unwinding
+from campaign.physics.complete import PURPOSES
 from campaign.protocol import Protocol, load_protocol
+from campaign.protocol.lacking import check_benches
 from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
 
@@ -38,6 +40,7 @@ def calibrate_protocol(
     """Fit, and write the result and the bench; the result's path is the last line of output."""
     path = find_protocol(name)
     protocol = load_protocol(path, experiments(), shipped=protocols_folder())
+    check_benches(protocol, tuple(PURPOSES), "a calibration, which simulates,")
     problem = make_problem(protocol, _published(protocol))
     for warning in problem.warnings:
         print_note(warning, style="yellow")

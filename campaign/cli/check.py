@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from campaign.cli.output import print_json, print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import Fact, facts_of
+from campaign.physics.complete import PURPOSES, CompleteBench, complete, lacking
 from campaign.physics.linear_friction import Regime
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import loops_of
@@ -56,20 +57,22 @@ class CheckedLoop:
 
 
 def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode:
-    """Print loops and facts of a bench and draw its Bode picture.
+    """Print loops and facts of a bench and draw its Bode picture; of what is known of it.
 
     Raises UsageError when the picture cannot be written, and what `load_bench` raises.
     """
     bench = load_bench(written)
     picture = output or Path(f"{Path(written).stem}-check.svg")
-    loops, facts = list(loops_checked(bench)), facts_of(bench)
-    _write_picture(bench, picture)
+    unknown = lacking(bench)
+    loops, facts = [] if unknown else list(loops_checked(bench)), facts_of(bench)
+    if not unknown:
+        _write_picture(complete(bench), picture)
     if as_json:
-        tree = {"bench": bench.name, **_tree(loops, facts), "picture": str(picture)}
-        print_json(tree)
+        drawn = {"lacking": list(unknown)} if unknown else {"picture": str(picture)}
+        print_json({"bench": bench.name, **_tree(loops, facts), **drawn})
     else:
         _print(bench, loops, facts)
-        print_line(f"Bode picture: {picture}")
+        print_line(_no_loops(unknown) if unknown else f"Bode picture: {picture}")
     unstable = [loop for loop in loops if loop.verdict == "UNSTABLE"]
     if unstable:
         one = unstable[0]
@@ -79,6 +82,12 @@ def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode
             "red",
         )
     return ExitCode.LIMIT_OR_FAULT if unstable else ExitCode.DONE
+
+
+def _no_loops(unknown: Sequence[str]) -> str:
+    """Why the loops of a bench are not told, and what would have to be known of it."""
+    what = "; ".join(f"{path} ({PURPOSES[path]})" for path in unknown)
+    return f"no loops and no Bode picture: the bench does not say {what}"
 
 
 def loops_checked(bench: Bench) -> Iterator[CheckedLoop]:
@@ -96,7 +105,7 @@ def loops_checked(bench: Bench) -> Iterator[CheckedLoop]:
                     yield CheckedLoop(name, mode, regime, None, str(found))
 
 
-def _write_picture(bench: Bench, path: Path) -> None:
+def _write_picture(bench: CompleteBench, path: Path) -> None:
     from campaign.report.drawing.bode import bode_png, bode_svg
 
     suffix = path.suffix.lower()
@@ -115,8 +124,11 @@ def _write_picture(bench: Bench, path: Path) -> None:
 def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:
     print_line(f"{bench.name}{f': {bench.description}' if bench.description else ''}")
     print_line()
-    print_table(HEADINGS, [_loop_row(loop) for loop in loops])
-    print_line()
+    if loops:
+        print_table(HEADINGS, [_loop_row(loop) for loop in loops])
+        print_line()
+    if not facts:
+        return
     headings = ("what against what", "is", "of", "share", "verdict", "what to do")
     print_table(headings, [_fact_row(fact) for fact in facts])
     print_line()

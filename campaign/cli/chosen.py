@@ -24,6 +24,7 @@ def as_toml(kind: str, name: str, value: Any) -> str:
     """An option's value (SI) as a protocol writes it; of a long list the ends."""
     known = {info.name: info.quantity for info in describe(experiments()[kind].options)}
     quantity = known.get(name)
+    quantity = quantity and quantity.here
     if isinstance(value, Sequence) and not isinstance(value, str):
         return _listed([_one(item, quantity) for item in value])
     return _one(value, quantity)

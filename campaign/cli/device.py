@@ -20,7 +20,7 @@ from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
 from campaign.errors import ExitCode, UsageError
 from campaign.interrupts import unwinding
-from campaign.protocol.bench_file import load_bench
+from campaign.protocol.bench_file import simulable
 
 ANY_PORT = "127.0.0.1:0"
 
@@ -44,7 +44,7 @@ def run_device(
     pace = _speed(speed)
     wanted = parse_faults(faults)
     with _latch_file(latch) as file, closing(_log(log)) as noting:
-        setup = Setup(load_bench(bench), pace, log=noting, latch_file=file)
+        setup = Setup(simulable(bench), pace, log=noting, latch_file=file)
         return _serve(setup, tcp, pty, heartbeat_timeout, wanted, fault_seed)
 
 

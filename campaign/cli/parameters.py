@@ -127,6 +127,16 @@ FromOption = Annotated[
         show_default=False,
     ),
 ]
+HandoverOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--handover",
+        metavar="DIR",
+        help="Where trials are handed out, with --backend files; short for "
+        "--set backend.folder=DIR.",
+        show_default=False,
+    ),
+]
 TruthOption = Annotated[
     str,
     typer.Option(

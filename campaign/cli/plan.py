@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
+from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of
 from campaign.cli.chosen import chosen_lines
 from campaign.cli.cost import Cost, cost_lines, costs
 from campaign.cli.damage import archive_of, say_damaged
@@ -159,7 +160,7 @@ def _response(response: Response) -> str:
 
 def _row(test: PlannedTest) -> tuple[str, ...]:
     closest = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)[:2]
-    limits = ", ".join(f"{use.margin.limit} {use.margin.fraction:.0%}" for use in closest)
+    limits = ", ".join(f"{use.margin.called} {use.margin.fraction:.0%}" for use in closest)
     trials = str(len(test.numbers))
     return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
 
@@ -188,16 +189,17 @@ def _print_details(
     for use in sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True):
         value, bound = in_display_units(use.margin)
         broken = "  BROKEN" if use.margin.broken else ""
-        share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
+        share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
-    _print_chosen(test)
+    with speaking_of(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
+        _print_chosen(test)
     for loss in losses:
         print_line(f"  without {loss['channel']}: no {loss['no']}")
     if test.loops:
         print_line(f"  loop: {in_words(test.loops[0])}{_sought(test)}")
     for use in test.coarse:
         broken = "  BROKEN" if use.margin.broken else ""
-        share = f"{use.margin.fraction:4.0%} of the {use.margin.limit} limit"
+        share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
         print_line(
             f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
         )

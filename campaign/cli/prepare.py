@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,18 @@ from campaign.backends import backends
 from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
 from campaign.channels import explained, missing
 from campaign.cli.damage import archive_of
-from campaign.errors import ArchiveError, UsageError
+from campaign.errors import ArchiveError, ProtocolError, UsageError
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
+from campaign.protocol.lacking import check_benches
 from campaign.protocol.overrides import parse_overrides
+from campaign.protocol.schema import Protocol
 from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
 from campaign.trial import Tree, Trial
+
+IMPORT = "import"
+"""The backend that serves what was recorded elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +78,44 @@ def prepare(request: Request) -> Prepared:
         shipped=protocols_folder(),
         truth=request.truth,
     )
-    plan = make_plan(
-        protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
-    )
+    _check_recordings(protocol, kind)  # before what only a simulation asks for
+    check_benches(protocol, kind.needs, f"the backend {kind.name!r}", request.only)
+    options = _with_mapping(options, protocol)
+    with _as_executed(protocol, kind) as protocol:
+        plan = make_plan(
+            protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
+        )
     return Prepared(path, plan, kind, options)
+
+
+def _with_mapping(options: Options, protocol: Protocol) -> Options:
+    """A backend that reads files by a mapping has that of the protocol, unless it names one."""
+    if protocol.columns and getattr(options, "mapping", None) == "":
+        return options.model_copy(update={"mapping": str(protocol.path.resolve())})
+    return options
+
+
+def _as_executed(protocol: Protocol, kind: BackendKind) -> AbstractContextManager[Protocol]:
+    """The protocol with the recordings that its tests have in place of trials, if they have any."""
+    if kind.name == IMPORT:
+        from campaign.importing.recorded_tests import with_recordings
+
+        return with_recordings(protocol)
+    return nullcontext(protocol)
+
+
+def _check_recordings(protocol: Protocol, kind: BackendKind) -> None:
+    """Raise ProtocolError where a test has recordings and the backend executes trials."""
+    if kind.name == IMPORT:
+        return
+    for test in protocol.tests:
+        if test.entry.recording:
+            message = (
+                f"the test '{test.entry.name}' was executed elsewhere, and these are its "
+                f"recordings: `campaign import {protocol.path}` makes a run of them, `campaign "
+                f"plan {protocol.path} --backend {IMPORT}` shows what it would hold"
+            )
+            raise ProtocolError([test.origin.problem(("recording",), "key", message)])
 
 
 def open_backend(
@@ -98,6 +138,11 @@ def open_backend(
         raise UsageError(
             f"the test {named[0].test!r} has a truth, and only a simulation can have one that is "
             f"chosen: leave it out, or take another backend than {kind.name!r}"
+        )
+    if kind.source is not Source.RECORDING and (named := [t for t in trials if t.recording]):
+        raise UsageError(
+            f"{named[0].name} ({named[0].label}) was executed elsewhere, and nothing here can "
+            "repeat it: `campaign import` reads its files again, `--backend replay` its archive"
         )
     source = archive_of(backend)
     refusal = ArchiveError if source is not None and source.damaged else UsageError
@@ -149,9 +194,18 @@ def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, .
     return {test: tuple(names) for test, names in found.items()}
 
 
-def short_settings(port: str | None, source: str | None, results: Path) -> tuple[str, ...]:
-    """`--port` and `--from` as the `--set` they are short for; a run is looked for in `results`."""
-    settings = {"port": port, "run": str(find_run(results, source)) if source else None}
+def short_settings(
+    port: str | None, source: str | None, results: Path, handover: Path | None = None
+) -> tuple[str, ...]:
+    """`--port`, `--from`, `--handover` as the `--set` they are short for.
+
+    A run is looked for in `results`; a folder is where it is from here, also at a resume.
+    """
+    settings = {
+        "port": port,
+        "run": str(find_run(results, source)) if source else None,
+        "folder": str(handover.resolve()) if handover else None,
+    }
     return tuple(
         f"backend.{name}={json.dumps(value, ensure_ascii=False)}"  # a TOML string, too
         for name, value in settings.items()

@@ -29,6 +29,7 @@ from campaign.execution.comparison import changes, differences
 from campaign.execution.written_order import in_written_order
 from campaign.physics import truth
 from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate
 from campaign.physics.engine_version import (
     DRY_ERRORS,
     DRY_TORQUE_ERRORS,
@@ -149,7 +150,7 @@ def _error(engine: int, channel: str, *, dry: bool) -> float:
 def _is_noisy(bench: Bench) -> bool:
     sensors = bench.sensors
     each = (sensors.gyro, sensors.encoder, sensors.resolver, sensors.current)
-    return bench.controller.sample_rate is not None and any(sensor.noise > 0 for sensor in each)
+    return control_rate(bench) is not None and any(sensor.noise > 0 for sensor in each)
 
 
 def _header(

@@ -12,7 +12,7 @@ from campaign.archive.layout.header import PARTIAL
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
-from campaign.cli.ask import allow_motion
+from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
@@ -93,6 +93,8 @@ def resume_run(
         backend = open_backend(remade.kind, remade.options, left, remade.truths)
         wait_until_compiled(compiling)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
+    if remade.kind.by_hand:
+        say_by_hand(remade.options)
     allow_motion(remade.kind, left, remade.tests, yes=yes)
 
     def open_archive() -> RunWriter:

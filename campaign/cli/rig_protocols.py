@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of, words_here
 from campaign.cli.chosen import chosen_lines
 from campaign.cli.output import print_line, print_note
 from campaign.cli.plan import in_short
@@ -101,7 +102,8 @@ def _check_fit(test: _Test, bench: Bench) -> None:
     experiment = experiments()[test.kind]
     try:
         if experiment.fit is not None:
-            experiment.fit(experiment.options(), bench)
+            with speaking_of(bench.sides):
+                experiment.fit(experiment.options(), bench)
     except (ValueError, ArithmeticError) as error:
         raise UsageError(f"{bench.name}: no {test.name} fits it: {error}") from None
 
@@ -128,6 +130,11 @@ def _stabilize(bench: Bench) -> _Test:
 
 
 def _page(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
+    with speaking_of(bench.sides):
+        return words_here(_text(bench, name, what, tests))
+
+
+def _text(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
     head = (
         f"# {what} {bench.name}. Values that are not written follow from the bench file: its\n"
         "# limits, inertia, sensors, loops, and its friction as far as it is described. Write\n"
@@ -151,7 +158,9 @@ def _with_reasons(path: Path) -> None:
         return
     text = path.read_text(encoding="utf-8")
     for test in plan.tests:
-        reasons = "".join(_comments(chosen_lines(test)))
+        trials = [plan.trials[number - 1] for number in test.numbers[:1]]
+        with speaking_of(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
+            reasons = "".join(_comments(chosen_lines(test)))
         mark = f'name = "{test.name}"\n'
         text = text.replace(f"[[test]]\n{mark}", f"{reasons}[[test]]\n{mark}")
     path.write_text(text, encoding="utf-8", newline="\n")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.archive.layout.header import PARTIAL, Truth
-from campaign.cli.ask import allow_motion
+from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Prepared, Request, prepare
@@ -69,6 +69,8 @@ def run_protocol(
         with timing.span(Work.COMPILING):
             wait_until_compiled(compiling)
         timing.add(Work.COMPILING, compiling.processor if compiling else 0.0)
+    if prepared.kind.by_hand:
+        say_by_hand(prepared.options)
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
     with reserved_name(results, prepared.path.stem, began) as lock:

@@ -13,7 +13,7 @@ from pathlib import Path
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialsFollowed
-from campaign.backends.interface import Backend, BackendKind, StoppedOutside, Timed
+from campaign.backends.interface import Backend, BackendKind, Introduced, Timed
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
@@ -127,7 +127,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     outcome: RunOutcome | None = None
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
-    if isinstance(session.backend, StoppedOutside):
+    if isinstance(session.backend, Introduced):
         session.backend.introduce(session.folder.stem)
     if isinstance(session.backend, Timed):
         session.backend.timing = session.timing

@@ -18,7 +18,7 @@ from campaign.archive.layout.journal import (
 )
 from campaign.archive.layout.record import plain
 from campaign.archive.layout.signature_file import has_signature, signature_path
-from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.layout.story import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table
@@ -36,7 +36,7 @@ def show_archive(
     `metrics`: also what was measured in each recording when it was executed.
     """
     run = open_run(find_run(results, name))
-    story = read_lines(run.journal.encode())
+    story = run.story
     if as_json:
         print_json(_tree(run, story))
     else:

@@ -60,7 +60,10 @@ def test_a_measured_limit_ends_the_trial_and_the_others_go_on(tmp_path: Path):
     [
         (("run", "nothing.toml"), "no such file"),
         (("run", "quickstrat"), "did you mean 'quickstart'"),
-        (("run", "quickstart", "--backend", "moon"), "there are replay, serial, sim"),
+        (
+            ("run", "quickstart", "--backend", "moon"),
+            "there are files, import, replay, serial, sim",
+        ),
         (("run", "quickstart", "--only", "nix"), "velocity-map"),
         (("run", "quickstart", "--set", "nonsense"), "--set"),
         (("run", "quickstart", "--set", "backend.longest_step=1"), "has no unit"),

@@ -48,6 +48,18 @@ def test_a_bench_is_stated_anew_after_a_change(bench: Path) -> None:
     assert stated.split()[1] in other[0]
 
 
+@pytest.mark.parametrize("kind", ["rotary", "linear"])
+def test_a_bench_that_says_its_schema_and_nothing_is_known_of(tmp_path: Path, kind: str) -> None:
+    bench = tmp_path / "rig.toml"
+    text = f'schema = 3\nname = "Rig"\n\n[axis]\nname = "joint"\nkind = "{kind}"\n'
+    bench.write_text(text, encoding="utf-8")
+    campaign(tmp_path, "fingerprint", "rig.toml")
+    after = bench.read_text(encoding="utf-8")
+    assert "[known]\nfingerprint = " in after
+    assert [line for line in text.splitlines() if line not in after.splitlines()] == []
+    assert "altered" not in campaign(tmp_path, "fingerprint", "rig.toml", "--check").out
+
+
 def test_a_bench_that_is_wrong_is_not_written(bench: Path) -> None:
     text = bench.read_text(encoding="utf-8").replace('"5.8"', '"5.88"')
     bench.write_text(text, encoding="utf-8")

@@ -1,0 +1,39 @@
+"""`campaign import`: recordings from elsewhere become a run like any other."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from campaign.cli.prepare import IMPORT, Request
+from campaign.cli.run import run_protocol
+from campaign.errors import ExitCode, UsageError
+
+
+def import_recordings(
+    files: Sequence[str],
+    results: Path,
+    *,
+    only: tuple[str, ...],
+    changes: tuple[str, ...],
+    workers: int | None,
+    report: bool,
+    sign: Path | None,
+) -> ExitCode:
+    """Archive what a mapping describes. Raises what a run raises."""
+    if len(files) != 1:
+        raise UsageError(
+            f"one mapping at a time, not {len(files)} files; `campaign import --guess FILE...` "
+            "prints a first mapping of recordings"
+        )
+    request = Request(files[0], only, changes, IMPORT)
+    return run_protocol(request, results, workers=workers, report=report, sign=sign)
+
+
+def guess_mapping(files: Sequence[Path]) -> ExitCode:
+    """Print a first mapping of files; what is doubtful is marked in it."""
+    from campaign.importing.guess import guess, mapping_text
+
+    sys.stdout.write(mapping_text(guess(files)))
+    return ExitCode.DONE
