@@ -36,7 +36,10 @@ from campaign.importing.reader import clock_times
 from campaign.unit_grammar import parse_unit
 
 Key = tuple[str | int, ...]
-TIMELESS = "nothing tells when its rows were sampled; give the columns a 'time'"
+TIMELESS = (
+    "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
+    'sample_rate = "1 kHz"'
+)
 
 
 class MappingError(ValueError):
@@ -335,6 +338,8 @@ class _Finding:
         self, name: str, channel: ChannelColumn, at: Cells, even: EvenClock, remarks: list[str]
     ) -> Made:
         shift = round(channel.delay * even.rate)
+        if channel.filter:
+            remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
         if shift:
             remarks.append(f"{name} is put back by {shift} samples, {shift / even.rate:.6g} s")
         try:

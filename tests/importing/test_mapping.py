@@ -127,6 +127,14 @@ def test_a_delay_is_put_back_by_whole_samples(tmp_path: Path):
     assert recording["drive_torque"][0] == pytest.approx(-2.5 * 0.5)
 
 
+def test_a_filter_of_the_drive_is_told(tmp_path: Path):
+    filtered = COLUMNS.replace("sign = -1", 'sign = -1\nfilter = "first order, 8 ms"')
+    (trial,) = planned(tmp_path, filtered + TEST + ENTRY).trials
+    recording, _ = served(trial)
+    said = [event.text for event in recording.events]
+    assert "drive_torque was filtered before it was recorded: first order, 8 ms" in said
+
+
 def test_conditions_are_numbers_with_units_or_words(tmp_path: Path):
     line = 'conditions = { load = "10 N", oil = "dry", speed = "90 deg/s" }'
     (trial,) = planned(tmp_path, COLUMNS + TEST + ENTRY + line).trials

@@ -8,6 +8,7 @@ from typing import Any
 
 from campaign.access.analysis import AnalysedTest
 from campaign.experiments.interface import options_of
+from campaign.report.content.recorded_from import recorded_from
 from campaign.report.content.written_units import TestUnits
 from campaign.text import path_words
 from campaign.trial import Role, canonical_json
@@ -24,6 +25,7 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
         )
     if test.source:
         yield "Samples from", test.source
+    yield from recorded_from(test)
     count = f"{len(test.trials)} executed"
     yield "Trials", count + (f", {len(test.failed)} not completed" if test.failed else "")
     points = _points(test)

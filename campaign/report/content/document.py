@@ -140,8 +140,10 @@ def _measured_by(trials: Iterable[ArchivedTrial]) -> str:
 
 def _command_words(run: RunReader) -> Iterator[str]:
     header = run.header
-    yield from ("campaign", "run", f"{header.protocol_name or 'protocol'}.toml")
-    if header.backend and header.backend != "sim":
+    imported = header.backend == "import"
+    command = "import" if imported else "run"
+    yield from ("campaign", command, f"{header.protocol_name or 'protocol'}.toml")
+    if header.backend and header.backend != "sim" and not imported:
         yield from ("--backend", header.backend)
     for test in header.only:
         yield from ("--only", test)
