@@ -36,13 +36,15 @@ class FrictionLine:
         coulomb: extrapolated to standstill (N m).
         viscous: slope (N m s/rad).
         covariance: of the two, shape (2, 2).
-        freedom: stretches less two.
+        stretches: how many it is of.
+        freedom: of their scatter: less, where neighbours are alike.
     """
 
     coulomb: Estimate
     viscous: Estimate
     covariance: Array
-    freedom: int
+    stretches: int
+    freedom: float
 
     def band(self, speed: Array) -> tuple[Array, Array]:
         """Low and high of the line's 95 % band at speeds, each shape (n,)."""
@@ -70,8 +72,7 @@ def friction_line(speed: Array, torque: Array) -> FrictionLine:
         raise ValueError("all steady stretches are about as fast, which shows no slope")
     columns = np.column_stack([np.ones(len(speed)), speed])
     found, *_ = np.linalg.lstsq(columns, torque, rcond=None)
-    freedom = len(speed) - 2
-    covariance = _covariance(columns, torque - columns @ found)
+    covariance, freedom = _covariance(columns, torque - columns @ found)
     errors = np.sqrt(np.diag(covariance))
     coulomb, viscous = (
         with_error(name, float(value), unit, float(error), freedom, METHOD)
@@ -79,7 +80,7 @@ def friction_line(speed: Array, torque: Array) -> FrictionLine:
             ("coulomb_torque", "viscous_friction"), ("N m", "N m s/rad"), found, errors, strict=True
         )
     )
-    return FrictionLine(coulomb, viscous, covariance, freedom)
+    return FrictionLine(coulomb, viscous, covariance, len(speed), freedom)
 
 
 def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:
@@ -88,8 +89,8 @@ def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:
     if count < 2:
         reason = "a single steady stretch: others would show how it scatters"
         return Estimate.without_interval(name, mean, unit, reason)
-    covariance = _covariance(np.ones((count, 1)), values - mean)
-    return with_error(name, mean, unit, float(np.sqrt(covariance[0, 0])), count - 1, OF_MEAN)
+    covariance, freedom = _covariance(np.ones((count, 1)), values - mean)
+    return with_error(name, mean, unit, float(np.sqrt(covariance[0, 0])), freedom, OF_MEAN)
 
 
 def in_order_of_time(speed: Array) -> bool:
@@ -99,8 +100,15 @@ def in_order_of_time(speed: Array) -> bool:
     return bool(abs(np.corrcoef(speed, np.arange(len(speed)))[0, 1]) > IN_ORDER)
 
 
-def _covariance(columns: Array, left: Array) -> Array:
-    """Of least-squares parameters by their residuals in order; zero where nothing is left over."""
+def _covariance(columns: Array, left: Array) -> tuple[Array, float]:
+    """Of least-squares parameters by their residuals in order, and its degrees of freedom.
+
+    Of n values with an AR(1) coefficient r as many as n (1 - r) / (1 + r) are independent; how many
+    there are is all that is known of the scatter. Zero where nothing is left over.
+    """
+    count, parameters = columns.shape
     if float(left @ left) <= np.finfo(float).eps ** 2 * float(np.sum(columns**2)):
-        return np.zeros((columns.shape[1], columns.shape[1]))
-    return errors_of(columns, left).covariance
+        return np.zeros((parameters, parameters)), float(count - parameters)
+    found = errors_of(columns, left)
+    independent = count * (1.0 - found.correlation) / (1.0 + found.correlation)
+    return found.covariance, max(1.0, min(independent, count) - parameters)

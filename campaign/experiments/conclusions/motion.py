@@ -35,15 +35,25 @@ def motion_conclusions(motions: Sequence[Motion]) -> tuple[Conclusion, ...]:
     return tuple(told)
 
 
+def _named(motion: Motion) -> str:
+    """`trial 2 (joint = 2, joints.csv)`: by what was set, and by its file."""
+    told = [f"{name} = {value}" for name, value in motion.place.items()]
+    files = motion.data.trial.recording.get("files")
+    if isinstance(files, list):
+        told += [str(each["name"]) for each in files if isinstance(each, dict)]
+    where = f" ({', '.join(told)})" if told else ""
+    return f"trial {motion.data.trial.number}{where}"
+
+
 def _of_one(motion: Motion, several: bool) -> Iterator[Conclusion]:
-    who = f"trial {motion.data.trial.number}: " if several else ""
+    who = f"{_named(motion)}: " if several else ""
     for direction, line in motion.lines.items():
         yield conclusion(
             f"{who}in the {direction} direction Coulomb friction is ",
             Amount(line.coulomb, "N m"),
             " and viscous friction ",
             Amount(line.viscous, "N m s/rad"),
-            f", from {count(line.freedom + 2, 'steady stretch', 'steady stretches')}",
+            f", from {count(line.stretches, 'steady stretch', 'steady stretches')}",
         )
     if motion.levels:
         told: list[tuple[Part, ...]] = [

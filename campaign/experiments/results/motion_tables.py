@@ -14,8 +14,8 @@ _SUMMARY = (
     Column("duration", "Duration", "s", "s", reason=ONE),
     Column("travel", "Travel", "rad", "deg", reason=ONE),
     Column("top_rate", "Largest rate", "rad/s", "deg/s", reason=ONE),
-    Column("rms_torque", "Drive torque (RMS)", "N m", "N m", reason=ONE),
-    Column("peak_torque", "Largest drive torque", "N m", "N m", reason=ONE),
+    Column("rms_torque", "Torque (RMS)", "N m", "N m", reason=ONE),
+    Column("peak_torque", "Largest torque", "N m", "N m", reason=ONE),
     Column("rms_error", "Tracking error (RMS)", "rad", "mrad", reason=ONE),
     Column("peak_error", "Largest tracking error", "rad", "mrad", reason=ONE),
     Column("stretches", "Steady stretches", exact=True),
@@ -57,7 +57,7 @@ def line_table(motions: Sequence[Motion]) -> Table:
             "direction": direction,
             "coulomb": line.coulomb,
             "viscous": line.viscous,
-            "stretches": line.freedom + 2,
+            "stretches": line.stretches,
         }
         for motion in motions
         for direction, line in motion.lines.items()
