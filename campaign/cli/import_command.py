@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +27,11 @@ def import_recordings(
         raise UsageError(
             f"one mapping at a time, not {len(files)} files; `campaign import --guess FILE...` "
             "prints a first mapping of recordings"
+        )
+    if Path(files[0]).is_file() and Path(files[0]).suffix.lower() != ".toml":
+        raise UsageError(
+            f"{files[0]} is no mapping, which is a .toml file; `campaign import --guess "
+            f"{shlex.quote(files[0])} > mapping.toml` writes a first one"
         )
     request = Request(files[0], only, changes, IMPORT)
     return run_protocol(request, results, workers=workers, report=report, sign=sign)

@@ -176,6 +176,16 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         f"{explained(name)}{f', for {purposes[name]}' if name in purposes else ''}"
         for name in names
     )
+    if kind.name == IMPORT:
+        from campaign.importing.described import Described
+
+        described = Described.model_validate(trial.recording, context={"si": True})
+        there = ", ".join(each.name for each in described.channels)
+        tables = ", ".join(f"[columns.NAME.{name}]" for name in names)
+        return (
+            f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}\n"
+            f"its mapping makes {there}: say by {tables} which column it is"
+        )
     return (
         f"the backend {kind.name!r} does not record what the experiment {trial.kind!r} requires in "
         f"{trial.name} ({trial.label}): {what}\n"

@@ -261,4 +261,10 @@ def _together(*shares: float | None) -> float | None:
 def _mismatch(name: str, entry: ChannelColumn, written: str, what: ChannelInfo) -> str:
     given = f"{written!r} times {entry.times!r}" if entry.times else repr(written)
     constant = "" if entry.times else "; 'times' is for a constant that leads there"
+    other = {"rad": "m", "m": "rad"}
+    turned = {base for base, _ in _unit(written).dimensions} & set(other)
+    wanted = {base for base, _ in _unit(what.unit).dimensions} & set(other)
+    if turned and wanted and turned != wanted and not entry.times:
+        now, then = ("linear", "rotary") if wanted == {"m"} else ("rotary", "linear")
+        constant = f"; the bench's axis is {now}: is it {then} (axis.kind)?"
     return f"{name} is in {what.unit or 'no unit'}, and {given} is no multiple of that{constant}"

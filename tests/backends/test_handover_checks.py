@@ -11,8 +11,11 @@ from campaign.backends.handover.checks import (
     wrong_length,
     wrong_motion,
 )
+from campaign.backends.handover.judging import _until_stopped
+from campaign.backends.handover.returned import Returned
+from campaign.channels import info
 from campaign.signals import Polyline, Sine
-from campaign.trial import Task
+from campaign.trial import Task, Trial
 
 RATE = 500.0
 MOVES = Polyline(
@@ -180,3 +183,34 @@ def test_a_drive_that_is_off_is_not_clipped() -> None:
     """It brakes, and is at exactly zero before and after: that is an extreme, too."""
     torque = np.where((TIME > 1) & (TIME < 4), -6.0 + 0.3 * np.sin(40 * TIME), 0.0)
     assert not clip(torque)
+
+
+def came_back(**series: np.ndarray) -> Returned:
+    """A recording of `TASK`'s rate, of nothing but these channels."""
+    samples = np.array(list(series.values()))
+    count = samples.shape[1]
+    channels = tuple(info(name) for name in series)
+    lost = np.zeros(count, dtype=bool)
+    return Returned(channels, np.arange(count) / RATE, samples, lost, RATE, count / RATE, ())
+
+
+def test_noise_of_a_differenced_position_ends_no_trial() -> None:
+    """The rate that ends a trial is looked at in its mean, and by the gyro of a hull at rest."""
+    trial = Trial(
+        number=1,
+        test="ramp",
+        kind="breakaway",
+        seed=1,
+        bench={},
+        task=TASK.model_copy(update={"stop_rate": 0.02}),
+    )
+    rng = np.random.default_rng(5)
+    sliding = np.where(TIME > 3.0, 0.1, 0.0)
+    noisy = sliding + 0.02 * rng.normal(size=len(TIME))
+    for series in ({"relative_rate": noisy}, {"gyro_rate": sliding, "relative_rate": 5 * noisy}):
+        cut, stopped = _until_stopped(trial, came_back(**series))
+        assert stopped
+        assert cut.time[-1] == pytest.approx(3.0, abs=0.1)
+    quiet, stopped = _until_stopped(trial, came_back(gyro_rate=0.0 * sliding, relative_rate=noisy))
+    assert not stopped
+    assert len(quiet.time) == len(TIME)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign.cli.import_command import import_recordings
 from campaign.cli.prepare import Request, prepare
 from campaign.errors import ProtocolError, UsageError
 from campaign.importing import defects
@@ -231,3 +232,38 @@ def test_windows_that_no_analysis_looks_for_are_refused(tmp_path: Path, kind: st
     told = refused(tmp_path, COLUMNS + TEST.replace("motion", kind) + ENTRY + line)
     assert "m.toml:20:13: " in told
     assert f"looks for a window 'rampp'; allowed are {known}" in told
+
+
+def test_what_a_person_mistakes_most_is_told_how_to_put_right(tmp_path):
+    """Recordings for a mapping, an axis of the other kind, a channel that nobody mapped."""
+    (tmp_path / "a.csv").write_text("t,x,m\n" + "\n".join(f"{k},{k},1" for k in range(50)))
+    with pytest.raises(UsageError, match="campaign import --guess"):
+        import_recordings(
+            [str(tmp_path / "a.csv")],
+            tmp_path / "r",
+            only=(),
+            changes=(),
+            workers=1,
+            report=False,
+            sign=None,
+        )
+    mapping = """
+[columns.c.time]
+column = "t"
+unit = "ms"
+[columns.c.relative_angle]
+column = "x"
+unit = "mm"
+[[test]]
+name = "any"
+kind = "motion"
+bench = "platform"
+[[test.recording]]
+file = "a.csv"
+"""
+    (tmp_path / "m.toml").write_text(mapping)
+    with pytest.raises(UsageError, match=r"axis is rotary: is it linear \(axis.kind\)"):
+        prepare(Request(str(tmp_path / "m.toml"), backend="import"))
+    (tmp_path / "m.toml").write_text(mapping.replace('"mm"', '"mrad"'))
+    with pytest.raises(UsageError, match=r"\[columns.NAME.drive_torque\] which column"):
+        prepare(Request(str(tmp_path / "m.toml"), backend="import")).open_backend()

@@ -9,13 +9,23 @@ from pydantic import ValidationError
 
 from campaign.backends.handover import checks
 from campaign.backends.handover.returned import Returned
-from campaign.channels import COMMAND, DRIVE_TORQUE, MOTOR_CURRENT, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_CURRENT,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import LimitWatch
+from campaign.signals import Zero
 from campaign.trial import Trial
 
 START = 0.02
 """of the angle limit, by which a trial may begin beside where it was asked to."""
+STOPPED = 20
+"""samples over which the rate that ends a trial is averaged: a person has looked at it as well."""
 LIMITED = {DRIVE_TORQUE: "torque", MOTOR_CURRENT: "current"}
 """The limit of a bench that holds a torque, by channel."""
 
@@ -77,13 +87,20 @@ def as_asked(
 
 def _until_stopped(trial: Trial, recording: Returned) -> tuple[Returned, bool]:
     """Up to the sample at which the rate ends the trial, and whether there is one."""
-    bound = trial.task.stop_rate
-    if bound is None or RELATIVE_RATE not in recording.by_name:
+    bound, still = trial.task.stop_rate, isinstance(trial.task.base_acceleration, Zero)
+    # Of a hull at rest the gyro tells the same rate, and is not differenced from an encoder.
+    names = (GYRO_RATE, RELATIVE_RATE) if still else (RELATIVE_RATE,)
+    name = next((name for name in names if name in recording.by_name), None)
+    if bound is None or name is None:
         return recording, False
-    beyond = np.abs(recording[RELATIVE_RATE]) > bound
+    rate = np.nan_to_num(recording[name])
+    size = min(STOPPED, len(rate))
+    mean = np.convolve(rate, np.full(size, 1.0 / size), mode="valid")
+    beyond = np.abs(mean) > bound
     if not beyond.any():
         return recording, False
-    return recording.cut(int(np.argmax(beyond)), "the rate that ends the trial was reached"), True
+    last = int(np.argmax(beyond)) + size - 1
+    return recording.cut(last, f"{name} reached the rate that ends the trial"), True
 
 
 def _limits(trial: Trial) -> LimitsOptions | None:

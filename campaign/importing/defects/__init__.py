@@ -20,6 +20,7 @@ CHANNEL_KINDS = (
     "lost",
     "quantisation",
     "sign",
+    "spike",
     "twice",
     "unrelated",
     "wraparound",
