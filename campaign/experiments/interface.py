@@ -17,7 +17,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.preparing.draws import draws_of, merged
 from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
 from campaign.experiments.preparing.swept_tables import table_names
-from campaign.experiments.preparing.unusable import doubt, notes_on
+from campaign.experiments.preparing.unusable import Doubt, doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED
@@ -142,6 +142,8 @@ class Experiment:
             recorded it names.
         windows: names of the windows that its analysis looks for, where other names tell it
             nothing; a mapping that names another is refused. Absent: whoever recorded it knows.
+        most_samples: of a recording that is looked at in one, whole channels in memory; longer ones
+            are archived and not analysed. None: however many there are.
         warnings: what the plan should warn of, with what to do about it: sentences without a full
             stop, of the options and the bench of a point whose trials were made. What a test's
             points say alike is told once.
@@ -162,6 +164,7 @@ class Experiment:
     recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
     windows: tuple[str, ...] = ()
     warnings: Callable[[Any, Bench], Iterable[str]] | None = None
+    most_samples: int | None = None
 
 
 EMPTY = Result()
@@ -183,7 +186,7 @@ def _sides(data: TestData) -> Sides:
 
 
 def _result_of(experiment: Experiment, data: TestData) -> Result:
-    doubts = [doubt(item) for item in data.trials]
+    doubts = [_doubt(experiment, item) for item in data.trials]
     kept = zip(data.trials, doubts, strict=True)
     trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
     result = EMPTY
@@ -228,13 +231,26 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
 
     Raises ValueError with a message for the user where it says nothing, or cannot.
     """
-    wrong = doubt(data)
+    wrong = _doubt(experiment, data)
     if wrong and wrong.fatal:
         raise ValueError(wrong.what)
     if experiment.measure is None:
         return ()
     with speaking_of(sides_in(data.trial.bench)):
         return tuple(map(estimate_here, experiment.measure(data)))
+
+
+def _doubt(experiment: Experiment, data: TrialData) -> Doubt | None:
+    """Why a recording is not analysed; of one that is too long no sample is read to find out."""
+    most, task = experiment.most_samples, data.trial.task
+    samples = task.duration * task.sample_rate
+    if most is not None and samples > most:
+        what = (
+            f"it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: "
+            "cut it by start and stop, or by each"
+        )
+        return Doubt(data.trial.label, what, True)
+    return doubt(data)
 
 
 def with_named_tables(data: TestData) -> TestData:

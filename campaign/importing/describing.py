@@ -186,16 +186,18 @@ class _Finding:
         return lambda first, stop: clock_times(clock, self.opened, first, stop)
 
     def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
-        """The table with the fastest clock: the others are held."""
+        """The table with the fastest clock, of several alike the longest: the others are held."""
         if len(clocks) == 1:
             return next(iter(clocks))
 
-        def step(table: tuple[int, int]) -> float:
-            rows = min(self.opened.rows(*table), 1000)
+        def slowness(table: tuple[int, int]) -> tuple[float, int]:
+            count = self.opened.rows(*table)
+            rows = min(count, 1000)
             times = self._times(clocks[table])(0, rows)
-            return float(np.median(np.diff(times))) if rows > 1 else np.inf
+            step = float(np.median(np.diff(times))) if rows > 1 else np.inf
+            return float(f"{step:.3g}"), -count  # the last digits of a step are its rounding
 
-        return min(clocks, key=step)
+        return min(clocks, key=slowness)
 
     # Rows
 

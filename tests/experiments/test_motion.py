@@ -14,7 +14,7 @@ import pytest
 import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
-from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.interface import TestData, measured, result_of
 from campaign.experiments.motion import EXPERIMENT
 from campaign.result import Result
 from tests.experiments.test_every_number import lacking
@@ -244,3 +244,26 @@ def test_what_is_not_recorded_is_left_out(tmp_path: Path):
     trial = run.archive.trials[0].trial
     assert trial.can_use == ("relative_angle",)
     assert not lacking(result(run))
+
+
+def test_of_a_recording_that_is_too_long_no_sample_is_read(tmp_path: Path):
+    rate = strokes(EVERY)
+    run = recorded(tmp_path, rate, friction(rate))
+    (archived,) = run.archive.trials
+    task = archived.trial.task.model_copy(update={"duration": 1e9})
+
+    class Unread:
+        trial = archived.trial.model_copy(update={"task": task})
+        ending, estimates = archived.ending, ()
+
+        def recording(self):
+            raise AssertionError("its samples were read")
+
+        def channel_names(self):
+            return archived.channel_names()
+
+    with pytest.raises(ValueError, match="are looked at in one"):
+        measured(EXPERIMENT, Unread())
+    told = result_of(EXPERIMENT, TestData("any", "motion", {}, (Unread(),)))
+    assert "cut it by start and stop" in " ".join(told.notes)
+    assert not told.figures

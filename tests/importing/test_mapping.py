@@ -240,3 +240,16 @@ def test_a_slower_table_is_held(tmp_path: Path):
     recording, _ = served(trial)
     np.testing.assert_allclose(recording["drive_torque"], 2.5 * (np.arange(200) // 10))
     assert recording.channels["drive_torque"].own_rate == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("begin", "step"), [(1_000_000, 10), (0, 1), (-5000, 10)])
+def test_clocks_that_do_not_cover_each_other_are_refused(tmp_path: Path, begin: int, step: int):
+    """A value that nobody measured is not held: neither before the first nor behind the last."""
+    fast = "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
+    slow = "t,i\n" + "\n".join(f"{begin + step * k},{k}" for k in range(20))
+    (tmp_path / "slow.csv").write_text(slow)
+    text = COLUMNS.replace("offset = 0.5\nsign = -1\n", "") + TEST
+    text += '[[test.recording]]\nfile = ["a.csv", "slow.csv"]\n'
+    told = refused(tmp_path, text, fast)
+    assert "slow.csv has times from" in told
+    assert "and the trial is from 0 to 0.199 s" in told
