@@ -106,11 +106,16 @@ def test_no_line_is_told_of_one_speed_or_of_two_stretches():
         friction_line(np.array([1.0, 1.01, 1.02, 1.0]), np.array([3.0, 4.0, 3.5, 3.4]))
 
 
-@pytest.mark.parametrize(("kinship", "least"), [(0.0, 0.92), (0.5, 0.86), (0.8, 0.84)])
-def test_the_mean_of_stretches_that_are_alike_holds_the_truth_nearly_as_often(kinship, least):
-    """Running-in: each of 60 is like the one before it. As if independent: 94, 73 and 44 %."""
+@pytest.mark.parametrize(
+    ("kinship", "count", "least"),
+    [(0.0, 60, 0.93), (0.5, 60, 0.90), (0.8, 60, 0.90), (0.8, 20, 0.88)],
+)
+def test_the_mean_of_stretches_that_are_alike_holds_the_truth_nearly_as_often(
+    kinship: float, count: int, least: float
+):
+    """Running-in: each is like the one before it. As if independent: 94, 73 and 44 % of 60."""
     rng = np.random.default_rng(9)
-    held, runs, count = 0, 300, 60
+    held, runs = 0, 600
     for _ in range(runs):
         values = np.zeros(count)
         values[0] = rng.normal() / np.sqrt(1.0 - kinship**2)

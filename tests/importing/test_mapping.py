@@ -253,3 +253,16 @@ def test_clocks_that_do_not_cover_each_other_are_refused(tmp_path: Path, begin: 
     told = refused(tmp_path, text, fast)
     assert "slow.csv has times from" in told
     assert "and the trial is from 0 to 0.199 s" in told
+
+
+def test_before_its_first_value_a_slower_channel_is_lost(tmp_path: Path):
+    """It begins half of its own step late: what it was before nobody knows."""
+    fast = "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
+    slow = "t,i\n" + "\n".join(f"{10 * k + 5},{k}" for k in range(20))
+    (tmp_path / "slow.csv").write_text(slow)
+    text = COLUMNS.replace("offset = 0.5\nsign = -1\n", "") + TEST
+    text += '[[test.recording]]\nfile = ["a.csv", "slow.csv"]\n'
+    (trial,) = planned(tmp_path, text, fast).trials
+    recording, _ = served(trial)
+    assert np.isnan(recording["drive_torque"][:5]).all()
+    np.testing.assert_allclose(recording["drive_torque"][5:], 2.5 * (np.arange(195) // 10))
