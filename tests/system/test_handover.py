@@ -23,7 +23,7 @@ AWK = shutil.which("awk")
 RIG = Path(__file__).with_name("rig.awk")
 COULOMB, VISCOUS = 6.0, 4.0
 """N m and N m s/rad: the rig's own, as `rig.awk` has them."""
-WAITING = 90.0
+WAITING = 600.0
 """s after which a test gives up."""
 
 PROTOCOL = """\
