@@ -43,7 +43,8 @@ def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
         return Result()
 
     (test,) = analyse_run(
-        open_run(path), {"velocity_map": SimpleNamespace(analyse=analyse, perturbs_bench=False)}
+        open_run(path),
+        {"velocity_map": SimpleNamespace(analyse=analyse, perturbs_bench=False, most_samples=None)},
     )
     assert seen == [[1.0, 3.0]]
     assert [trial.trial.number for trial in test.trials] == [1, 3]
