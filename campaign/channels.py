@@ -22,7 +22,7 @@ from enum import StrEnum
 
 from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
 from campaign.axis_kind import Sides
-from campaign.trial import ChannelInfo
+from campaign.recording import ChannelInfo
 
 COMMAND = "command"
 REFERENCE = "reference"

@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from campaign.options import Options
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from campaign.units import Time
 
 

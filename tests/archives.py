@@ -12,8 +12,9 @@ from campaign.backends.interface import Backend
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
 from campaign.protocol import Plan, as_tree, load_protocol, make_plan
+from campaign.recording import Ending, Outcome, Recording
 from campaign.resources import protocols_folder
-from campaign.trial import Ending, Outcome, Recording, Trial
+from campaign.trial import Trial
 
 PROTOCOL = """
 title = "A stabilized axis"

@@ -18,7 +18,7 @@ from campaign.backends.replay import BACKEND as REPLAY
 from campaign.backends.replay import ReplayOptions
 from campaign.channels import VOCABULARY, AxisKind, KnownBy, Side, explained, info, missing
 from campaign.errors import BackendError
-from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
+from campaign.recording import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
 from campaign.units import factor
 from tests.archives import archived, plan_of
 

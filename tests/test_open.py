@@ -17,8 +17,8 @@ from campaign.access.estimates import findings_table
 from campaign.archive import open_run
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
+from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Finding
-from campaign.trial import Channel, Ending, Outcome, Recording
 from tests.archives import archived, plan_of, simulated_run
 
 PAGE = (Path(__file__).parents[1] / "docs" / "reading-archives.md").read_text(encoding="utf-8")

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from campaign import recording
+from campaign import trial as asked
 from campaign.trial import Task, Trial
 
 TASK = Task(mode="rate", duration=1.0, window=(0.0, 1.0), sample_rate=1000.0)
@@ -39,3 +41,14 @@ def test_what_determines_no_sample_changes_no_fingerprint():
     before = original.fingerprint
     assert original.model_copy(update={"number": 7, "note": "again"}).fingerprint == before
     assert copy.copy(original).fingerprint == copy.deepcopy(original).fingerprint == before
+
+
+def test_what_plug_ins_imported_from_here_is_what_came_back():
+    nouns = {
+        name
+        for name, thing in vars(recording).items()
+        if getattr(thing, "__module__", "") == recording.__name__ and not name.startswith("_")
+    }
+    assert nouns > {"Recording", "Channel", "Ending", "Outcome", "MemoryRecorder", "lost_samples"}
+    for name in nouns | {"Array"}:
+        assert getattr(asked, name) is getattr(recording, name)

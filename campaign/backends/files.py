@@ -63,7 +63,8 @@ from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED
 from campaign.plain_text import json_text
-from campaign.trial import Ending, Event, Fault, Outcome, Recorder, SafeState, Trial, canonical_json
+from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState
+from campaign.trial import Trial, canonical_json
 from campaign.units import Time
 
 GLANCE = 0.2

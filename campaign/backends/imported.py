@@ -18,7 +18,8 @@ from campaign.importing.interface import RecordingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader, paths_unchanged
 from campaign.options import Options
-from campaign.trial import Ending, Event, Fault, Outcome, Recorder, SafeState, Trial
+from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState
+from campaign.trial import Trial
 
 
 class ImportOptions(Options):

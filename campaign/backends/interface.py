@@ -9,8 +9,9 @@ from typing import Protocol, runtime_checkable
 
 from campaign.archive import RunReader
 from campaign.options import Options
+from campaign.recording import Ending, PanicStop, Recorder, SafeState
 from campaign.stopwatch import Timing
-from campaign.trial import Ending, PanicStop, Recorder, SafeState, Tree, Trial
+from campaign.trial import Tree, Trial
 
 
 class Source(StrEnum):

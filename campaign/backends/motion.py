@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from campaign.recording import SafeState
 from campaign.signals import Signal
-from campaign.trial import SafeState
 
 
 class BaseMotion(Protocol):

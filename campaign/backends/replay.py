@@ -27,17 +27,8 @@ from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ArchiveError
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.trial import (
-    Ending,
-    Fault,
-    Outcome,
-    Recorder,
-    SafeState,
-    Task,
-    Tree,
-    Trial,
-    canonical_json,
-)
+from campaign.recording import Ending, Fault, Outcome, Recorder, SafeState
+from campaign.trial import Task, Tree, Trial, canonical_json
 
 _BLOCK = 4096  # samples between two looks at whether to stop
 _NOT_ASKED = {"window"}  # what a task says to an analysis alone

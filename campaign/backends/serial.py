@@ -29,16 +29,8 @@ from campaign.link.identity import identity, new_session
 from campaign.link.refusal import Refusal
 from campaign.link.session import Session
 from campaign.options import Options
-from campaign.trial import (
-    ChannelInfo,
-    Ending,
-    Fault,
-    Outcome,
-    PanicStop,
-    Recorder,
-    SafeState,
-    Trial,
-)
+from campaign.recording import ChannelInfo, Ending, Fault, Outcome, PanicStop, Recorder, SafeState
+from campaign.trial import Trial
 from campaign.units import Time
 from campaign.wire.channel_features import named_channels
 from campaign.wire.configuration import REHEARSAL, configuration_of

@@ -21,8 +21,9 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import PURPOSES, CompleteBench, IncompleteBenchError, complete
 from campaign.physics.truth import simulated
+from campaign.recording import Array, Ending, Recorder, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import Array, Ending, Recorder, SafeState, Tree, Trial
+from campaign.trial import Tree, Trial
 from campaign.units import Time
 
 if TYPE_CHECKING:  # the engine takes its time to be imported

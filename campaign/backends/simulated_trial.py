@@ -28,7 +28,8 @@ from campaign.channels import (
 from campaign.physics.base_motion import base_rate
 from campaign.physics.complete import CompleteBench
 from campaign.physics.limit_watch import LimitWatch
-from campaign.trial import Array, ChannelInfo, Ending, Event, Outcome, Recorder, Task
+from campaign.recording import Array, ChannelInfo, Ending, Event, Outcome, Recorder
+from campaign.trial import Task
 
 CHANNELS = tuple(
     info(name)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import JsonValue
 
-from campaign.trial import Array
+from campaign.recording import Array
 
 STEP, CHANGE = "step_s", "change_at_half_the_step"
 """What it is called in a trial's telemetry: the step, and per channel the RMS of the change over

@@ -29,7 +29,8 @@ from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test
 from campaign.published.evidence import Evidence, evidence_of
 from campaign.published.scoreboard import score
-from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
+from campaign.trial import Trial
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")

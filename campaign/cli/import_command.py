@@ -16,11 +16,11 @@ def import_recordings(
     files: Sequence[str],
     results: Path,
     *,
-    only: tuple[str, ...],
-    changes: tuple[str, ...],
-    workers: int | None,
-    report: bool,
-    sign: Path | None,
+    only: tuple[str, ...] = (),
+    changes: tuple[str, ...] = (),
+    workers: int | None = 1,
+    report: bool = False,
+    sign: Path | None = None,
 ) -> ExitCode:
     """Archive what a mapping describes. Raises what a run raises."""
     if len(files) != 1:

@@ -10,7 +10,7 @@ from campaign.cli.ask import read_line, somebody_is_there
 from campaign.cli.output import print_note
 from campaign.errors import BackendError, CampaignError, ExitCode
 from campaign.execution.display import clock
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 
 
 class StillStoppedError(CampaignError):

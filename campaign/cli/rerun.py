@@ -40,7 +40,8 @@ from campaign.physics.engine_version import (
 )
 from campaign.physics.friction import is_dry
 from campaign.policy import Policy
-from campaign.trial import Recording, trial_number
+from campaign.recording import Recording
+from campaign.trial import trial_number
 
 SIM = "sim"
 TIMES = 10

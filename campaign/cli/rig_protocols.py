@@ -16,6 +16,7 @@ from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.physics.bench import Bench
+from campaign.physics.complete import lacking
 from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
 from campaign.resources import protocols_folder
@@ -94,7 +95,9 @@ def init_for_bench(folder: Path, written: str) -> None:
     protocols = [path for path in files if path.parent == folder]
     for path in protocols:
         _with_reasons(path)
-    print_line(f"now: campaign plan {protocols[0]}, then campaign run {protocols[0]} --report")
+    # What cannot be simulated is executed on hardware, or by hand.
+    where = f"{protocols[0]}{' --backend files --handover out' if lacking(bench) else ''}"
+    print_line(f"now: campaign plan {where}, then campaign run {where} --report")
 
 
 def _check_fit(test: _Test, bench: Bench) -> None:

@@ -42,8 +42,9 @@ from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
 from campaign.protocol import PlannedStage
+from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import Outcome, Trial
+from campaign.trial import Trial
 
 
 @dataclass(frozen=True)

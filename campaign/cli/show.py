@@ -24,8 +24,9 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
+from campaign.recording import Outcome
 from campaign.text import interval, pretty_unit
-from campaign.trial import Outcome, Tree
+from campaign.trial import Tree
 
 
 def show_archive(

@@ -12,7 +12,7 @@ from campaign.archive import open_run
 from campaign.backends.step_check import CHANGE
 from campaign.cli.output import print_note
 from campaign.options import Options
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 
 TOLERANCE = 1e-3
 """Of a channel's RMS: what steps are chosen for."""

@@ -18,7 +18,7 @@ from campaign.device.machine import Machine, Setup
 from campaign.device.motion import Strike
 from campaign.device.session import LONGEST_ARRAY, Configuration, Session
 from campaign.physics.compensation import compensation_methods
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from campaign.wire import codes
 from campaign.wire.channel_features import channel_features
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError

@@ -18,7 +18,8 @@ from campaign.device.producer import Producer
 from campaign.device.ring import Ring
 from campaign.device.temperature import Winding
 from campaign.physics.complete import CompleteBench
-from campaign.trial import Ending, Outcome, Trial
+from campaign.recording import Ending, Outcome
+from campaign.trial import Trial
 from campaign.wire.device import Channel
 from campaign.wire.messages import Record
 

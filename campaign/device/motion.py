@@ -14,7 +14,7 @@ from campaign.device.faults import RATES, FaultSpec
 from campaign.device.producer import Producer
 from campaign.device.ring import Ring
 from campaign.device.temperature import Winding
-from campaign.trial import Array, Ending, Fault, Outcome
+from campaign.recording import Array, Ending, Fault, Outcome
 from campaign.wire.device import Channel, End, Event, Samples
 from campaign.wire.fields import clipped
 from campaign.wire.messages import Fault as FaultCode

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from campaign.backends.interface import Backend
-from campaign.trial import Array, ChannelInfo, Ending, Event, Fault, Outcome, Trial
+from campaign.recording import Array, ChannelInfo, Ending, Event, Fault, Outcome
+from campaign.trial import Trial
 
 AHEAD = 50_000
 """Samples that are kept ready at most, give or take a block of the simulation."""

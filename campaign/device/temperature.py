@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from campaign.trial import Array
+from campaign.recording import Array
 
 ZERO_CELSIUS = 273.15
 ROOM = 293.15

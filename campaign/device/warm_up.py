@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.physics.complete import CompleteBench
-from campaign.trial import MemoryRecorder, Task, Trial
+from campaign.recording import MemoryRecorder
+from campaign.trial import Task, Trial
 
 
 def warm_up(bench: CompleteBench) -> None:

@@ -14,8 +14,9 @@ from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
 from campaign.execution.writer import PlanWriter, TrialWriter
+from campaign.recording import Ending, Outcome, SafeState
 from campaign.stopwatch import Work
-from campaign.trial import Ending, Outcome, SafeState, Trial
+from campaign.trial import Trial
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from campaign.trial import Array, Recording
+from campaign.recording import Array, Recording
 
 
 def differences(was: Recording, now: Recording) -> list[str]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from campaign.policy import Policy, Rest
-from campaign.trial import Ending, Trial
+from campaign.recording import Ending
+from campaign.trial import Trial
 
 
 @dataclass(frozen=True)

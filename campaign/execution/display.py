@@ -15,7 +15,8 @@ from rich.text import Text
 
 from campaign.execution.progress import Progress
 from campaign.plain_text import printable
-from campaign.trial import Ending, Outcome, Trial
+from campaign.recording import Ending, Outcome
+from campaign.trial import Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
 PATIENCE = 2.0  # s that the archive may take to close before somebody is told

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from campaign.axis_kind import sides_in
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import WATCHED, LimitWatch
-from campaign.trial import Array, Ending, Fault, Outcome, Task, Trial
+from campaign.recording import Array, Ending, Fault, Outcome
+from campaign.trial import Task, Trial
 
 STEP = 0.5
 """Of a sample: further from its place, it could be another one."""

@@ -15,15 +15,17 @@ from dataclasses import dataclass, field
 import campaign
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.measured import Measured
+from campaign.axis_kind import sides_in, speaking_of, words_here
 from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
 from campaign.experiments.interface import Experiment, measured
 from campaign.plugins import Kinds
+from campaign.recording import Outcome
 from campaign.source_hash import digest, sources_of
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import Outcome, Role
+from campaign.trial import Role
 
 LIMIT = 60.0
 """s that one recording may be measured for: the bench waits, and what follows from it."""
@@ -73,7 +75,8 @@ class Measuring:
             estimates = checked(measured(experiment, data))
             return Measured(estimates, self._by(data.trial.kind)) if estimates else Measured()
         except (ValueError, UsageError) as error:
-            return Measured(problem=_one_line(str(error)))
+            with speaking_of(sides_in(data.trial.bench)):
+                return Measured(problem=words_here(_one_line(str(error))))
         except Exception as error:  # noqa: BLE001 - a bug of a plug-in must not cost the trial
             return Measured(problem=_one_line(f"measuring failed: {describe(error)}"))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode, worst_exit_code
-from campaign.trial import Outcome, SafeState
+from campaign.recording import Outcome, SafeState
 
 _TRIAL_CODES = {
     Outcome.COMPLETED: ExitCode.DONE,

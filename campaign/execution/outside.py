@@ -8,7 +8,7 @@ from collections.abc import Callable
 from campaign.backends.interface import Backend, StoppedOutside
 from campaign.execution.safety import describe
 from campaign.execution.stop import StopSwitch
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 
 INTERVAL = 0.1
 """s between two questions to the bench."""

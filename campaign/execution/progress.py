@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from campaign.execution.forecast import Forecast, worth
-from campaign.trial import Array, ChannelInfo, Ending, Outcome, Trial
+from campaign.recording import Array, ChannelInfo, Ending, Outcome
+from campaign.trial import Trial
 
 
 @dataclass(frozen=True)

@@ -30,16 +30,8 @@ from campaign.execution.pace import Pace
 from campaign.execution.supervision import Subscriber, Supervision, TrialStop
 from campaign.execution.writer import TrialWriter
 from campaign.physics.limit_watch import LimitWatch
-from campaign.trial import (
-    Array,
-    ChannelInfo,
-    Ending,
-    Event,
-    Fault,
-    Outcome,
-    Trial,
-    lost_samples,
-)
+from campaign.recording import Array, ChannelInfo, Ending, Event, Fault, Outcome, lost_samples
+from campaign.trial import Trial
 
 ARCHIVE_PATIENCE = 30.0
 """s that the archive may take to take a block, once the trial is over."""

@@ -14,7 +14,8 @@ from campaign.errors import UsageError
 from campaign.execution.provenance import shaping
 from campaign.protocol import PlannedStage
 from campaign.protocol.plan_tree import planned_stage
-from campaign.trial import Outcome, Tree, Trial, canonical_json
+from campaign.recording import Outcome
+from campaign.trial import Tree, Trial, canonical_json
 
 SHOWN = 20
 """Differences that are shown one by one."""

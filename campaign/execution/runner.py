@@ -28,8 +28,9 @@ from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
+from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
-from campaign.trial import Outcome, PanicStop, Trial
+from campaign.trial import Trial
 
 SIMULATED = Supervision()
 _NOTHING: Mapping[int, Outcome] = MappingProxyType({})

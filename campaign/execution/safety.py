@@ -11,7 +11,7 @@ from pathlib import Path
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, CampaignError, ExitCode
 from campaign.execution.naming import how_to_go_on
-from campaign.trial import SafeState
+from campaign.recording import SafeState
 
 AT_ONCE = 20.0
 """s that it may take to see the bench safe when somebody insists on leaving."""

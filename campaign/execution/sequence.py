@@ -24,7 +24,8 @@ from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
-from campaign.trial import Ending, Outcome, PanicStop, SafeState, Trial
+from campaign.recording import Ending, Outcome, PanicStop, SafeState
+from campaign.trial import Trial
 
 LOOK = 1.0
 """s after which a display is told how far the running trials are."""

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from campaign.backends.interface import Source
+from campaign.recording import Array, ChannelInfo
 from campaign.stopwatch import UNTIMED, Timing
-from campaign.trial import Array, ChannelInfo, Trial
+from campaign.trial import Trial
 
 Subscriber = Callable[[Trial, tuple[ChannelInfo, ...], Array, Array], None]
 """Is handed every block that is archived: its trial, the channels, time (n,), block (channels, n).

@@ -7,7 +7,8 @@ from typing import Protocol
 
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.reading.measured import Measure
-from campaign.trial import Array, ChannelInfo, Ending, Event, SafeState, Trial
+from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState
+from campaign.trial import Trial
 
 
 class TrialWriter(Protocol):

@@ -25,6 +25,7 @@ from campaign.experiments.results.breakaway_tables import findings_of, table_of,
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.experiments.shared.found_trials import named_or_found
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.found_excitation import found_ramp
@@ -33,9 +34,10 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
+from campaign.recording import Array
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
-from campaign.trial import Array, Offered, Task, Trial, TrialRequest
+from campaign.trial import Offered, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
     AngularRate,
@@ -112,14 +114,22 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
         )
 
 
+def _warnings(options: BreakawayOptions, bench: Bench) -> Iterator[str]:
+    if bench.axis.inertia is None:
+        yield (
+            "no breakaway torque can be told of its ramps, for the bench does not say axis.inertia "
+            "(what the torque accelerates): add it before they are executed"
+        )
+
+
 def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
     """The ramp of a recording that nobody planned: up to when the load first slides."""
     known = {RELATIVE_ANGLE} & offered.channels
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
     sliding = np.abs(recording[GYRO_RATE]) > options.sliding_rate
     if not sliding.any():
-        rate = np.rad2deg(options.sliding_rate)
-        raise ValueError(f"the load never slides at {rate:.3g} deg/s (sliding_rate)")
+        rate = rate_here(options.sliding_rate)
+        raise ValueError(f"the load never slides at {rate} (sliding_rate)")
     slides = float(recording.time[int(np.argmax(sliding))])
     ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], slides)
     stops = np.abs(recording[GYRO_RATE]) > STOP_FACTOR * options.sliding_rate
@@ -127,10 +137,8 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     place: dict[str, JsonValue] = {}
     if known and "position" not in offered.conditions:
         place["position"] = round(float(recording[RELATIVE_ANGLE][0]), 4)
-    windows = offered.windows or (
-        Window("rest", 0.0, ramp.start),
-        Window("ramp", ramp.start, stop),
-    )
+    looked_for = Window("rest", 0.0, ramp.start), Window("ramp", ramp.start, stop)
+    windows = named_or_found(offered, looked_for)
     yield TrialRequest(
         Task(mode="recorded", duration=stop, window=(ramp.start, stop), sample_rate=1.0),
         point=place | {"direction": "positive" if ramp.slope > 0 else "negative"},
@@ -242,14 +250,23 @@ def _analyse(data: TestData) -> Result:
         notes += remarks(ramps)
     rates = [_options(item.trial).torque_rate for item in data.completed()]
     known = any(bench_of(item.trial).axis.inertia is not None for item in data.completed())
+    slid = not findings and any(_slid(item) for item in data.completed())
     settings = Settings.of(data, BreakawayOptions)
     return Result(
         tuple(tables),
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        breakaway_conclusions(findings, rates, settings, inertia_known=known or not rates),
+        breakaway_conclusions(
+            findings, rates, settings, inertia_known=known or not rates, slid=slid
+        ),
     )
+
+
+def _slid(item: TrialData) -> bool:
+    """Whether the load came to the rate that counts as sliding."""
+    bound = _options(item.trial).sliding_rate
+    return bool(np.any(np.abs(item.recording()[GYRO_RATE]) >= bound))
 
 
 def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
@@ -261,7 +278,8 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
             notes.append(f"No breakaway torque: {error}.")
             continue
         except ValueError as error:
-            notes.append(f"{item.trial.label}: {error}.")
+            faster = "; a higher sample_rate holds more of it" if _slid(item) else ""
+            notes.append(f"{item.trial.label}: {error}{faster}.")
             continue
         trials.append(item)
         places.append({**conditions(item), "direction": direction_of(item.trial)})
@@ -293,6 +311,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     fit=fitting.breakaway,
+    warnings=_warnings,
     measure=_measure,
     recorded=_found,
     windows=("rest", "ramp"),

@@ -49,7 +49,7 @@ from campaign.experiments.shared.common import (
     swept,
 )
 from campaign.experiments.shared.found_trials import sine_response
-from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.sine_commands import rate_sine, told_amplitude, torque_sine
 from campaign.experiments.shared.swept_words import words
 from campaign.identification.frequency_response import Response, make_response
 from campaign.identification.intervals import with_error
@@ -59,10 +59,8 @@ from campaign.identification.servo import characteristics
 from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.complete import control_rate, inertia_of, limits_of
-from campaign.physics.limits import worst_friction
+from campaign.physics.complete import control_rate
 from campaign.result import Conclusion, Figure, Finding, Result, Table
-from campaign.signals import Sine
 from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
@@ -71,12 +69,8 @@ from campaign.units import (
     Frequency,
     Time,
     Torque,
-    angle_here,
-    rate_here,
 )
 
-LIMIT_SHARE = 0.9
-"""of the bench's limits that the amplitude of a rate command may use."""
 NYQUIST_SHARE = 0.4
 """of the controller's sample rate: the highest frequency that can be told."""
 MOST_FREQUENCIES = 10_000
@@ -152,7 +146,10 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
     settle = max(options.settle_cycles, math.ceil(options.settle_time * frequency - 1e-9))
     start, stop = settle / frequency, (settle + options.cycles) / frequency
     closed = options.loop == "closed"
-    command, swing = (_rate_sine if closed else _torque_sine)(options, bench, frequency)
+    if closed:
+        command, swing = rate_sine(bench, frequency, options.amplitude, options.max_acceleration)
+    else:
+        command, swing = torque_sine(bench, frequency, options.torque, options.position)
     return TrialRequest(
         Task(
             mode="rate" if closed else "torque",
@@ -164,7 +161,7 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
             start_angle=options.position - swing,
         ),
         point={"frequency": frequency},
-        note=f"{options.cycles} cycles after {settle} to settle; {_amplitude(command, closed)}",
+        note=f"{options.cycles} cycles after {settle} to settle; {told_amplitude(command, closed)}",
         requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         windows=(Window(STEADY, start, stop),),
     )
@@ -224,12 +221,6 @@ def _excitation(mode: str) -> str:
     return COMMAND if mode == "rate" else DRIVE_TORQUE
 
 
-def _amplitude(command: Sine, closed: bool) -> str:
-    if closed:
-        return f"amplitude {rate_here(command.amplitude)}"
-    return f"amplitude {command.amplitude:.3g} N·m"
-
-
 def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> float:
     """Of the recording (Hz): `samples_per_cycle`, or a whole share of the controller's rate."""
     control = control_rate(bench)
@@ -241,41 +232,6 @@ def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: flo
             f"({control:g} Hz); lower the highest frequency"
         )
     return control / max(1, math.floor(control / (options.samples_per_cycle * frequency)))
-
-
-def _rate_sine(
-    options: FrequencyResponseOptions, bench: Bench, frequency: float
-) -> tuple[Sine, float]:
-    """The rate command and half the angle it swings (rad); it starts at rest."""
-    rig, omega = Rig(bench), 2.0 * math.pi * frequency
-    acceleration = options.max_acceleration
-    if acceleration is None:
-        torque = rig.torque - worst_friction(bench, options.amplitude)
-        if torque <= 0:
-            raise ValueError("the bench's torque and current limits do not overcome its friction")
-        acceleration = LIMIT_SHARE * min(rig.limits.acceleration, rig.accelerated_by(torque))
-    amplitude = min(options.amplitude, acceleration / omega)
-    return Sine(amplitude=amplitude, frequency=frequency), amplitude / omega
-
-
-def _torque_sine(
-    options: FrequencyResponseOptions, bench: Bench, frequency: float
-) -> tuple[Sine, float]:
-    """The torque and half the angle (rad) that it would swing a load without friction.
-
-    It starts at its peak: the rate of a free load then has no offset, and the angle no drift.
-    """
-    omega = 2.0 * math.pi * frequency
-    limits = limits_of(bench)
-    rate = options.torque / (inertia_of(bench, "the swing of a free load") * omega)
-    swing = rate / omega
-    if abs(options.position) + swing > limits.angle or rate > limits.rate:
-        raise ValueError(
-            f"{options.torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
-            f"{angle_here(swing)} at {rate_here(rate)}, beyond the bench's "
-            "limits; lower torque or raise lowest"
-        )
-    return Sine(amplitude=options.torque, frequency=frequency, phase=0.5 * math.pi), swing
 
 
 def _steady(trial: Trial) -> tuple[float, float]:
@@ -394,6 +350,7 @@ EXPERIMENT = Experiment(
     measure=_measure,
     fit=fitting.frequency_response,
     recorded=_found,
+    windows=(STEADY,),
     requires={
         GYRO_RATE: "the response",
         COMMAND: "what a closed loop responds to",

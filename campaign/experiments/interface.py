@@ -21,17 +21,9 @@ from campaign.experiments.preparing.unusable import Doubt, doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED
+from campaign.recording import Ending, Recording
 from campaign.result import Result
-from campaign.trial import (
-    Ending,
-    Most,
-    Offered,
-    Recording,
-    Tree,
-    Trial,
-    TrialRequest,
-    canonical_json,
-)
+from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
 
 _Options = TypeVar("_Options", bound=Options)
 

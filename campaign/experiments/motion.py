@@ -37,8 +37,9 @@ from campaign.identification.steady_sliding import steady_sliding
 from campaign.identification.steady_stretches import FEWEST, SHORTEST_TIME, steady_stretches
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.recording import Recording
 from campaign.result import Result
-from campaign.trial import Offered, Recording, Task, Trial, TrialRequest
+from campaign.trial import Offered, Task, Trial, TrialRequest
 from campaign.units import Length, Time
 
 MOST_STRETCHES = 400

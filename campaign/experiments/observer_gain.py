@@ -48,9 +48,10 @@ from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, limits_of
 from campaign.physics.stability import growth_rate
+from campaign.recording import Outcome
 from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Outcome, Task, Tree, TrialRequest
+from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularAcceleration, Frequency, Time, Torque
 
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)

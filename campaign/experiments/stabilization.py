@@ -35,6 +35,7 @@ from campaign.experiments.shared.comparisons import compared, preload_of
 from campaign.experiments.shared.found_trials import hull_sine
 from campaign.experiments.shared.hull_motion import Motion, SeriesMotion, ShipMotion, SineMotion
 from campaign.experiments.shared.pointing_error import (
+    MEASURED,
     error_of,
     found,
     largest_of,
@@ -49,9 +50,10 @@ from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import pointing_high_pass
+from campaign.recording import Recording
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Offered, Recording, Task, Trial, TrialRequest
+from campaign.trial import Offered, Task, Trial, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
 
 SAMPLES_PER_CYCLE = 10
@@ -113,7 +115,7 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
 
 def _found(options: StabilizationOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
     """The swinging hull of a recording that nobody planned."""
-    request = hull_sine(offered, options.settle_cycles)
+    request = hull_sine(offered, MEASURED, options.settle_cycles)
     compensated = request.task.model_copy(update={"compensation": options.compensation})
     yield replace(
         request, task=compensated, can_use=_can_use(options), windows=windows_of(compensated)
@@ -292,6 +294,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     fit=fitting.base_motion,
     recorded=_found,
+    windows=(MEASURED,),
     measure=_measure,
     requires={POINTING_ERROR: "the stabilization error"},
     can_use={

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field, ValidationError, field_validator
@@ -14,6 +14,7 @@ from campaign.estimate import Estimate, Window
 from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.conclusions.servo import step_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.results.step_response_results import Step, step_figure, step_table
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import (
     conditions,
@@ -25,6 +26,7 @@ from campaign.experiments.shared.common import (
 from campaign.experiments.shared.found_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.identification.intervals import of_repeats
+from campaign.identification.rise_time import rise_interval
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.step_response import (
     NOT_SETTLED,
@@ -33,27 +35,11 @@ from campaign.identification.step_response import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import (
-    Array,
-    Axis,
-    Cell,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-    Value,
-)
+from campaign.recording import Recording
+from campaign.result import Finding, Result
 from campaign.signals import Polyline
-from campaign.trial import Offered, Recording, Task, Tree, Trial, TrialRequest
+from campaign.trial import Offered, Task, Tree, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
-
-SHOWN = 2.5
-"""The figure shows the step up to this many settling times."""
-
 
 LEAST_REST = 0.01
 """s of standstill before a step."""
@@ -153,18 +139,32 @@ def _options(trial: Trial) -> StepResponseOptions:
         raise ValueError(f"these options fit no step response: {wrong}") from None
 
 
-def _characteristics(trial: Trial, recording: Recording) -> StepCharacteristics:
+def _characteristics(
+    trial: Trial, recording: Recording
+) -> tuple[StepCharacteristics, Estimate | None]:
+    """What a step says, and its rise time with the interval that its noise leaves, if any."""
     options, start = _options(trial), _answer(trial).start
     rate = recording[GYRO_RATE]
-    return step_characteristics(recording.time, rate, start, options.step, options.band)
+    found = step_characteristics(recording.time, rate, start, options.step, options.band)
+    if not math.isfinite(found.rise_time):
+        return found, None
+    told = rise_interval(recording.time, rate, start, options.step, found)
+    if told is None:
+        return found, None
+    rise, rise_from = told
+    reasons = found.reasons | ({} if math.isfinite(rise.value) else {"rise_time": rise.reason})
+    found = replace(found, rise_time=rise.value, rise_from=rise_from, reasons=reasons)
+    return found, rise
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Rise, settling, overshoot and what error stays; without those that were not seen."""
-    found = _characteristics(data.trial, data.recording())
+    found, rise = _characteristics(data.trial, data.recording())
     values = ((name, float(getattr(found, name)), unit) for name, unit in QUANTITIES)
     return tuple(
-        Estimate(name, value, unit, reason=ONE_STEP)
+        rise
+        if rise is not None and name == rise.name
+        else Estimate(name, value, unit, reason=ONE_STEP)
         for name, value, unit in values
         if math.isfinite(value)
     )
@@ -179,33 +179,10 @@ def _without_friction(bench: Bench) -> Tree:
     return tree
 
 
-@dataclass(frozen=True)
-class Step:
-    """One step and what it says: time from the step, rate and command, shape (n,), SI.
-
-    The command is None where it was not recorded; `level` is the rate (rad/s) before the step.
-    """
-
-    place: dict[str, Value]
-    label: str
-    series: str
-    time: Array
-    rate: Array
-    command: Array | None
-    level: float
-    options: StepResponseOptions
-    rise_from: float
-    found: Mapping[str, Estimate]
-
-    def value(self, name: str) -> float:
-        """A characteristic by name; NaN where it was not seen."""
-        return self.found[name].value if name in self.found else math.nan
-
-
 def _evaluate(data: TrialData, paths: list[str]) -> Step:
     options = _options(data.trial)
     recording: Recording = data.recording()  # for the figure, and for why there is no number
-    again = _characteristics(data.trial, recording)
+    again, _ = _characteristics(data.trial, recording)
     found = dict(metrics(data, _measure))
     for name, unit in QUANTITIES:
         if name not in found:
@@ -261,11 +238,13 @@ def _analyse(data: TestData) -> Result:
     if not steps:
         return Result(notes=tuple(notes))
     notes += [note for step in steps for note in _notes(step)]
-    tables = (_table(steps, [path for path in paths if path not in ("linear", "compensation")]),)
+    tables = (
+        step_table(steps, [path for path in paths if path not in ("linear", "compensation")]),
+    )
     options, settings = steps[0].options, Settings.of(data, StepResponseOptions)
     return Result(
         tables,
-        (_figure(steps),),
+        (step_figure(steps),),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
         step_conclusions(findings, options.step, options.band, settings),
@@ -291,95 +270,18 @@ UNSEEN = {"rise_time": "rise time", "settling_time": "settling time", "overshoot
 
 
 def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
-    """Mean of a characteristic over repeated steps, with the interval of their scatter."""
+    """Mean of a characteristic over repeated steps, with the interval of their scatter.
+
+    Of one step it is its own, with what its noise leaves open.
+    """
+    if len(repeats) == 1 and repeats[0].found[name].has_interval:
+        return repeats[0].found[name]
     values = [step.value(name) for step in repeats]
     if not all(map(math.isfinite, values)):
         reasons = {step.found[name].reason for step in repeats if math.isnan(step.value(name))}
         why = reasons.pop() if len(reasons) == 1 else NOT_SEEN
         return Estimate.without_interval(name, math.nan, unit, why)
     return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
-
-
-def _table(steps: list[Step], extra: list[str]) -> Table:
-    rows: list[Mapping[str, Cell]] = []
-    for step in steps:
-        loop = "without friction" if step.options.linear else "with friction"
-        rows.append({**step.place, "loop": loop, **step.found})
-    band = 100 * steps[0].options.band
-    return Table(
-        key="step-response",
-        title="Step response of the rate loop",
-        columns=(
-            Column("loop", "Loop"),
-            Column("compensation", "Compensation"),
-            *(Column(path, path, exact=True) for path in extra),
-            Column("rise_time", "Rise time (10 to 90 %)", "s", "ms"),
-            Column("settling_time", f"Settling time ({band:g} %)", "s", "ms"),
-            Column("overshoot", "Overshoot", "", "percent"),
-            Column("steady_state_error", "Steady-state error", "rad/s", "deg/s"),
-        ),
-        rows=tuple(rows),
-        thesis=(),
-        note="Times count from the start of the step. Each row is one step; what repeats of it say "
-        "together, with intervals, is among the findings.",
-    )
-
-
-def _figure(steps: list[Step]) -> Figure:
-    first = steps[0]
-    times = [step.value("settling_time") for step in steps]
-    settled = [time for time in times if math.isfinite(time)]
-    end = min(SHOWN * max(settled), first.options.duration) if settled else first.options.duration
-    height, level = first.options.step, first.level
-    ends = sorted(level + height * (1 + sign * first.options.band) for sign in (-1, 1))
-    curves = []
-    if first.command is not None:
-        curves.append(Curve(first.time, first.command, "command", "reference", "thin"))
-    curves += [Curve(step.time, step.rate, step.label, step.series) for step in steps]
-    band = 100 * first.options.band
-    marks = [
-        Mark(f"±{band:g} %", y=ends[0], until=ends[1]),
-        *_marks(first),
-    ]
-    marked = f" Marked are numbers of: {first.label}." if len(steps) > 1 and marks[1:] else ""
-    return Figure(
-        key="step",
-        title="Step response of the rate loop",
-        caption="The rate rises to its command; it has settled once it stays within the shaded "
-        f"band of ±{band:g} % of the step around it.{marked}",
-        alt="Rate of the load over time after a step of the rate command, with the band in which "
-        "it counts as settled; rise, overshoot and settling are marked where they are seen.",
-        panels=(
-            Panel(
-                Axis("Time from the step", "s", "ms", limits=(-0.05 * end, end)),
-                Axis("Rate", "rad/s", "deg/s"),
-                curves,
-                marks=tuple(marks),
-            ),
-        ),
-        thesis=("4.7",),
-    )
-
-
-def _marks(step: Step) -> Iterator[Mark]:
-    """Rise, overshoot and settling of one step, where they were seen."""
-    rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
-    if math.isfinite(rise + step.rise_from):
-        start = step.rise_from
-        yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
-    if over > 0:
-        # Only after the step: noise before it may lie as far out.
-        share = np.where(step.time >= 0, step.rate / step.options.step, np.nan)
-        peak = int(np.nanargmax(share))
-        label = f"overshoot {100 * over:.3g} %"
-        x, y = float(step.time[peak]), float(step.rate[peak])
-        yield Mark(label, x=x, y=y, point=True, series=step.series)
-    if math.isfinite(settled):
-        yield Mark(f"settled {_time(settled)}", x=settled, series=step.series)
-
-
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 EXPERIMENT = Experiment(

@@ -33,6 +33,7 @@ from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.recording import Recording
 from campaign.result import (
     Array,
     Axis,
@@ -47,7 +48,7 @@ from campaign.result import (
     Table,
 )
 from campaign.signals import Polyline
-from campaign.trial import Recording, Task, TrialRequest
+from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Frequency, RotationalStiffness, Time
 
 

@@ -48,6 +48,7 @@ from campaign.result import (
     Table,
 )
 from campaign.signals import Polyline
+from campaign.text import number
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
@@ -195,8 +196,9 @@ def _analyse(data: TestData) -> Result:
             Column("curve", "Stribeck curve", "N m", "N m", reason=OF_THE_MODEL),
         ),
         rows=tuple(rows),
-        note=f"Measured torque and curve agree within {max(worst, 1e-12):.0e} of the torque. A "
-        "reading is the friction over the travel of its window; a ripple over position that is "
+        note="Measured torque and curve agree within "
+        f"{number(max(worst, 1e-12), 1)} of the torque. "
+        "A reading is the friction over the travel of its window; a ripple over position that is "
         f"longer than that stays in it. {OF_ONE}",
     )
     figure = Figure(

@@ -7,7 +7,7 @@ from pathlib import Path
 from campaign.access import TrialView
 from campaign.export.interface import ExportKind
 from campaign.plain_text import on_a_page
-from campaign.trial import Recording
+from campaign.recording import Recording
 
 
 def _write(trial: TrialView, recording: Recording, path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.access import TrialView
-from campaign.trial import Recording
+from campaign.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ from campaign.access import TrialView
 from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
-from campaign.trial import Recording, canonical_json
+from campaign.recording import Recording
+from campaign.trial import canonical_json
 
 LARGEST = 2**31 - 1
 """Bytes of a variable in version 5; version 7.3 would be HDF5, as the archive is."""

@@ -8,7 +8,8 @@ from campaign.access import TrialView
 from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
-from campaign.trial import Recording, canonical_json
+from campaign.recording import Recording
+from campaign.trial import canonical_json
 
 
 def _write(trial: TrialView, recording: Recording, path: Path) -> None:

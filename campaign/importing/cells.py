@@ -42,10 +42,16 @@ UNIT_WORDS = {
     "newton": "N",
     "u/min": "rpm",
     "umdr/min": "rpm",
+    "tr/min": "rpm",
+    "t/min": "rpm",
+    "giri/min": "rpm",
     "min-1": "1/min",
     "%": "percent",
     "inc": "count",
     "ticks": "count",
+    "cnt": "count",
+    "cnts": "count",
+    "cnt/s": "count/s",
 }
 """Units as instruments write them, in lower case, in the spelling of the program's grammar."""
 _BRACKETED = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")

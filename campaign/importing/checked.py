@@ -19,9 +19,9 @@ QUIET = frozenset({"quantisation", "constant"})
 """Kinds that are in every recording: nobody needs to be told of them once more."""
 
 _REMEDIES = {
-    "scale": "correct its 'unit' or 'times'",
-    "swap_sign": "correct its 'sign'",
-    "shift": "put it back by 'delay'",
+    "times": "correct its 'unit' or 'times'",
+    "sign": "correct its 'sign'",
+    "delay": "put it back by 'delay'",
     "unwrap": 'repair = ["unwrap"] makes it continuous',
 }
 

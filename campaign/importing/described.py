@@ -15,7 +15,7 @@ from pydantic import Field
 from campaign.errors import Problem
 from campaign.importing.interface import RecordingError, check_regular
 from campaign.options import Options
-from campaign.trial import ChannelInfo
+from campaign.recording import ChannelInfo
 
 _CHUNK = 1 << 20  # bytes at a time
 
@@ -59,19 +59,19 @@ class ClockUsed(Options):
 class Made(Options):
     """A channel: factor * (column - offset), read `shift` samples later; or from another channel.
 
-    A channel of the vocabulary is `how` = column, copy or derivative; where it is made from another
-    channel, that one stands before it.
+    `how` = column, copy, derivative or integral; where it is made from another channel, that one
+    stands before it.
     """
 
     name: str
     unit: str
     label: str
     display_unit: str
-    how: Literal["column", "copy", "derivative"] = "column"
+    how: Literal["column", "copy", "derivative", "integral"] = "column"
     cells: Cells | None = None
     """Of a column."""
     source: str = ""
-    """Of a copy or a derivative: the other channel."""
+    """Of a copy, a derivative or an integral: the other channel."""
     factor: float = 1.0
     """From the column's unit to `unit`, with its sign and what it is multiplied by."""
     offset: float = 0.0

@@ -42,17 +42,26 @@ TIMELESS = (
 )
 
 
+DRIFTS = (
+    "it is zero where the trial begins, and what that channel reads at rest makes it drift; "
+    "'offset' of its column takes that out"
+)
+"""What is to be known of a channel that adds another one up."""
+
+
 class MappingError(ValueError):
     """What of a mapping does not go with its files.
 
     Attributes:
         keys: of `[[test.recording]]` or of `[columns.NAME]`, where it stands.
         of_columns: which of the two.
+        others: what is wrong besides, told together with it.
     """
 
     def __init__(self, message: str, keys: Key = (), *, of_columns: bool = False) -> None:
         self.keys = keys
         self.of_columns = of_columns
+        self.others: tuple[MappingError, ...] = ()
         super().__init__(message)
 
 
@@ -104,8 +113,7 @@ class _Finding:
     used: tuple[FileUsed, ...]
 
     def trials(self) -> Iterator[tuple[Described, Stretch]]:
-        cells = self._channel_cells()
-        clocks = self._clocks({(c.file, c.table) for c in cells.values()})
+        cells, clocks = self._columns_and_clocks()
         for each in (*cells.values(), *(c.cells for c in clocks.values() if c.cells)):
             self.opened.want(each)
         main = self._main(clocks)
@@ -117,12 +125,28 @@ class _Finding:
         for stretch in self._stretches(main, clocks[main], chosen):
             yield self._described(main, stretch, cells, clocks), stretch
 
-    def _channel_cells(self) -> dict[str, Cells]:
-        found = {}
+    def _columns_and_clocks(self) -> tuple[dict[str, Cells], dict[tuple[int, int], ClockUsed]]:
+        """Where each channel is, and the clock of each table; all that is missing at once."""
+        cells: dict[str, Cells] = {}
+        clocks: dict[tuple[int, int], ClockUsed] = {}
+        faults: list[MappingError] = []
         for name, channel in self.layout.channels.items():
-            if channel.column is not None:
-                found[name] = self._find((name, "column"), channel, of_columns=True)
-        return found
+            if channel.column is None:
+                continue
+            try:
+                cells[name] = self._find((name, "column"), channel, of_columns=True)
+                self._column(name, channel, cells[name], 0)
+            except MappingError as error:
+                faults.append(error)
+        for table in sorted({(each.file, each.table) for each in cells.values()}):
+            try:
+                clocks[table] = self._clock(*table)
+            except MappingError as error:
+                faults.insert(0, error)
+        if faults:
+            faults[0].others = tuple(faults[1:])
+            raise faults[0]
+        return cells, clocks
 
     def _find(self, keys: Key, wanted: ColumnPlace, *, of_columns: bool = False) -> Cells:
         try:
@@ -144,9 +168,6 @@ class _Finding:
             yield ("trigger", "column"), ColumnPlace(column=entry.trigger.column)
 
     # Clocks
-
-    def _clocks(self, tables: Collection[tuple[int, int]]) -> dict[tuple[int, int], ClockUsed]:
-        return {table: self._clock(*table) for table in sorted(tables)}
 
     def _clock(self, file: int, table: int) -> ClockUsed:
         time, stated = self.layout.time, self.opened.table(file, table).clock
@@ -330,7 +351,7 @@ class _Finding:
                 made[name] = one
         for name, channel in self.layout.channels.items():
             if name not in cells:
-                made |= self._derived(name, channel, made)
+                made |= self._derived(name, channel, made, remarks)
         for one, remark in following(self.wanted - made.keys(), made, self.rig):
             made[one.name] = one
             remarks.append(remark)
@@ -344,20 +365,28 @@ class _Finding:
             remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
         if shift:
             remarks.append(f"{name} is put back by {shift} samples, {shift / even.rate:.6g} s")
+        return self._column(name, channel, at, shift)
+
+    def _column(self, name: str, channel: ChannelColumn, at: Cells, shift: int) -> Made:
         try:
             return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig, shift)
         except ValueError as error:
             raise MappingError(f"{self._names()}: {error}", (name,), of_columns=True) from None
 
-    def _derived(self, name: str, channel: ChannelColumn, made: dict[str, Made]) -> dict[str, Made]:
+    def _derived(
+        self, name: str, channel: ChannelColumn, made: dict[str, Made], remarks: list[str]
+    ) -> dict[str, Made]:
         source = made.get(channel.derive)
         if source is None:
             message = f"{channel.derive} is derived itself; derive {name} from a column"
             raise MappingError(message, (name, "derive"), of_columns=True)
         try:
-            return {name: made_of_channel(name, channel, source, self.rig)}
+            one = made_of_channel(name, channel, source, self.rig)
         except ValueError as error:
             raise MappingError(str(error), (name, "derive"), of_columns=True) from None
+        if one.how == "integral":
+            remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
+        return {name: one}
 
     def _slower(
         self, clock: ClockUsed, table: tuple[int, int], even: EvenClock

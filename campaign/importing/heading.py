@@ -24,11 +24,19 @@ def heading(above: Sequence[list[str]], columns: int) -> Heading:
     paired = _pairs(rows, columns)
     if paired is not None:
         return paired
-    # Of comments only the last can be a heading; those above it are sentences.
+    # Of comments only the last can be a heading, and the one above it if that is of units; those
+    # above are sentences.
     commented = [k for k, cells in enumerate(rows) if cells[0][:1] in ("#", "%")]
-    rows = rows[commented[-1] :] if commented else rows
-    rows = [[cells[0].lstrip("#% "), *cells[1:]] for cells in rows]
-    rows = [cells[:columns] if cells[0] else cells[1 : columns + 1] for cells in rows]
+    if commented:
+        last = commented[-1]
+        bare = _unmarked(rows[last])
+        named = last - 1 in commented and any(bare) and _all_units(bare)
+        rows = rows[last - named :]
+    rows = [_unmarked(cells) for cells in rows]
+    # A mark of a comment may be a cell of its own. An index without a name is a column, and so is
+    # one without a unit; what is one cell too long then ends with a separator.
+    marked = [not cells[0] and len(cells) > columns and cells[-1] != "" for cells in rows]
+    rows = [cells[m : columns + m] for cells, m in zip(rows, map(int, marked), strict=True)]
     while rows and any(map(_is_any_number, rows[0])) and not _are_channels(rows):
         rows.pop(0)  # a key and its value
     if len(rows) > 1 and _is_key_of_units(rows[0]) and not _all_units(rows[1]):
@@ -36,6 +44,13 @@ def heading(above: Sequence[list[str]], columns: int) -> Heading:
         keyed = ("", *(without_brackets(cell) for cell in rows[0][1:]))
         return names, tuple(a or b for a, b in zip(own, keyed, strict=True)), used
     return _named(rows, columns)
+
+
+def _unmarked(cells: Sequence[str]) -> list[str]:
+    """Without the mark of a comment, which hides the quotes of the cell behind it."""
+    bare = cells[0].lstrip("#% ")
+    quoted = bare != cells[0] and len(bare) > 1 and bare[0] == bare[-1] == '"'
+    return [bare[1:-1] if quoted else bare, *cells[1:]]
 
 
 def _named(rows: Sequence[list[str]], columns: int) -> Heading:

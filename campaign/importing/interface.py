@@ -5,9 +5,11 @@ Nothing is converted here and nothing is guessed: a unit is text, a number what 
 
 from __future__ import annotations
 
+import difflib
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,9 @@ HEAD = 1 << 16
 """Bytes by which a format is recognised, and an encoding judged."""
 ROWS = 65_536
 """Most rows of a block: memory does not grow with a recording."""
+
+LISTED = 5000
+"""Files of a folder among which a name that is not there is looked for."""
 
 
 class RecordingError(UsageError):
@@ -39,12 +44,25 @@ def check_regular(path: Path) -> None:
         mode = path.stat().st_mode
     except (OSError, ValueError) as error:
         told = getattr(error, "strerror", None) or str(error)
-        raise RecordingError([Problem(path, 0, 0, f"it cannot be opened: {told}")]) from None
+        hint = _nearest_file(path) if isinstance(error, FileNotFoundError) else ""
+        message = f"it cannot be opened: {told}{hint}"
+        raise RecordingError([Problem(path, 0, 0, message)]) from None
     if stat.S_ISDIR(mode):
         raise RecordingError([Problem(path, 0, 0, "it cannot be opened: it is a folder")])
     if not stat.S_ISREG(mode):
         message = "it cannot be opened: it is a pipe, a device or the like, and no regular file"
         raise RecordingError([Problem(path, 0, 0, message)])
+
+
+def _nearest_file(path: Path) -> str:
+    """The file of its folder that is called most alike, for a message; "" where none is."""
+    try:
+        names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
+    except OSError:
+        return ""
+    by_letters = {name.casefold(): name for name in names}
+    close = difflib.get_close_matches(path.name.casefold(), by_letters, 1)
+    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
 
 
 @dataclass(frozen=True)

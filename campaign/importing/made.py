@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from campaign.channels import (
     COMMAND,
@@ -22,7 +23,7 @@ from campaign.channels import (
 )
 from campaign.importing.described import Cells, Made
 from campaign.importing.mapping import ChannelColumn
-from campaign.trial import ChannelInfo
+from campaign.recording import ChannelInfo
 from campaign.unit_grammar import ONE, Unit, parse_unit
 from campaign.units import split_quantity
 
@@ -93,17 +94,20 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
     """
     what = _info(name, entry, rig, None)
     number, by = _times(entry)
-    for how in ("copy", "derivative"):
-        unit = _unit(source.unit) * by
-        if how == "derivative":
-            unit = unit * _unit("1/s")
+    ways: tuple[tuple[Literal["copy", "derivative", "integral"], str], ...] = (
+        ("copy", "1"),
+        ("derivative", "1/s"),
+        ("integral", "s"),
+    )
+    for how, per in ways:
+        unit = _unit(source.unit) * by * _unit(per)
         if unit.dimensions == _unit(what.unit).dimensions:
             return Made(
                 name=name,
                 unit=what.unit,
                 label=what.label,
                 display_unit=what.display_unit,
-                how="copy" if how == "copy" else "derivative",
+                how=how,
                 source=source.name,
                 factor=entry.sign * number * float(unit.factor / _unit(what.unit).factor),
                 relative_uncertainty=_together(
@@ -113,7 +117,7 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
             )
     raise ValueError(
         f"{name} is in {what.unit} and {source.name} in {source.unit}; neither that times a "
-        "constant nor its derivative is the other"
+        "constant nor its derivative or integral is the other"
     )
 
 

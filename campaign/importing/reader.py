@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from campaign.errors import Problem
-from campaign.importing.defects.repairs import unwrap
+from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
 from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.interface import ROWS, Array, RecordingError
 from campaign.importing.opened import OpenedFiles
-from campaign.trial import Channel, Recording
+from campaign.recording import Channel, Recording
 
 
 class RecordingReader:
@@ -67,6 +67,8 @@ class RecordingReader:
         source = self._made[made.source]
         if made.how == "copy":
             return made.factor * self._channel(source, first, stop)
+        if made.how == "integral":
+            return self._integrated(made, source)[first:stop]
         before, after = max(first - 1, 0), min(stop + 1, self.described.samples)
         values = self._channel(source, before, after)
         slope = np.gradient(values) if len(values) > 1 else np.zeros(len(values))
@@ -78,7 +80,15 @@ class RecordingReader:
         if made.name not in self._whole:
             plain = made.model_copy(update={"period": None})
             values = self._channel(plain, 0, self.described.samples)
-            self._whole[made.name] = unwrap(values, period).values
+            self._whole[made.name] = continuous(values, period)
+        return self._whole[made.name]
+
+    def _integrated(self, made: Made, source: Made) -> Array:
+        """All of an integral, by trapezoids; behind a lost sample nothing of it is known."""
+        if made.name not in self._whole:
+            values = self._channel(source, 0, self.described.samples)
+            steps = 0.5 * (values[1:] + values[:-1]) / self.described.sample_rate
+            self._whole[made.name] = made.factor * np.concatenate([[0.0], np.cumsum(steps)])
         return self._whole[made.name]
 
     def _column(self, made: Made, cells: Cells, first: int, stop: int) -> Array:

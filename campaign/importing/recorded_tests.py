@@ -28,7 +28,8 @@ from campaign.physics.bench import Bench
 from campaign.protocol.files import Origin
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import ChosenValue, ExperimentKind, Protocol, StageKind, Test
-from campaign.trial import Offered, Recording, Task, TrialRequest
+from campaign.recording import Recording
+from campaign.trial import Offered, Task, TrialRequest
 from campaign.units import to_si
 
 ROUNDING = 1e-9
@@ -165,7 +166,8 @@ class _Loader:
                 )
                 continue
             except MappingError as error:
-                self.problems.append(self._placed(at, below, entry, error))
+                every = (error, *error.others)
+                self.problems += (self._placed(at, below, entry, each) for each in every)
                 continue
             self.stack.enter_context(opened)
             found += (Found(entry, index, *both, opened) for both in trials)

@@ -14,8 +14,8 @@ from campaign.link.errors import RefusedError, SilenceError, ViolationError
 from campaign.link.records import Missing, RecordOrder
 from campaign.link.session import Session, Traffic
 from campaign.plain_text import printable
-from campaign.trial import Array, Ending, Fault, Outcome, Recorder, SafeState
-from campaign.trial import Event as TrialEvent
+from campaign.recording import Array, Ending, Fault, Outcome, Recorder, SafeState
+from campaign.recording import Event as TrialEvent
 from campaign.wire.messages import (
     Channel,
     End,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from campaign.trial import Fault, PanicStop
+from campaign.recording import Fault, PanicStop
 from campaign.wire.messages import Nak
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from campaign.plain_text import printable
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 from campaign.wire.codes import LatchCause
 from campaign.wire.messages import Latch
 

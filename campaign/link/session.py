@@ -21,7 +21,7 @@ from campaign.link.errors import (
 from campaign.link.panic import panic_stop_of
 from campaign.link.safe import is_safe, query_frame, safe_frame
 from campaign.plain_text import printable
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
 from campaign.wire.frames import FrameDecoder, encode_frame
 from campaign.wire.messages import (

@@ -127,13 +127,6 @@ def pointing_high_pass(bench: Bench) -> float:
     return 0.0 if bench.controller is None else bench.controller.pointing_high_pass
 
 
-def rate_gains_of(bench: Bench, who: str) -> RateController:
-    """Gains of the rate loop. Raises IncompleteBenchError where nobody says them."""
-    if bench.controller is None or bench.controller.rate is None:
-        raise IncompleteBenchError.of(bench, ("controller.rate",), who)
-    return bench.controller.rate
-
-
 def limits_of(bench: Bench, who: str = "whatever moves") -> LimitsOptions:
     """Its limits. Raises IncompleteBenchError where it has none."""
     if bench.limits is None:

@@ -109,11 +109,12 @@ def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> s
         if shape is None:
             if not names:
                 whole = ".".join(str(part) for part in keys[:depth])
-                return f"nothing to sweep at '{prefix}{whole}.{key}': '{whole}' has no parts"
+                told = shown(f"{prefix}{whole}.{key}")
+                return f"nothing to sweep at {told}: {shown(whole)} has no parts"
             before = prefix + "".join(f"{part}." for part in keys[:depth])
             paths = [f"{before}{name}" for name in names] + ([] if prefix else ["bench.…"])
             slip = nearest(f"{before}{key}", paths)
-            return f"nothing to sweep at '{before}{key}'; {allowed(paths)}{slip}"
+            return f"nothing to sweep at {shown(f'{before}{key}')}; {allowed(paths)}{slip}"
         tree = tree.get(key) if isinstance(tree, Mapping) else None
     return ""
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
 from campaign.errors import CampaignError
+from campaign.recording import ChannelInfo, Recording, SafeState
 from campaign.testing.under_test import CheckFailedError, require
-from campaign.trial import ChannelInfo, Recording, SafeState, Trial
+from campaign.trial import Trial
 
 _AT = "2000-01-01T00:00:00Z"
 

@@ -9,21 +9,14 @@ import numpy as np
 
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError
+from campaign.recording import Array, Ending, Outcome, Recording, SafeState
 from campaign.testing.archiving import archived_as_recorded
 from campaign.testing.outside import keeps_a_stop_from_outside
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.supervised import Disturb, got_through, supervised, with_narrow_limit
 from campaign.testing.together import executes_together_what_it_does_alone
 from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
-from campaign.trial import (
-    Array,
-    Ending,
-    Outcome,
-    Recording,
-    SafeState,
-    Trial,
-    canonical_json,
-)
+from campaign.trial import Trial, canonical_json
 from campaign.units import factor
 
 LATEST = 0.2

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from campaign.backends.interface import Backend, StoppedOutside
 from campaign.errors import BackendError
+from campaign.recording import Ending, Outcome, PanicStop
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.under_test import BackendUnderTest, CheckFailedError, require
-from campaign.trial import Ending, Outcome, PanicStop, Trial
+from campaign.trial import Trial
 
 
 def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from campaign.trial import Array, ChannelInfo, Ending, Event, MemoryRecorder, Recording
+from campaign.recording import Array, ChannelInfo, Ending, Event, MemoryRecorder, Recording
 
 
 class StrictRecorder:

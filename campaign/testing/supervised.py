@@ -15,8 +15,7 @@ from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision
 from campaign.physics.limit_watch import WATCHED
-from campaign.testing.under_test import BackendUnderTest, CheckFailedError, require
-from campaign.trial import (
+from campaign.recording import (
     Array,
     ChannelInfo,
     Ending,
@@ -25,8 +24,9 @@ from campaign.trial import (
     Recorder,
     Recording,
     SafeState,
-    Trial,
 )
+from campaign.testing.under_test import BackendUnderTest, CheckFailedError, require
+from campaign.trial import Trial
 
 OTHERS = 1e300
 """What the limits are that a check is not about."""

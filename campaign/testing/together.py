@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from campaign.backends.interface import Backend, ExecutesTogether
+from campaign.recording import Outcome, Recording
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.under_test import BackendUnderTest, require
-from campaign.trial import Outcome, Recording, Trial
+from campaign.trial import Trial
 
 
 def executes_together_what_it_does_alone(under_test: BackendUnderTest) -> None:

@@ -1,7 +1,7 @@
 """The numbers of the protocol: message types, states, refusals, outcomes, faults, formats.
 
 Every enumeration is one byte on the wire; `.text` is the same word as elsewhere in the program,
-e.g. `campaign.trial.Fault(Fault.OVER_TEMPERATURE.text)`.
+e.g. `campaign.recording.Fault(Fault.OVER_TEMPERATURE.text)`.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class NakCode(Code):
 
 
 class Outcome(Code):
-    """How a trial ended; `campaign.trial.Outcome` by `.text`."""
+    """How a trial ended; `campaign.recording.Outcome` by `.text`."""
 
     COMPLETED = 0
     LIMIT = 1
@@ -114,7 +114,7 @@ class Outcome(Code):
 
 
 class Fault(Code):
-    """What failed; all but NONE are `campaign.trial.Fault` by `.text`."""
+    """What failed; all but NONE are `campaign.recording.Fault` by `.text`."""
 
     NONE = 0
     LOST_CONNECTION = 1

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
-from campaign.trial import ChannelInfo, Ending, Event, Outcome, Task, Trial
+from campaign.recording import ChannelInfo, Ending, Event, Outcome
+from campaign.trial import Task, Trial
 
 CREATED = "2026-11-21T09:36:58Z"
 STARTED = "2026-11-21T09:37:00.250Z"

@@ -17,7 +17,7 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
 from campaign.archive.layout.journal import JOURNAL
 from campaign.errors import ArchiveError, UsageError
-from campaign.trial import Ending, Outcome
+from campaign.recording import Ending, Outcome
 
 # Writes trials without end or, with "seal", a few and then one file; says what it finished.
 CHILD = """

@@ -12,8 +12,9 @@ from campaign.archive import PlannedTrial, RunStatus, RunWriter
 from campaign.archive.verifying.verification import verify_run
 from campaign.archive.writing.default_plot import telling_trial
 from campaign.backends.sim import CHANNELS
+from campaign.recording import Ending, Outcome
 from campaign.signals import Sine
-from campaign.trial import Ending, Outcome, Role, Task, Trial
+from campaign.trial import Role, Task, Trial
 
 SHAKEN = Sine(amplitude=0.3, frequency=0.24)
 TORQUES = {"friction_torque", "compensation_torque", "drive_torque"}

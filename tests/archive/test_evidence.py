@@ -23,7 +23,7 @@ from campaign.archive.reading.sound_samples import whole_recording
 from campaign.archive.verifying.statement import run_statement
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import (
     canonical,
     change_record,

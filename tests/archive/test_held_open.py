@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from campaign.archive import RunReader, open_run
-from campaign.archive.reading import guarded
+from campaign.archive.reading import guarded, heaps
 from campaign.errors import ArchiveError
 from tests.archive.test_kept import KEPT
 
@@ -72,3 +72,23 @@ def test_an_opened_run_is_the_same_in_another_process(name: str) -> None:
     assert read_all(other) == read_all(run)
     assert len(other.full_plan) == len(run.full_plan)
     assert other.planned(1) == run.planned(1)
+
+
+def test_what_is_known_of_heaps_is_told_another_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = Path(shutil.copy(KEPT / "format-2.nxs", tmp_path))
+    looked: list[Path] = []
+    original = heaps._sound
+    monkeypatch.setattr(heaps, "_sound", lambda *of: (looked.append(of[0]), original(*of))[1])
+    monkeypatch.setattr(heaps, "_known", {})
+    run = open_run(path)
+    assert looked == [path]
+    known = heaps.known_heaps()
+    heaps._known.clear()  # as in a process that has just begun
+    heaps.told_of_heaps(known)
+    read_all(run)
+    assert looked == [path]
+    path.touch()  # it may be another file by now
+    read_all(run)
+    assert looked == [path, path]

@@ -30,7 +30,7 @@ from campaign.archive.layout.journal import (
     read_journal,
 )
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome, SafeState
+from campaign.recording import Outcome, SafeState
 
 AT = "2026-11-21T09:37:00Z"
 STARTED = RunStarted(at=AT, run="r", format=2, trials=3)

@@ -12,7 +12,8 @@ from campaign.archive import RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
-from campaign.trial import ChannelInfo, Ending, Fault, Outcome, Role, SafeState
+from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
+from campaign.trial import Role
 from tests.archive.forging import series_digest
 
 KEPT = Path(__file__).parent / "kept"

@@ -18,6 +18,7 @@ from campaign.archive import (
 )
 from campaign.archive.layout.journal import read_journal
 from campaign.errors import ArchiveError, UsageError
+from campaign.trial import Ending, Outcome
 
 NOW = datetime(2026, 11, 21, 9, 36, 58, tzinfo=UTC)
 
@@ -66,6 +67,23 @@ def test_a_list_tells_how_each_run_went(results, kit):
     assert (listed[3].status, listed[3].trials, listed[3].planned) == (RunStatus.INCOMPLETE, 1, 1)
     assert listed[1].bytes == listed[1].path.stat().st_size
     assert (listed[1].protocol, listed[1].created) == ("tiny", kit.CREATED)
+
+
+def test_a_trial_that_somebody_stopped_has_not_failed(tmp_path, kit):
+    """In the folder of a run as well as in its sealed file."""
+    trials = [kit.trial(number) for number in (1, 2, 3)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    kit.record(writer, trials[0], 10)
+    kit.record(writer, trials[1], None)
+    writer.begin(trials[2]).finish(Ending(Outcome.INTERRUPTED, "Ctrl-C"), kit.STARTED, kit.ENDED)
+
+    def counted():
+        (run,) = list_runs(tmp_path)
+        return run.trials, run.failed, run.interrupted
+
+    assert counted() == (3, 1, 1)
+    writer.seal(RunStatus.INTERRUPTED, "stopped by Ctrl-C", ended=kit.ENDED)
+    assert counted() == (3, 1, 1)
 
 
 def test_a_run_is_found_by_path_name_or_beginning(results, monkeypatch):

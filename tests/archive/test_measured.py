@@ -17,7 +17,7 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
 from campaign.archive.verifying.verification import verify_run
 from campaign.estimate import Estimate, Systematic
-from campaign.trial import Ending, Outcome
+from campaign.recording import Ending, Outcome
 from tests.archive import forging
 
 TOP = Estimate("top", 0.25, "rad/s", 0.21, 0.29, 0.95, "the largest sample", freedom=7.0)

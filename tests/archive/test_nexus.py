@@ -17,7 +17,7 @@ from campaign.archive.layout.storage import CHUNK
 from campaign.archive.writing.nexus import REQUIRED, VERSION, definition_path
 from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.backends.sim import CHANNELS
-from campaign.trial import ChannelInfo, Ending, Outcome
+from campaign.recording import ChannelInfo, Ending, Outcome
 
 
 def nxcheck(path: Path) -> tuple[int, int, str]:

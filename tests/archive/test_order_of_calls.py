@@ -18,7 +18,8 @@ from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
 from campaign.estimate import Estimate
-from campaign.trial import ChannelInfo, Ending, Outcome, SafeState, Trial
+from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
+from campaign.trial import Trial
 from tests.archive.recorded_calls import Call, Calls, recorded
 from tests.archives import _header, plan_of
 

@@ -21,7 +21,7 @@ from campaign.archive.layout.record import (
 )
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
-from campaign.trial import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
+from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
 
 ENDING = Ending(
     Outcome.FAULT,

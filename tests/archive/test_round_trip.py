@@ -12,7 +12,8 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.storage import CHUNK
 from campaign.archive.writing.preview import PREVIEW_POINTS
-from campaign.trial import Ending, Outcome, Role, SafeState
+from campaign.recording import Ending, Outcome, SafeState
+from campaign.trial import Role
 
 
 def equal_bits(a, b):

@@ -15,7 +15,7 @@ import pytest
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import put_text, text_of
 
 

@@ -16,7 +16,8 @@ from campaign.archive.verifying.verification import verify_run
 from campaign.archive.writing.nexus import REQUIRED
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.errors import ArchiveError
-from campaign.trial import ChannelInfo, Ending, Outcome, Role, SafeState
+from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
+from campaign.trial import Role
 from tests.archive.forging import sha256, text_of
 
 ENDED = "2026-11-21T09:40:00Z"

@@ -22,7 +22,7 @@ from campaign.archive.verifying.verification import verify_run
 from campaign.archive.writing import hdf5 as hdf5_module
 from campaign.archive.writing import sealed_file, sealing
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Outcome
+from campaign.recording import Ending, Outcome
 from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of
 
 WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well

@@ -9,7 +9,7 @@ from campaign.archive.layout.followed import trials_followed, trials_in
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 
 AT = "2026-11-21T09:37:02Z"
 STAGED = {

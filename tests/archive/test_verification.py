@@ -12,7 +12,7 @@ from campaign.archive import RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.verifying.result import PER_DATASET, STRUCTURE, UNFINISHED
 from campaign.archive.verifying.verification import verify_run
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 
 KEPT = Path(__file__).parent / "kept"

@@ -11,7 +11,7 @@ from campaign.archive.layout.storage import CHUNK, pack
 from campaign.archive.writing.hdf5 import SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.errors import BackendError
-from campaign.trial import ChannelInfo
+from campaign.recording import ChannelInfo
 
 
 def test_memory_is_one_chunk_whatever_is_appended(tmp_path):

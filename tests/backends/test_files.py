@@ -17,9 +17,10 @@ from scipy.io import loadmat, savemat
 
 from campaign.backends.files import BACKEND, DEFECTS, FilesBackend
 from campaign.errors import ProtocolError, UsageError
+from campaign.recording import Ending, Fault, Outcome, Recording, SafeState
 from campaign.signals import Polyline, Sine
 from campaign.testing import BackendUnderTest, StrictRecorder, backend_checks
-from campaign.trial import Ending, Fault, Outcome, Recording, SafeState, Task, Trial
+from campaign.trial import Task, Trial
 from tests.physics.benches import bench
 
 ROOT = Path(__file__).parents[2]
@@ -230,6 +231,57 @@ def test_a_linear_axis_is_asked_in_its_own_units(tmp_path: Path) -> None:
         assert not re.search(r"\b(rad|deg|N m)\b", text)
     hand_in(out)
     assert execute(opened(tmp_path, (trial,)), trial).ending.outcome is Outcome.COMPLETED
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "command", "limit"),
+    [
+        (
+            "rotary",
+            "begins at 28.6479 deg instead of 0 deg",
+            "deg/s",
+            "limit is 5.72958 deg/s",
+        ),
+        ("linear", "begins at 500 mm instead of 0 mm", "mm/s", "limit is 100 mm/s"),
+    ],
+)
+def test_reasons_are_in_the_units_that_a_person_reads(
+    tmp_path: Path, kind: str, place: str, command: str, limit: str
+) -> None:
+    limits = {"angle": 1.0, "rate": 1.0, "acceleration": 5.0, "torque": 900.0, "current": 9.0}
+    tree = {
+        "name": "carriage",
+        "axis": {"name": "x", "kind": kind},
+        "limits": {**limits, "duration": 60.0},
+    }
+    trial = TRIAL.model_copy(update={"bench": tree})
+
+    def told(folder: Path, one: Trial, columns: Columns) -> str:
+        execute(opened(folder, (one,)), one)
+        hand_in(folder / "trial-00003", columns)
+        execute(opened(folder, (one,)), one)
+        return json.loads((folder / "trial-00003" / "verdict.json").read_text(encoding="utf-8"))[
+            "refused"
+        ]
+
+    assert place in told(
+        tmp_path / "a", trial, changed(relative_angle=GOOD["relative_angle"] + 0.5)
+    )
+    off = np.where(TIME > 1.0, -1.0, 1.0) * GOOD["command"] - 0.05 * np.sin(40 * TIME)
+    said = told(tmp_path / "b", trial, changed(command=off))
+    assert re.search(rf"the command is [-\d.e]+ {command} instead of [-\d.e]+ {command} at", said)
+    slow = {**tree, "limits": {**limits, "rate": 0.1, "duration": 60.0}}
+    assert limit in told(tmp_path / "c", trial.model_copy(update={"bench": slow}), GOOD)
+
+
+def test_the_page_says_how_long_to_go_on_behind_the_rate_that_ends_a_trial(tmp_path: Path) -> None:
+    task = TASK.model_copy(update={"stop_rate": 0.02})
+    trial = TRIAL.model_copy(update={"task": task})
+    execute(opened(tmp_path, (trial,)), trial)
+    page = (tmp_path / "trial-00003" / "index.html").read_text(encoding="utf-8")
+    assert "has passed 1.14592 deg/s, play and record on for 0.16 s (40 samples)" in page
+    told = json.loads((tmp_path / "trial-00003" / "manifest.json").read_text(encoding="utf-8"))
+    assert told["record_after_stop_rate"] == 0.16
 
 
 def test_what_no_rig_can_do_is_refused(tmp_path: Path) -> None:

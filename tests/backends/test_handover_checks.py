@@ -11,7 +11,7 @@ from campaign.backends.handover.checks import (
     wrong_length,
     wrong_motion,
 )
-from campaign.backends.handover.judging import _until_stopped
+from campaign.backends.handover.judging import FEWEST, GO_ON, _until_stopped
 from campaign.backends.handover.returned import Returned
 from campaign.channels import info
 from campaign.signals import Polyline, Sine
@@ -214,3 +214,54 @@ def test_noise_of_a_differenced_position_ends_no_trial() -> None:
     quiet, stopped = _until_stopped(trial, came_back(gyro_rate=0.0 * sliding, relative_rate=noisy))
     assert not stopped
     assert len(quiet.time) == len(TIME)
+
+
+RAMP = Trial(
+    number=1,
+    test="ramp",
+    kind="breakaway",
+    seed=1,
+    bench={},
+    task=TASK.model_copy(update={"stop_rate": 0.02}),
+)
+
+
+def rates(acceleration: float, growth: float = 0.0) -> np.ndarray:
+    """Of a load that breaks away at 3 s: at once, or as an instability grows (1/s)."""
+    after = np.maximum(TIME - 3.0, 0.0)
+    return acceleration * (np.expm1(growth * after) / growth if growth else after)
+
+
+def test_of_a_load_that_breaks_away_at_once_enough_is_kept() -> None:
+    light = rates(40.0)
+    cut, stopped = _until_stopped(RAMP, came_back(gyro_rate=light))
+    assert stopped
+    assert np.sum(cut["gyro_rate"] > 0.5 * cut["gyro_rate"][-1]) >= FEWEST
+    assert len(cut.time) < np.argmax(light > 0.02) + GO_ON
+    # Of a slow one nothing that is not needed: what it does later is another friction.
+    slow = rates(1e-4, growth=4.0)
+    cut, stopped = _until_stopped(RAMP, came_back(gyro_rate=slow))
+    assert stopped
+    assert cut["gyro_rate"][-1] < 1.1 * 0.02
+    # Who ended it at once is told how little that is by the analysis, and is not refused.
+    ended = int(np.argmax(light > 0.02)) + 5
+    cut, stopped = _until_stopped(RAMP, came_back(gyro_rate=light[:ended]))
+    assert stopped
+    assert len(cut.time) == ended
+
+
+def test_behind_the_rate_that_ends_a_trial_no_limit_is_broken() -> None:
+    """It came to that rate within its limits, and there the trial was over."""
+    limits = {"angle": 1.0, "rate": 5.0, "acceleration": 50.0, "torque": 9.0, "current": 9.0}
+    trial = RAMP.model_copy(update={"bench": {"limits": {**limits, "duration": 60.0}}})
+    light = rates(40.0)
+    first = int(np.argmax(light > 0.02))
+    whole, _ = _until_stopped(trial, came_back(gyro_rate=light))
+    beyond = len(whole.time) - 2
+    torque = np.where(np.arange(len(TIME)) >= beyond, 10.0, 5.0)
+    cut, stopped = _until_stopped(trial, came_back(gyro_rate=light, drive_torque=torque))
+    assert stopped
+    assert len(cut.time) == beyond
+    early = np.where(np.arange(len(TIME)) >= first - 7, 10.0, 5.0)
+    cut, _ = _until_stopped(trial, came_back(gyro_rate=light, drive_torque=early))
+    assert cut["drive_torque"][-1] == 10.0  # before it: the recorder ends the trial there

@@ -13,7 +13,7 @@ import campaign
 from campaign.archive import open_run
 from campaign.backends.replay import BACKEND, ReplayOptions
 from campaign.protocol import as_tree
-from campaign.trial import (
+from campaign.recording import (
     Channel,
     Ending,
     Event,
@@ -22,8 +22,8 @@ from campaign.trial import (
     Outcome,
     Recording,
     SafeState,
-    Trial,
 )
+from campaign.trial import Trial
 from tests.archives import PROTOCOL, archived, executed, plan_of, simulated_run
 
 

@@ -14,17 +14,9 @@ from campaign.backends.sim import BACKEND as SIM
 from campaign.backends.sim import SimOptions
 from campaign.errors import UsageError
 from campaign.protocol.bench_file import load_bench
+from campaign.recording import Ending, Fault, MemoryRecorder, Outcome, Recording, SafeState
 from campaign.signals import Polyline, Sine
-from campaign.trial import (
-    Ending,
-    Fault,
-    MemoryRecorder,
-    Outcome,
-    Recording,
-    SafeState,
-    Task,
-    Trial,
-)
+from campaign.trial import Task, Trial
 from campaign.wire.channel_features import channel_features, named_channels
 from tests.link.controllers import controller
 

@@ -8,8 +8,9 @@ import pytest
 
 from campaign.backends.serial import BACKEND, SerialOptions
 from campaign.backends.sim import SimBackend, SimOptions
+from campaign.recording import MemoryRecorder, Outcome, SafeState
 from campaign.signals import Sine
-from campaign.trial import MemoryRecorder, Outcome, SafeState, Task, Trial
+from campaign.trial import Task, Trial
 from tests.link.controllers import controller
 from tests.physics.benches import bench
 

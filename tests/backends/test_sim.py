@@ -10,16 +10,9 @@ import pytest
 from campaign.backends.sim import BACKEND, CHANNELS, SimBackend, SimOptions
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording, SafeState
 from campaign.signals import Polyline, Sine
-from campaign.trial import (
-    Ending,
-    MemoryRecorder,
-    Outcome,
-    Recording,
-    SafeState,
-    Task,
-    Trial,
-)
+from campaign.trial import Task, Trial
 from tests.physics.benches import KT, RATIO, bench, run, task
 
 SWING = Sine(amplitude=float(np.deg2rad(18.0)), frequency=0.24)

@@ -17,8 +17,9 @@ from campaign.cli.run import run_protocol
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
 from campaign.physics.grid import Grid
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.signals import Polyline, Sine
-from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+from campaign.trial import Trial
 from tests.backends.test_sim import WIDE, limited, trial
 from tests.physics.benches import bench, task
 

@@ -10,8 +10,9 @@ import pytest
 from campaign.archive import open_run
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.backends.step_check import CHANGE, STEP, StepCheck
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.signals import Sine
-from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+from campaign.trial import Trial
 from tests.backends.test_sim import trial
 from tests.physics.benches import bench, task
 from tests.system.user import SEA, campaign, write

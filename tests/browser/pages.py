@@ -11,9 +11,9 @@ import numpy as np
 
 from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.experiments.interface import Experiment, TestData
+from campaign.recording import ChannelInfo, Ending, Outcome
 from campaign.report.build import build_report
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Result, Table
-from campaign.trial import ChannelInfo, Ending, Outcome
 from tests.report import made_up
 
 WORD = "W" * 10_000

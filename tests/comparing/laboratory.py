@@ -16,8 +16,9 @@ from campaign.comparing.shared import shared_sources
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, bench_of, result_of
 from campaign.protocol import load_protocol, make_plan
+from campaign.recording import MemoryRecorder
 from campaign.resources import protocols_folder
-from campaign.trial import MemoryRecorder, Trial
+from campaign.trial import Trial
 from tests.experiments.laboratory import Done
 
 Run = tuple[AnalysedTest, ...]

@@ -17,8 +17,9 @@ from campaign.estimate import Estimate
 from campaign.experiments.interface import TestData
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
+from campaign.recording import Ending, Outcome
 from campaign.result import Finding, Result
-from campaign.trial import Ending, Outcome, Task, Trial
+from campaign.trial import Task, Trial
 from tests.comparing.laboratory import analysed
 
 

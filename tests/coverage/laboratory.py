@@ -13,8 +13,9 @@ from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol.expand import channels_of
+from campaign.recording import MemoryRecorder
 from campaign.result import Result
-from campaign.trial import MemoryRecorder, Trial
+from campaign.trial import Trial
 from tests.coverage.benches import Case
 from tests.experiments.laboratory import Done
 

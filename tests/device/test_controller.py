@@ -16,8 +16,9 @@ from campaign.device.faults import parse_faults
 from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
 from campaign.protocol.bench_file import load_bench
+from campaign.recording import MemoryRecorder
 from campaign.signals import Sine
-from campaign.trial import MemoryRecorder, Task, Trial
+from campaign.trial import Task, Trial
 from campaign.wire.codes import Fault, NakCode, Outcome, State
 from campaign.wire.configuration import configuration_of
 from campaign.wire.device import (

@@ -13,7 +13,7 @@ import numpy as np
 from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.reading.measured import Measure
 from campaign.estimate import Estimate
-from campaign.trial import (
+from campaign.recording import (
     ChannelInfo,
     Ending,
     MemoryRecorder,
@@ -22,9 +22,8 @@ from campaign.trial import (
     Recorder,
     Recording,
     SafeState,
-    Task,
-    Trial,
 )
+from campaign.trial import Task, Trial
 
 COMPLETED = Ending(Outcome.COMPLETED)
 RATE = ChannelInfo("gyro_rate", "rad/s", "gyro rate", "deg/s")

@@ -18,7 +18,8 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Policy
-from campaign.trial import Ending, Outcome, Recorder, SafeState, Trial
+from campaign.recording import Ending, Outcome, Recorder, SafeState
+from campaign.trial import Trial
 from tests.execution.fakes import COMPLETED, RATE, FakeBackend, MemoryArchive, make_trials
 
 PIECE = 5

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from campaign.execution.display import PlainDisplay, clock, live_display, progress_display
 from campaign.execution.progress import Ledger
-from campaign.trial import Ending, Outcome
+from campaign.recording import Ending, Outcome
 from tests.execution.fakes import COMPLETED, make_trials
 
 DIVERGED = Ending(Outcome.DIVERGED, "gyro_rate [rad/s] is infinite at 0.3 s")

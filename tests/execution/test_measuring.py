@@ -7,6 +7,7 @@ import json
 import math
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -339,3 +340,13 @@ def test_show_lists_metrics_with_their_intervals(
     assert trial["metrics"][0]["high"] == 0.29
     assert trial["metrics"][1]["reason"] == "a single step"
     assert trial["measured_by"] == f"campaign {campaign.__version__}"
+
+
+def test_why_nothing_was_measured_is_told_in_the_words_of_the_axis() -> None:
+    asked = {"positions": ["0 deg"], "directions": ["positive"], "peak_torque": "5 N m"}
+    (done,) = execute(trials("breakaway", bench(), asked))
+    linear = {"name": "carriage", "axis": {"name": "x", "kind": "linear", "inertia": 9.0}}
+    moved = replace(done, trial=done.trial.model_copy(update={"bench": linear}))
+    measuring = Measuring(experiments())
+    assert "the rate never reached 0.005 rad/s" in measuring(done).problem
+    assert "the rate never reached 0.005 m/s" in measuring(moved).problem

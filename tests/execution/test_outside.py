@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from campaign.execution.outside import INTERVAL, OutsideWatch
 from campaign.execution.stop import StopSwitch
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 from tests.execution.fakes import FakeBackend, SwitchedBench
 
 BY_EVE = PanicStop(3, "eve", 1.5)

@@ -13,7 +13,8 @@ from campaign.execution.outcome import RunOutcome
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Policy
-from campaign.trial import Ending, Fault, Outcome, PanicStop, Recorder, SafeState, Trial
+from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, SafeState
+from campaign.trial import Trial
 from tests.execution.fakes import FakeBackend, MemoryArchive, make_trials
 
 STOP = PanicStop(3, "ada")

@@ -15,7 +15,8 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Policy, Response, Rest
-from campaign.trial import Ending, Fault, Outcome, PanicStop, SafeState, Trial
+from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
+from campaign.trial import Trial
 from tests.execution.fakes import (
     COMPLETED,
     FakeBackend,

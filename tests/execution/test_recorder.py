@@ -12,7 +12,7 @@ import pytest
 from campaign.backends.interface import Source
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.supervision import Supervision, TrialStop
-from campaign.trial import (
+from campaign.recording import (
     ChannelInfo,
     Ending,
     Event,
@@ -21,9 +21,8 @@ from campaign.trial import (
     Outcome,
     Recording,
     SafeState,
-    Task,
-    Trial,
 )
+from campaign.trial import Task, Trial
 
 RATE = 100.0
 SAMPLES = 200

@@ -15,7 +15,8 @@ from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.physics.bench import Bench
-from campaign.trial import Channel, Ending, Event, Outcome, Recording, Trial
+from campaign.recording import Channel, Ending, Event, Outcome, Recording
+from campaign.trial import Trial
 from tests.archives import archived, simulated_run
 
 KEPT = Path(__file__).parents[1] / "archive" / "kept"

@@ -16,7 +16,8 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.safety import AbortedError, NotSafeError
 from campaign.execution.stop import StopSwitch
-from campaign.trial import Ending, Fault, Outcome, SafeState, Trial
+from campaign.recording import Ending, Fault, Outcome, SafeState
+from campaign.trial import Trial
 from tests.execution.fakes import COMPLETED, RATE, FakeBackend, MemoryArchive, make_trials
 
 

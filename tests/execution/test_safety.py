@@ -24,7 +24,7 @@ from campaign.execution.safety import (
     safe_when_broken_off,
     unsafe_first,
 )
-from campaign.trial import SafeState
+from campaign.recording import SafeState
 from tests.execution.fakes import FakeBackend
 
 RUN = Path("results/run.partial")

@@ -25,9 +25,10 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.policy import Policy
 from campaign.protocol.stages import PlannedStage
+from campaign.recording import Ending, Fault, Outcome
 from campaign.result import Result
 from campaign.signals import Polyline
-from campaign.trial import Ending, Fault, Most, Outcome, Role, Task, Trial, TrialRequest
+from campaign.trial import Most, Role, Task, Trial, TrialRequest
 from tests.execution.fakes import FakeBackend, MemoryArchive
 from tests.execution.test_batches import Together
 

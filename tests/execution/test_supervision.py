@@ -21,7 +21,7 @@ from campaign.execution.recorder import LATE, SupervisingRecorder
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Patience, SilenceWatch, Supervision, TrialStop
-from campaign.trial import (
+from campaign.recording import (
     ChannelInfo,
     Ending,
     Fault,
@@ -29,8 +29,8 @@ from campaign.trial import (
     Outcome,
     Recorder,
     SafeState,
-    Trial,
 )
+from campaign.trial import Trial
 from tests.execution.fakes import COMPLETED, MemoryArchive, MemoryTrial, make_trials
 
 ANGLE = ChannelInfo("relative_angle", "rad", "Angle", "deg")

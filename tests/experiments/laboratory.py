@@ -12,8 +12,9 @@ from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import channels_of
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.result import Finding, Result, Table, bare
-from campaign.trial import Ending, MemoryRecorder, Outcome, Recording, Trial
+from campaign.trial import Trial
 
 Tree = dict[str, Any]
 

@@ -388,3 +388,38 @@ def test_ramps_of_two_directions_stand_side_by_side() -> None:
         assert 0.0 < abs(curve.aside) < 0.1 * np.diff(places).min()
     assert one.aside == -other.aside
     assert mean.aside == 0.0
+
+
+def broke_away(samples: int) -> tuple[Any, ...]:
+    """The ramps of `TWO`, with a load that was at rest and slides in the last of their samples."""
+
+    def changed(item: Any) -> Any:
+        gyro = item.samples.channels["gyro_rate"]
+        rate = 1e-6 * np.random.default_rng(1).standard_normal(len(gyro.samples))
+        rate[-samples:] += np.linspace(0.1, 1.0, samples)
+        channels = {**item.samples.channels, "gyro_rate": replace(gyro, samples=rate)}
+        return replace(item, samples=replace(item.samples, channels=channels))
+
+    return tuple(map(changed, execute(trials("breakaway", bench(), TWO))))
+
+
+def test_a_load_that_slid_too_fast_for_its_samples_is_not_said_to_have_stayed() -> None:
+    result = analyse("breakaway", broke_away(3))
+    assert any("too few for its torque; a higher sample_rate holds" in n for n in result.notes)
+    (only,) = result.conclusions
+    told = "".join(str(part) for part in only.parts)
+    assert told == "The load slid, and no recording of it tells at which torque it broke away."
+    short = execute(trials("breakaway", bench(), {**TWO, "peak_torque": "10 N m"}))
+    stayed = analyse("breakaway", short)
+    assert any("the rate never reached" in note for note in stayed.notes)
+    assert not any("sample_rate" in note for note in stayed.notes)
+    assert "".join(map(str, stayed.conclusions[0].parts)) == "No ramp came to a breakaway torque."
+
+
+def test_a_plan_tells_that_without_the_inertia_no_torque_will_be_told() -> None:
+    experiment = experiments()["breakaway"]
+    assert experiment.warnings is not None
+    unknown = Bench.model_validate({"name": "rig", "axis": {"name": "azimuth"}})
+    (told,) = experiment.warnings(experiment.options(), unknown)
+    assert "axis.inertia" in told
+    assert list(experiment.warnings(experiment.options(), bench())) == []

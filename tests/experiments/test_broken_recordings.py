@@ -16,8 +16,8 @@ import pytest
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment, measured
+from campaign.recording import Recording
 from campaign.result import Result
-from campaign.trial import Recording
 from tests.experiments.laboratory import Done, analyse
 from tests.experiments.test_channels import CASES, Case, done
 

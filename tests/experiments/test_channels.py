@@ -55,6 +55,12 @@ RAMP = {"torque_rate": "5 N m/s"}
 PULL = {"stiffness": "200 N m/rad", "pull_rate": "0.1 rad/s"}
 RAMP = {"torque_rate": "5 N m/s"}
 PULL = {"stiffness": "200 N m/rad", "pull_rate": "0.1 rad/s", "duration": "8 s"}
+SHAKEN = {
+    "amplitudes": ["0.3 N m", "0.6 N m"],
+    "lowest": "1 Hz",
+    "highest": "40 Hz",
+    "periods": 3,
+}
 CASES = (
     Case("breakaway", bench, {**RAMP, "positions": ["-5 deg", "0 deg", "5 deg"]}),
     Case("component_friction", bench, {**RAMP, "measurements": 2}),
@@ -77,6 +83,7 @@ CASES = (
         },
     ),
     Case("presliding_hysteresis", bench, {"amplitudes": ["1 mrad"], "frequency": "1 Hz"}),
+    Case("presliding_multisine", bench, SHAKEN),
     Case("repeatability", bench, MAP, ({}, {"rest": "0.2 s"})),
     Case(
         "sensitivity",

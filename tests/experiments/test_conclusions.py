@@ -39,7 +39,7 @@ from tests.experiments.test_channels import CASES, Case, done
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 MOST = 3
-DIFFERENCE = re.compile(r"times (less|more)")
+DIFFERENCE = re.compile(r"(times|%) (less|more)")
 CONFINED = re.compile(r"times \w+ in this simulation")
 SETTINGS = Settings({"frequency": Quantity("frequency", "Hz", "Hz", ("Hz",))})
 
@@ -227,7 +227,7 @@ def test_each_method_is_told_against_none() -> None:
 
 def test_a_method_that_makes_it_worse() -> None:
     (told,) = stabilized(error("none", 0.74), error("static", 0.84))
-    assert "1.14 times more (1.10 to 1.17)" in told
+    assert ", 13.5 ± 3.3 % more" in told
 
 
 def test_a_method_without_a_difference() -> None:
@@ -283,7 +283,7 @@ def test_of_a_sweep_its_range_and_the_most_important_contrasts() -> None:
     assert "4.0 times less" in where or "4.00 times less" in where
     assert least.startswith("The smallest ratio of all is that of the LuGre model (frequency 2 Hz)")
     # As the smallest of three: t of 1 - 0.05/6 with 20 degrees of freedom is 2.613, times 0.01 √2.
-    assert "1.20 times less (1.16 to 1.25)" in least
+    assert ", 16.7 ± 3.1 % less" in least
 
 
 def test_an_extreme_that_was_picked_has_to_be_surer() -> None:
@@ -440,7 +440,7 @@ def fitted(direction: str, coulomb: Estimate) -> Finding:
     ("negative", "ratio"),
     [
         # The extremes of both intervals: 26.6/25.4 and 26.8/25.2.
-        (26.7, "1.055 times more (1.047 to 1.063)"),
+        (26.7, "5.53 ± 0.81 % more"),
         (25.4, "no difference that the data show (0.996 to 1.012 times)"),
     ],
 )
@@ -484,7 +484,7 @@ def test_ramps_that_did_not_show_a_stiffness_say_so() -> None:
 def test_directions_are_told_apart_only_where_they_are() -> None:
     both = [ramp("both", 32.4), ramp("positive", 31.4), ramp("negative", 33.4)]
     told, *_ = said(breakaway_conclusions(both, [1.0], SETTINGS))
-    assert "times more in the negative" in told
+    assert "% more in the negative" in told
     both[2] = ramp("negative", 31.5)
     told, *_ = said(breakaway_conclusions(both, [1.0], SETTINGS))
     assert "no difference that the data show" in told
@@ -508,7 +508,7 @@ def test_one_ramp_in_each_direction_decides_nothing() -> None:
         for number, (way, value) in enumerate((("positive", 31.3), ("negative", 33.5)), start=2)
     ]
     told = said(breakaway_conclusions([*means, *single_ramps, *more], [1.0], SETTINGS))
-    assert "times more in the negative" in told[0]
+    assert "% more in the negative" in told[0]
     assert told[1].startswith("Over 4 ramps it is from 31.30")
 
 
@@ -576,7 +576,7 @@ def gain(corner: float, value: float) -> Finding:
 
 @pytest.mark.parametrize(
     ("own", "word"),
-    [(0.26, "2.23 times less"), (0.70, "1.21 times more"), (0.58, "no difference that the data")],
+    [(0.26, "2.23 times less"), (0.70, "20.7 ± 3.6 % more"), (0.58, "no difference that the data")],
 )
 def test_the_observer_is_told_against_none(own: float, word: str) -> None:
     told = said(observer_conclusions([gain(0.0, 0.58), gain(2.0, own), gain(8.0, 0.1)], 2.0, ""))
@@ -586,7 +586,7 @@ def test_the_observer_is_told_against_none(own: float, word: str) -> None:
 
 @pytest.mark.parametrize(
     ("fast", "word"),
-    [(1.0, "1.49 times less on the fastest"), (1.8, "1.21 times more on the fastest")],
+    [(1.0, "1.49 times less on the fastest"), (1.8, "20.8 ± 2.2 % more on the fastest")],
 )
 def test_what_a_faster_ramp_does_to_breakaway(fast: float, word: str) -> None:
     rows = [

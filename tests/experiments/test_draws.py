@@ -12,8 +12,9 @@ from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment, TestData, TrialData, result_of
 from campaign.options import Options
 from campaign.published.draws import SEED
+from campaign.recording import Ending, Outcome, Recording, SafeState
 from campaign.result import Column, Finding, Result, Table
-from campaign.trial import Ending, Outcome, Recording, SafeState, Task, Trial
+from campaign.trial import Task, Trial
 
 DONE = Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED)
 TASK = Task(mode="rate", duration=1.0, window=(0.0, 1.0), sample_rate=10.0)

@@ -130,11 +130,28 @@ def test_what_a_plan_is_made_of_is_asked_for_field_by_field() -> None:
     options = experiments()["velocity_map"].options()
     with pytest.raises(IncompleteBenchError) as caught:
         fit(options, Bench.model_validate(DRIVEN))
-    assert caught.value.paths == ("limits", "controller.rate")
-    ready = {**DRIVEN, "controller": GAINS, "limits": {}}
-    rig = Bench.model_validate({**ready, "limits": None})
-    limited = rig.model_copy(update={"limits": bench().limits})
-    assert "fastest" in fit(options, limited)
+    assert caught.value.paths == ("limits",)
+
+
+def test_a_map_is_planned_from_limits_and_what_its_test_writes() -> None:
+    """Nobody says how fast the loop is: it settles for a usual time, or as the test says."""
+    fit, kind = experiments()["velocity_map"].fit, experiments()["velocity_map"].options
+    assert fit is not None
+    limited = Bench.model_validate(BARE).model_copy(update={"limits": bench().limits})
+    chosen = fit(kind(), limited)
+    assert chosen["settle_time"].value == 1.0
+    assert "the rate loop is not described" in chosen["settle_time"].reason
+    assert "fastest" in chosen
+    stated = {"speeds": SPEEDS, "settle_time": "2 s", "acceleration": "50 deg/s^2", "rest": "1 s"}
+    assert not fit(kind.model_validate(stated), limited).keys() & stated.keys()
+    (run, *_) = trials("velocity_map", limited, {**stated, "warm_up_cycles": 0})
+    (window,) = (each for each in run.windows if each.name == "settled positive")
+    ramp = 1.0 / 50.0
+    assert window.start == pytest.approx(1.0 + ramp + 2.0)
+    driven = Bench.model_validate({**DRIVEN, "controller": GAINS}).model_copy(
+        update={"limits": bench().limits}
+    )
+    assert "time constants of the loop" in fit(kind(), driven)["settle_time"].reason
 
 
 def test_the_pace_of_a_loop_follows_from_what_is_known_of_it() -> None:
@@ -142,10 +159,8 @@ def test_the_pace_of_a_loop_follows_from_what_is_known_of_it() -> None:
     whole = Rig(bench())
     known = Bench.model_validate({**DRIVEN, "controller": GAINS})
     assert Rig(known).loop_time == pytest.approx(whole.loop_time, rel=0.1)
-    light = Bench.model_validate({**BARE, "controller": GAINS})
-    with pytest.raises(IncompleteBenchError) as caught:
-        _ = Rig(light).loop_time
-    assert caught.value.paths == ("axis.inertia", "motor.torque_constant", "gear.ratio")
+    assert Rig(Bench.model_validate({**BARE, "controller": GAINS})).loop_time is None
+    assert Rig(Bench.model_validate(DRIVEN)).loop_time is None
 
 
 def test_limits_bound_what_no_inertia_does() -> None:

@@ -13,8 +13,9 @@ from campaign.estimate import Window
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response import _point
 from campaign.identification.step_response import step_characteristics
+from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Result
-from campaign.trial import Channel, Ending, Offered, Outcome, Recording, Trial
+from campaign.trial import Offered, Trial
 from tests.experiments.laboratory import Done, analyse, finding, table_of_estimates
 from tests.physics.benches import bench
 
@@ -192,3 +193,23 @@ def test_a_sine_after_another_needs_a_window():
         recorded("frequency_response", both, both)
     done = recorded("frequency_response", both, both, (Window("steady", 4.0, 16.0),))
     assert done.trial.point["frequency"] == pytest.approx(2.0, rel=1e-3)
+    assert "in the window 'steady', 4 to 16 s" in done.trial.note
+
+
+def test_a_window_is_taken_by_its_name_and_not_by_its_place():
+    both = np.where(RESTS, SINE, 0.8 * np.sin(2 * np.pi * 6.0 * TIME))
+    windows = Window("rest", 0.0, 2.0), Window("steady", 4.0, 16.0)
+    done = recorded("frequency_response", both, both, windows)
+    assert done.trial.windows == (Window("steady", 4.0, 16.0),)
+    assert done.trial.point["frequency"] == pytest.approx(2.0, rel=1e-3)
+    with pytest.raises(ValueError, match="a window 'rest' says nothing here; it is 'steady'"):
+        recorded("frequency_response", both, both, windows[:1])
+
+
+def test_what_somebody_named_is_taken_and_the_rest_is_found():
+    rest = Window("rest", 0.1, 0.2)
+    windows = {
+        w.name: w for w in recorded("step_response", JUMP, answer(JUMP), (rest,)).trial.windows
+    }
+    found = {w.name: w for w in recorded("step_response", JUMP, answer(JUMP)).trial.windows}
+    assert windows == {"rest": rest, "answer": found["answer"]}

@@ -12,8 +12,8 @@ from scipy.signal import cont2discrete
 from campaign.estimate import Estimate
 from campaign.experiments.frequency_response import EXPERIMENT, _point
 from campaign.physics.limits import margins
+from campaign.recording import Recording
 from campaign.result import Figure, Result
-from campaign.trial import Recording
 from tests.experiments.laboratory import (
     analyse,
     execute,

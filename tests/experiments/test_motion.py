@@ -83,15 +83,7 @@ file = "a.csv"
 {entry}
 """
     )
-    code = import_recordings(
-        [str(folder / "m.toml")],
-        folder / "r",
-        only=(),
-        changes=(),
-        workers=1,
-        report=False,
-        sign=None,
-    )
+    code = import_recordings([str(folder / "m.toml")], folder / "r")
     assert code is ExitCode.DONE
     return campaign.open(next((folder / "r").glob("*.nxs")))
 

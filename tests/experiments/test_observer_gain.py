@@ -11,7 +11,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions
 from campaign.experiments.results.observer_metrics import Gain, Rejection, measured_corner
 from campaign.identification.sine_amplitude import amplitude
-from campaign.trial import Ending, Outcome
+from campaign.recording import Ending, Outcome
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench
 

@@ -34,8 +34,9 @@ from campaign.physics.true_values import stribeck_parameters
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol.expand import samples_of
 from campaign.protocol.follow import ROUNDING
+from campaign.recording import Recording
 from campaign.result import Result
-from campaign.trial import Recording, Role, Trial, TrialRequest
+from campaign.trial import Role, Trial, TrialRequest
 from tests.coverage import laboratory
 from tests.coverage.benches import BENCHES, Case, Scale, make_case
 from tests.coverage.judging import Pooled, entries, pooled

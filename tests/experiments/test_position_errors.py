@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.trial import Channel, Ending, Outcome, Recording
+from campaign.recording import Channel, Ending, Outcome, Recording
 from tests.experiments.laboratory import Done, analyse, trials
 from tests.physics.benches import bench
 

@@ -11,7 +11,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.results.sensitivity_results import Response, judge, ranking
 from campaign.experiments.sensitivity import EXPERIMENT, SensitivityOptions
 from campaign.identification.threshold import Threshold
-from campaign.trial import Channel, Recording
+from campaign.recording import Channel, Recording
 from tests.experiments.laboratory import (
     Done,
     analyse,

@@ -16,8 +16,9 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
+from campaign.recording import MemoryRecorder
 from campaign.result import Result
-from campaign.trial import MemoryRecorder, Trial
+from campaign.trial import Trial
 from tests.experiments.laboratory import Done, analyse, finding, trials
 from tests.identification.coverage import holds, rejected
 

@@ -14,8 +14,9 @@ from campaign.experiments.results.reversal_figures import HELD, can_be_shown, re
 from campaign.experiments.results.stabilization_errors import MOST_PANELS, error_figures
 from campaign.experiments.results.stabilization_figures import stabilization_figures
 from campaign.experiments.stabilization import StabilizationOptions
+from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Figure, Panel
-from campaign.trial import Channel, Ending, Outcome, Recording, Trial
+from campaign.trial import Trial
 from tests.experiments.laboratory import Done, analyse, execute, trials
 from tests.physics.benches import bench
 

@@ -18,7 +18,7 @@ from campaign.errors import UsageError
 from campaign.export import exports
 from campaign.export.mat import LARGEST, check_size, matlab_names
 from campaign.export.run_export import export_run
-from campaign.trial import Channel, Ending, Outcome, Recording
+from campaign.recording import Channel, Ending, Outcome, Recording
 from tests.archives import archived, plan_of
 
 SPECIAL = [0.1, 1 / 3, np.nan, np.inf, -np.inf, -0.0, 5e-324, np.finfo(float).max, 1 + 2**-52]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from campaign import trial
+from campaign import recording
 from campaign.device import controller as rehearsal
 from campaign.device import latch as memory
 from campaign.device.machine import Setup
@@ -65,9 +65,9 @@ class Axis:
     def __init__(self, emit) -> None:
         self.ring, self._emit = Ring(RECORDS), emit
         self.winding = SimpleNamespace(celsius=25.0)
-        self.outcome: trial.Outcome | None = None
+        self.outcome: recording.Outcome | None = None
         self.drive_on = False
-        self._ending: trial.Ending | None = None
+        self._ending: recording.Ending | None = None
 
     at_rest = True
 
@@ -81,7 +81,7 @@ class Axis:
         self.ring.begin(number)
         self.drive_on, self.outcome = True, None
 
-    def switch_off(self, ending: trial.Ending, *, told: bool = False) -> None:
+    def switch_off(self, ending: recording.Ending, *, told: bool = False) -> None:
         if self.drive_on:
             self.drive_on, self._ending = False, ending
 
@@ -120,9 +120,11 @@ class Rehearsal:
 
     def finish(self, outcome: wire.Outcome) -> list[wire.Message]:
         if outcome is wire.Outcome.FAULT:
-            self.controller._fail(trial.Fault.DRIVE, "")
+            self.controller._fail(recording.Fault.DRIVE, "")
         else:
-            self.controller.machine.switch_off(trial.Ending(trial.Outcome[outcome.name], ""))
+            self.controller.machine.switch_off(
+                recording.Ending(recording.Outcome[outcome.name], "")
+            )
         return self.tick()
 
     def reset(self) -> None:

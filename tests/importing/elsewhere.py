@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.trial import Recording
+from campaign.recording import Recording
 
 
 @dataclass(frozen=True)

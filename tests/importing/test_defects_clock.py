@@ -1,4 +1,4 @@
-"""Times: what was done to them is found, where it was done and how large; and is repaired."""
+"""Times: what was done to them is found, where it was done and how large."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import pytest
 
 from campaign.importing.defects import Defect, Severity
 from campaign.importing.defects.clock import drift_between, of_time, ticks
-from campaign.importing.defects.repairs import drop, resample, restamp
 
 RATE = 1000.0
 EVEN = np.arange(5000) / RATE
@@ -59,21 +58,16 @@ def test_stamps_in_whole_milliseconds_are_rounded_and_not_jittered(rate):
     (rounded,) = found(time, "rounded")
     assert rounded.size == pytest.approx(1e-3, rel=1e-4)
     assert kinds(time) == {"rounded"}
-    even = restamp(time)
-    assert np.abs(even.values - np.arange(3000) / rate).max() < 1e-3
-    assert np.ptp(np.diff(even.values)) < 1e-9
     short = np.delete(np.arange(3000), range(1500, 1520)) / rate
     (gap,) = found(np.round(short, 3), "gap")
     assert (gap.size, gap.rows) == (20, (1499, 1500))
-    assert np.abs(restamp(np.round(short, 3)).values - short).max() < 1e-3
 
 
 def test_a_clock_coarser_than_the_sampling_repeats_itself():
     time = np.floor(EVEN * 100) / 100
     (duplicate,) = found(time, "duplicate")
-    assert (duplicate.size, duplicate.repair) == (4500, "restamp")
+    assert (duplicate.size, duplicate.repair) == (4500, "sample_rate")
     assert found(time, "gap") == []
-    assert np.abs(restamp(time).values - EVEN).max() < 0.01
 
 
 def test_seconds_since_1970_in_single_precision_are_no_clock():
@@ -82,19 +76,14 @@ def test_seconds_since_1970_in_single_precision_are_no_clock():
     assert (only.kind, only.severity) == ("no clock", Severity.REFUSED)
 
 
-def test_repetitions_and_steps_back_are_dropped():
+def test_repetitions_and_steps_back_are_found():
     time = np.concatenate([EVEN[:100], EVEN[99:200], EVEN[150:]])
     (duplicate,), (back,) = found(time, "duplicate"), found(time, "backward")
     assert (duplicate.rows, duplicate.size) == ((100, 100), 1)
     assert (back.rows, back.size) == ((201, 201), 1)
-    left = drop(time, np.arange(len(time))[:, None])
-    np.testing.assert_array_equal(left.time, EVEN)
-    assert left.touched == len(time) - len(EVEN)
-    assert str(left.touched) in left.what
     lost = EVEN.copy()
     lost[7] = np.nan
     assert found(lost, "lost time")[0].rows == (7, 7)
-    assert len(drop(lost, EVEN[:, None]).time) == 4999
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -136,37 +125,6 @@ def test_two_clocks_are_held_against_each_other():
     assert drift.severity is Severity.NOTED  # 0.4 ms in all: less than a sample
     (drift,) = drift_between(EVEN, 4.0 + EVEN * 1.01)
     assert drift.severity is Severity.REPAIRABLE
-
-
-def test_resampling_holds_and_loses_and_invents_nothing():
-    time = np.delete(EVEN, range(1000, 1010))
-    values = np.column_stack([time, -time])
-    on = resample(time, values)
-    np.testing.assert_allclose(on.time, EVEN, atol=1e-12)
-    assert np.isnan(on.values[1000:1010]).all()
-    assert np.isfinite(np.delete(on.values, range(1000, 1010), axis=0)).all()
-    np.testing.assert_array_equal(on.values[:1000], values[:1000])
-    np.testing.assert_array_equal(on.values[1010:], values[1000:])
-    assert (on.touched, "10 samples are lost" in on.what) == (10, True)
-    with pytest.raises(ValueError, match="10 points of an even grid"):
-        resample(time, values, fill="refuse")
-    assert resample(EVEN, EVEN[:, None], fill="refuse").touched == 0
-    with pytest.raises(ValueError, match="times increase"):
-        resample(EVEN[::-1], EVEN[:, None])
-    with pytest.raises(ValueError, match="longer than its recording"):
-        resample(EVEN, EVEN[:, None], step=1e-9)
-
-
-@pytest.mark.parametrize("fill", ["hold", "linear"])
-@pytest.mark.parametrize("seed", SEEDS)
-def test_jittered_samples_find_their_place(seed, fill):
-    chance = np.random.default_rng(seed)
-    time = EVEN + chance.uniform(-0.3, 0.3, len(EVEN)) / RATE
-    on = resample(time, np.sin(2 * np.pi * time)[:, None], step=1 / RATE, fill=fill)
-    off = on.values[:, 0] - np.sin(2 * np.pi * on.time)
-    assert np.isfinite(off).all()
-    worst = 2 * np.pi * 1.6 / RATE if fill == "hold" else (2 * np.pi / RATE) ** 2
-    assert np.abs(off).max() < worst
 
 
 def test_the_step_of_a_clock_is_what_most_samples_have():

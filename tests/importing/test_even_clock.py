@@ -27,6 +27,28 @@ def test_rounded_times_are_even():
     assert "0.2" in found.remarks[0]
 
 
+@pytest.mark.parametrize("rate", [430.0, 333.0])
+def test_rounded_times_with_a_gap_have_their_places(rate):
+    kept = np.delete(np.arange(3000), range(1500, 1520))
+    found = clock(np.round(kept / rate, 3), ["mark gaps"])
+    assert found.rate == pytest.approx(rate, rel=1e-5)
+    assert found.samples == 3000
+    assert list(np.flatnonzero(np.isnan(found.positions))) == list(range(1500, 1520))
+
+
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        (np.round(np.arange(3000) / 1000 * 1.5, 3), r"0\.001 s, too coarse .* about 666\.7 Hz"),
+        (np.floor(np.arange(3000) / 10) / 100, r"0\.01 s, too coarse .* about 1000 Hz"),
+    ],
+)
+def test_times_coarser_than_their_steps_are_better_left_out(times, says):
+    """Lines through samples that were even would put the rounding into them."""
+    with pytest.raises(UnevenError, match=says):
+        clock(times)
+
+
 def test_the_rate_is_that_of_all_rows_and_not_of_the_ends():
     times = np.arange(2000) / 1000.0
     times[0] -= 0.2e-3
@@ -55,8 +77,9 @@ def test_repeated_and_backward_rows_are_named_and_left_out_when_that_is_asked_fo
     assert "2 rows were left out" in found.remarks[0]
 
 
-def test_jitter_is_resampled_only_when_that_is_asked_for():
-    rng = np.random.default_rng(3)
+@pytest.mark.parametrize("seed", range(5))
+def test_jitter_is_resampled_only_when_that_is_asked_for(seed):
+    rng = np.random.default_rng(seed)
     times = np.arange(4000) / 500.0 + rng.uniform(-0.4, 0.4, 4000) / 500.0
     with pytest.raises(UnevenError, match=r"no even clock: steps vary by .* %.*resample"):
         clock(times)

@@ -53,7 +53,7 @@ def test_no_unit_that_stands_plainly_is_wrong(tmp_path, number):
     wild = wild_files()[number]
     found = guess([made(tmp_path, wild)])
     told = tomllib.loads(mapping_text(found, tmp_path))
-    assert {each["columns"] for each in told["test"][0]["recording"]} >= set(
+    assert {each["columns"] for test in told["test"] for each in test["recording"]} >= set(
         told.get("columns", {})
     )
     for section in told.get("columns", {}).values():
@@ -103,10 +103,11 @@ def test_what_is_wrong_with_a_recording_is_a_doubt(tmp_path):
     assert "# ? 10 samples missing" in mapping_text(guess([tmp_path / "a.csv"]))
 
 
-def test_axes_in_one_file_are_recordings_of_their_own(tmp_path):
+def test_axes_in_one_file_are_tests_of_their_own(tmp_path):
     wild = next(each for each in wild_files() if each.name == "two_joints_15ms.csv")
     told = tomllib.loads(mapping_text(guess([made(tmp_path, wild)]), tmp_path))
-    one, two = told["test"][0]["recording"]
+    assert [test["name"] for test in told["test"]] == ["axis_1", "axis_2"]
+    one, two = (test["recording"][0] for test in told["test"])
     assert one["file"] == two["file"] == wild.name
     for number, each in enumerate((one, two), start=1):
         columns = {key: value["column"] for key, value in told["columns"][each["columns"]].items()}

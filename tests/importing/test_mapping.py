@@ -17,7 +17,7 @@ from campaign.cli.prepare import Request, prepare
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.verify import verify_archives
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.trial import Ending, MemoryRecorder, Outcome, Recording
+from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 
 COLUMNS = """\
 [columns.rig.time]
@@ -207,9 +207,7 @@ def test_a_run_does_not_execute_what_was_executed_elsewhere(tmp_path: Path):
 def test_an_imported_run_is_verified_and_replayed_and_not_rerun(tmp_path: Path, capsys):
     text = COLUMNS + TEST + ENTRY + 'each = "run"\n'
     path = write(tmp_path, text)
-    code = import_recordings(
-        [path], tmp_path / "r", only=(), changes=(), workers=1, report=False, sign=None
-    )
+    code = import_recordings([path], tmp_path / "r")
     assert code is ExitCode.DONE
     archive = next((tmp_path / "r").glob("*.nxs"))
     assert verify_archives([str(archive)], tmp_path / "r", as_json=False) is ExitCode.DONE

@@ -225,6 +225,8 @@ derive = "drive_torque"
         ("breakaway", "rest, ramp; did you mean 'ramp'?"),
         ("step_response", "rest, answer"),
         ("velocity_map", "positive, negative"),
+        ("frequency_response", "steady"),
+        ("stabilization", "measured"),
     ],
 )
 def test_windows_that_no_analysis_looks_for_are_refused(tmp_path: Path, kind: str, known: str):
@@ -234,19 +236,23 @@ def test_windows_that_no_analysis_looks_for_are_refused(tmp_path: Path, kind: st
     assert f"looks for a window 'rampp'; allowed are {known}" in told
 
 
+@pytest.mark.parametrize(
+    ("kind", "wrong", "right"),
+    [("frequency_response", "stady", "steady"), ("stabilization", "measure", "measured")],
+)
+def test_a_window_that_is_nearly_called_so_is_not_taken(
+    tmp_path: Path, kind: str, wrong: str, right: str
+):
+    line = f'windows = {{ {wrong} = ["0 s", "0.1 s"] }}'
+    told = refused(tmp_path, COLUMNS + TEST.replace("motion", kind) + ENTRY + line)
+    assert f"did you mean '{right}'?" in told
+
+
 def test_what_a_person_mistakes_most_is_told_how_to_put_right(tmp_path):
     """Recordings for a mapping, an axis of the other kind, a channel that nobody mapped."""
     (tmp_path / "a.csv").write_text("t,x,m\n" + "\n".join(f"{k},{k},1" for k in range(50)))
     with pytest.raises(UsageError, match="campaign import --guess"):
-        import_recordings(
-            [str(tmp_path / "a.csv")],
-            tmp_path / "r",
-            only=(),
-            changes=(),
-            workers=1,
-            report=False,
-            sign=None,
-        )
+        import_recordings([str(tmp_path / "a.csv")], tmp_path / "r")
     mapping = """
 [columns.c.time]
 column = "t"

@@ -76,15 +76,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 def imported(folder: Path, mapping: str) -> Any:
     (folder / "mapping.toml").write_text('published = "none"\n' + mapping, encoding="utf-8")
-    code = import_recordings(
-        [str(folder / "mapping.toml")],
-        folder / "results",
-        only=(),
-        changes=(),
-        workers=2,
-        report=False,
-        sign=None,
-    )
+    code = import_recordings([str(folder / "mapping.toml")], folder / "results", workers=2)
     assert code is ExitCode.DONE
     return campaign.open(next((folder / "results").glob("*.nxs")))
 

@@ -30,15 +30,7 @@ def imported(folder: Path) -> Any:
     rig, mapping = blocks()
     (folder / "emps-rig.toml").write_text(rig, encoding="utf-8")
     (folder / "emps.toml").write_text(mapping, encoding="utf-8")
-    code = import_recordings(
-        [str(folder / "emps.toml")],
-        folder / "results",
-        only=(),
-        changes=(),
-        workers=1,
-        report=True,
-        sign=None,
-    )
+    code = import_recordings([str(folder / "emps.toml")], folder / "results", report=True)
     assert code is ExitCode.DONE
     return campaign.open(next((folder / "results").glob("*-emps.nxs")))
 

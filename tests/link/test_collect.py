@@ -15,7 +15,7 @@ import pytest
 from campaign.link.collect import ACKNOWLEDGE_EVERY, BRAKING, ENDING, STANDSTILL, Collector
 from campaign.link.errors import RefusedError, SilenceError, ViolationError
 from campaign.link.session import Traffic
-from campaign.trial import (
+from campaign.recording import (
     ChannelInfo,
     Ending,
     Fault,

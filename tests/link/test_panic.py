@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from campaign.link.panic import FORGETFUL, NOBODY, panic_stop_of, printable
-from campaign.trial import PanicStop
+from campaign.recording import PanicStop
 from campaign.wire.codes import LatchCause
 from campaign.wire.messages import Latch
 

@@ -12,8 +12,9 @@ from campaign.backends.sim import BACKEND, SimOptions
 from campaign.experiments.shared.friction_models import with_model
 from campaign.physics.engine_version import ENGINE
 from campaign.protocol.bench_file import load_bench
+from campaign.recording import MemoryRecorder
 from campaign.signals import Polyline, Sine
-from campaign.trial import MemoryRecorder, Task, Trial
+from campaign.trial import Task, Trial
 
 BENCHES = Path(__file__).parent / "kept"
 KEPT = BENCHES / "engine.json"

@@ -13,8 +13,9 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import complete
 from campaign.physics.lanes import Lane
 from campaign.physics.truth import digest, has, plant_of, settings, simulated, with_settings
+from campaign.recording import MemoryRecorder, Recording
 from campaign.signals import Polyline
-from campaign.trial import MemoryRecorder, Recording, Task, Trial
+from campaign.trial import Task, Trial
 from tests.physics.benches import INERTIA, KE, KT, RATIO, Tree, bench, stribeck, task
 
 STEADY = task(

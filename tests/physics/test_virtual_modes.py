@@ -14,8 +14,9 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.steady_friction import steady_friction
+from campaign.recording import MemoryRecorder, Outcome, Recording
 from campaign.signals import Polyline, Sine
-from campaign.trial import MemoryRecorder, Outcome, Recording, Task, Trial
+from campaign.trial import Task, Trial
 from tests.physics.benches import KT, RATIO, Tree, bench, run, stribeck, task
 
 SPECIMEN = (

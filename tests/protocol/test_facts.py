@@ -90,14 +90,16 @@ def test_a_plan_that_moves_a_bench_without_limits_is_refused_at_the_test(desk: D
 
 
 def test_an_experiment_says_what_its_plan_follows_from_at_the_test(desk: Desk) -> None:
-    desk.write("rig.toml", HELD)
+    desk.write("rig.toml", BARE)
     path = desk.write("protocol.toml", TEST.format("velocity_map"))
     with pytest.raises(ProtocolError) as caught:
         make_plan(load_protocol(path, experiments(), shipped=SHIPPED), seed=1)
     (problem,) = caught.value.problems
     assert {(problem.file, problem.line, problem.column)} == set(desk.marks)
     assert problem.message.startswith("test 't' (velocity_map): ")
-    assert "controller.rate (the rate loop)" in problem.message
+    assert "limits (what must never be exceeded while it moves)" in problem.message
+    desk.write("rig.toml", HELD)
+    assert make_plan(load_protocol(path, experiments(), shipped=SHIPPED), seed=1).trials
 
 
 def test_a_plan_tells_what_it_cannot_predict(desk: Desk) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from campaign.policy import Occasion, Policy, Response, Rest
 from campaign.protocol import as_tree, make_plan
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 
 from .conftest import Desk
 

@@ -19,7 +19,8 @@ from campaign.physics.limit_watch import judged_samples
 from campaign.physics.limits import Margin
 from campaign.physics.resolution import rate_of_one_count, resolution_margins
 from campaign.protocol import Plan, check_limits, load_protocol, make_plan
-from campaign.trial import MemoryRecorder, Outcome, Task
+from campaign.recording import MemoryRecorder, Outcome
+from campaign.trial import Task
 from tests.physics.benches import SIMULINK, bench, task
 
 from .conftest import SHIPPED

@@ -19,8 +19,9 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
 from campaign.protocol import load_protocol, make_plan
+from campaign.recording import Ending, SafeState
 from campaign.resources import protocols_folder
-from campaign.trial import Ending, Role, SafeState, Trial
+from campaign.trial import Role, Trial
 from tests.system.user import SEA, write
 
 ALL = SimBackend.channels(None, SimpleNamespace(truth=""))  # type: ignore[arg-type]

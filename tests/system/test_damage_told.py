@@ -25,7 +25,7 @@ from campaign.archive.reading.sound_samples import readable, without_damaged
 from campaign.errors import ArchiveError
 from campaign.export import exports
 from campaign.export.run_export import export_run
-from campaign.trial import Channel, Ending, Outcome, Recording
+from campaign.recording import Channel, Ending, Outcome, Recording
 from tests.system import told_damage as told
 
 KEPT = Path(__file__).parents[1] / "archive" / "kept"

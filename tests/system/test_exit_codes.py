@@ -16,7 +16,7 @@ from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
 from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.execution.safety import AbortedError
-from campaign.trial import Ending, Outcome, SafeState
+from campaign.recording import Ending, Outcome, SafeState
 from tests.system.user import SEA, write
 
 WAYS = {

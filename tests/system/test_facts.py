@@ -120,10 +120,17 @@ def test_other_commands_take_it_or_say_what_they_miss(folder: Path) -> None:
     written.write_text(RIG, encoding="utf-8")
     campaign(folder, "fingerprint", "stated.toml")
     assert "fingerprint" in written.read_text(encoding="utf-8")
-    told = campaign(folder, "init", "new", "--bench", "rig.toml", code=2).err
+    told = campaign(folder, "init", "new", "--bench", "bare.toml", code=2).err
     assert "no velocity-map fits it" in told
-    assert "controller.rate" in told
+    assert "limits" in told
     assert not (folder / "new").exists()
+    # Limits are all that it takes; what can be executed is by hand, and says so.
+    done = campaign(folder, "init", "new", "--bench", "rig.toml")
+    assert "campaign plan new/identify.toml --backend files --handover out" in done.out
+    plan = ("plan", "new/identify.toml", "--backend", "files", "--handover", "out")
+    told = campaign(folder, *plan)
+    assert "the rate loop is not described" in told.out
+    assert "no breakaway torque can be told of its ramps" in told.err
     told = campaign(folder, "device", "--bench", "rig.toml", code=2).err
     assert all(path in told for path in PURPOSES if path != "limits")
 

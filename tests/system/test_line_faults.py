@@ -21,7 +21,7 @@ import pytest
 
 from campaign.archive import RunStatus, open_run
 from campaign.errors import ExitCode
-from campaign.trial import Fault, Outcome, Recording, SafeState
+from campaign.recording import Fault, Outcome, Recording, SafeState
 from tests.link.bad_line import Block, Trouble, bad_line, schedule
 from tests.link.controllers import controller
 from tests.system.user import campaign, command, environment, write

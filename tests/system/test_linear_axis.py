@@ -22,8 +22,9 @@ from campaign.comparing.shared import shared_sources
 from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol import load_protocol, make_plan
+from campaign.recording import MemoryRecorder, Recording
 from campaign.resources import protocols_folder
-from campaign.trial import MemoryRecorder, Recording, Trial
+from campaign.trial import Trial
 from tests.system.user import campaign
 
 UNITS = r"(?<![\w/])[mµu]?rad(?!\w)|(?<![\w])deg(?!\w)|°|(?<!\w)[mk]?N[ ·]m(?!\w)|kg[ ·]m(?![a-z])"

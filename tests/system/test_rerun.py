@@ -19,7 +19,7 @@ from campaign.execution.comparison import changes, differences
 from campaign.execution.written_order import in_written_order
 from campaign.physics import grid
 from campaign.physics.step_choice import StepChoice
-from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
+from campaign.recording import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
 from tests.system.user import SEA, write
 
 

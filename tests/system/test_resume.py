@@ -18,7 +18,7 @@ from campaign.cli.prepare import Request
 from campaign.cli.resume import remake, resume_run
 from campaign.cli.run import Remarks, run_protocol
 from campaign.errors import ExitCode, UsageError
-from campaign.trial import Ending, Fault, Outcome
+from campaign.recording import Ending, Fault, Outcome
 from tests.archive.test_resuming import content, documented_differences
 from tests.system.user import SEA, campaign, command, environment, write
 

@@ -18,7 +18,7 @@ from campaign.archive import RunStatus, open_run
 from campaign.execution.recorder import LATE
 from campaign.link.port import open_port
 from campaign.link.safe import SafeWatch, is_safe, query_frame
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 from campaign.wire.messages import State, Status
 from tests.link.controllers import controller
 from tests.system.user import campaign, command, environment, write

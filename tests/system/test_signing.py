@@ -30,7 +30,7 @@ from campaign.cli.sign import sign_archive
 from campaign.cli.signature import wanted_signature
 from campaign.cli.verify import verify_archives
 from campaign.errors import ArchiveError, ExitCode, UsageError
-from campaign.trial import Ending, Outcome, SafeState
+from campaign.recording import Ending, Outcome, SafeState
 from tests.archive.conftest import make_header, make_trial, write_run, write_trial
 from tests.system.user import SEA, campaign, command, environment, write
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunReader, open_run
-from campaign.trial import Fault, Outcome, SafeState
+from campaign.recording import Fault, Outcome, SafeState
 from campaign.wire.messages import State
 from tests.link.controllers import controller
 from tests.system.test_safety import status_of

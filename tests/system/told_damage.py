@@ -21,8 +21,8 @@ from campaign.archive.layout.story import read_lines
 from campaign.archive.reading.results_file import read_results
 from campaign.cli.bench_commands import app
 from campaign.errors import ArchiveError, CampaignError
+from campaign.recording import Recording
 from campaign.report.output import MARKER
-from campaign.trial import Recording
 
 PROTOCOL = """
 title = "A stabilized axis"

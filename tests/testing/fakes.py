@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from campaign.errors import BackendError
-from campaign.testing import BackendUnderTest
-from campaign.trial import (
+from campaign.recording import (
     ChannelInfo,
     Ending,
     Event,
@@ -21,9 +20,9 @@ from campaign.trial import (
     PanicStop,
     Recorder,
     SafeState,
-    Task,
-    Trial,
 )
+from campaign.testing import BackendUnderTest
+from campaign.trial import Task, Trial
 
 RATE = 100.0
 BLOCK = 20

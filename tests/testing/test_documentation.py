@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import find_run, open_run
+from campaign.recording import Fault, Outcome, SafeState
 from campaign.testing import backend_checks
-from campaign.trial import Fault, Outcome, SafeState
 from tests.testing.drive import Drive
 
 ROOT = Path(__file__).parents[2]
@@ -93,7 +93,7 @@ def test_its_faults_have_names(
     expected: Fault,
     safe: SafeState,
 ) -> None:
-    from campaign.trial import MemoryRecorder
+    from campaign.recording import MemoryRecorder
 
     with Drive(fault) as drive:
         trial = told(drive, monkeypatch)["TRIAL"]

@@ -13,8 +13,8 @@ import pytest
 
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import BackendError
+from campaign.recording import Ending, Event, Outcome, SafeState
 from campaign.testing import BackendUnderTest, CheckFailedError, backend_checks
-from campaign.trial import Ending, Event, Outcome, SafeState
 from tests.experiments.laboratory import trials
 from tests.physics.benches import bench
 from tests.testing.fakes import CHANNELS, nan_at_the_end, renamed, under_test

@@ -15,9 +15,10 @@ from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.cli.stop import stop_bench
 from campaign.errors import ExitCode
+from campaign.recording import Ending, Event, Fault, Outcome, Recording
 from campaign.signals import Sine
 from campaign.testing import BackendUnderTest, StrictRecorder, backend_checks
-from campaign.trial import Ending, Event, Fault, Outcome, Recording, Task, Trial
+from campaign.trial import Task, Trial
 from tests.archives import archived, executed
 from tests.link.controllers import controller
 from tests.physics.benches import bench

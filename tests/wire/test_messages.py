@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from campaign import trial
+from campaign import recording
 from campaign.wire import codes
 from campaign.wire import messages as wire
 from campaign.wire.parameters import SLICE
@@ -172,9 +172,9 @@ def test_samples_have_the_layout_of_their_channels() -> None:
 
 
 def test_words_are_those_of_the_rest_of_the_program() -> None:
-    of_hosts = {str(trial.Fault.RECORDING)}  # judged there; no device can say it
-    assert {f.text for f in wire.Fault} - {"none"} == {str(f) for f in trial.Fault} - of_hosts
-    assert {o.text for o in wire.Outcome} == {str(o) for o in trial.Outcome}
+    of_hosts = {str(recording.Fault.RECORDING)}  # judged there; no device can say it
+    assert {f.text for f in wire.Fault} - {"none"} == {str(f) for f in recording.Fault} - of_hosts
+    assert {o.text for o in wire.Outcome} == {str(o) for o in recording.Outcome}
 
 
 def test_commands_are_what_the_host_sends_and_the_device_acknowledges() -> None:

@@ -35,7 +35,7 @@ from campaign.archive.verifying.result import (
     Verification,
 )
 from campaign.errors import ArchiveError
-from campaign.trial import ChannelInfo
+from campaign.recording import ChannelInfo
 
 _CHANNELS = TypeAdapter(list[ChannelInfo])
 _OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES}

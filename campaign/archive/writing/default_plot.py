@@ -17,7 +17,8 @@ from campaign.channels import (
     POINTING_ERROR,
     RELATIVE_RATE,
 )
-from campaign.trial import ChannelInfo, Role, Task, Tree
+from campaign.recording import ChannelInfo
+from campaign.trial import Role, Task, Tree
 
 BY_MODE = {
     "rate": GYRO_RATE,

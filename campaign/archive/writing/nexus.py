@@ -28,7 +28,8 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
-from campaign.trial import ChannelInfo, Tree
+from campaign.recording import ChannelInfo
+from campaign.trial import Tree
 
 DEFINITION = "NXfriction_trial"
 VERSION = "2.0"

@@ -30,7 +30,8 @@ from campaign.archive.writing import hdf5, nexus
 from campaign.archive.writing.default_plot import telling_trial
 from campaign.archive.writing.trial_file import write_root
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome, Tree, canonical_json
+from campaign.recording import Outcome
+from campaign.trial import Tree, canonical_json
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from campaign.archive.layout.run_folder import SEALING, read_header
 from campaign.archive.writing.remnants import remove_folder
 from campaign.archive.writing.sealed_file import SealedFile, check_sealed
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 
 _FREE = 1 << 28  # bytes that stay free for the trials while their copies are made beside them
 _AT_ONCE = 2  # more than one finishes at a time, so that those that waited are caught up with

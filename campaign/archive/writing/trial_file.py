@@ -36,7 +36,8 @@ from campaign.archive.writing.default_plot import Aim, beside
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
-from campaign.trial import ChannelInfo, Ending, Event, Trial
+from campaign.recording import ChannelInfo, Ending, Event
+from campaign.trial import Trial
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,9 @@ from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished
 from campaign.archive.reading.measured import trial_measured
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
+from campaign.recording import ChannelInfo, Ending, Event
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import ChannelInfo, Ending, Event, Trial
+from campaign.trial import Trial
 
 if TYPE_CHECKING:
     from campaign.archive.reading.archived_trial import ArchivedTrial
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 class TrialWriter:
-    """Takes one trial's recording: a `campaign.trial.Recorder` that ends in a file.
+    """Takes one trial's recording: a `campaign.recording.Recorder` that ends in a file.
 
     Use it from one thread; several may be open at once. End it with `finish` or `abandon`.
     """

@@ -27,8 +27,9 @@ from campaign.archive.writing.resuming import reopen
 from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
+from campaign.recording import Outcome, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import Outcome, SafeState, Trial
+from campaign.trial import Trial
 
 __all__ = ["RunWriter", "TrialWriter"]
 

@@ -6,12 +6,13 @@ against it by its sign and its size: how well a rig follows is what an experimen
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from campaign.channels import (
+    COMMAND,
     DRIVE_TORQUE,
     GYRO_RATE,
     JOINT_TORQUE,
@@ -19,7 +20,8 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
-from campaign.trial import Array, Task
+from campaign.recording import Array
+from campaign.trial import Task
 
 TOLERANCE = 0.02
 """of the RMS of a command: more is another command."""
@@ -48,6 +50,15 @@ RATES = (RELATIVE_RATE, GYRO_RATE)
 TORQUES = (DRIVE_TORQUE, MOTOR_CURRENT, JOINT_TORQUE)
 
 
+Told = Callable[[str, float], str]
+"""How a value (SI) of a channel is told, such as `5 deg/s`."""
+
+
+def plain(channel: str, value: float) -> str:
+    """A value as it is, for whoever has no trial to tell its unit."""
+    return f"{value:.6g}"
+
+
 @dataclass(frozen=True)
 class Found:
     """What is wrong with a recording: its name, and what was seen."""
@@ -71,20 +82,21 @@ def wrong_length(task: Task, samples: int, stopped: bool) -> Found | None:
     )
 
 
-def wrong_start(task: Task, angle: Array, within: float) -> Found | None:
+def wrong_start(task: Task, angle: Array, within: float, told: Told = plain) -> Found | None:
     """A trial that began elsewhere: `angle` (n,) as recorded, `within` what it may be off by."""
     off = float(angle[0]) - task.start_angle
     if abs(off) <= within:
         return None
     return Found(
         "another place",
-        f"{RELATIVE_ANGLE} begins at {angle[0]:.6g} instead of {task.start_angle:.6g}; 'offset' of "
-        "its column is for an encoder that has its zero elsewhere",
+        f"{RELATIVE_ANGLE} begins at {told(RELATIVE_ANGLE, float(angle[0]))} instead of "
+        f"{told(RELATIVE_ANGLE, task.start_angle)}; 'offset' of its column is for an encoder that "
+        "has its zero elsewhere",
     )
 
 
 def wrong_command(
-    got: Array, asked: Array, rate: float, others: Mapping[str, Array]
+    got: Array, asked: Array, rate: float, others: Mapping[str, Array], told: Told = plain
 ) -> Found | None:
     """Why a recorded command is not the one that was asked; both (n,), at `rate` (Hz).
 
@@ -96,7 +108,9 @@ def wrong_command(
         largest = max((float(np.max(np.abs(o))) for o in others.values()), default=0.0)
         if worst <= TOLERANCE * largest or worst == 0.0:
             return None
-        return Found("another command", f"nothing was to be commanded, and {worst:.6g} was")
+        return Found(
+            "another command", f"nothing was to be commanded, and {told(COMMAND, worst)} was"
+        )
     if _off(got, asked) <= TOLERANCE:
         return None
     if _rms(got) <= TOLERANCE * size:
@@ -106,8 +120,8 @@ def wrong_command(
     lag = _lag(asked, got)
     if abs(lag) > HELD and _off(got, asked, lag, lag) <= TOLERANCE:
         word = "late" if lag > 0 else "early"
-        told = f"the command is {word} by {abs(lag) / rate:.4g} s ({abs(lag)} samples)"
-        return Found(word, f"{told}; the recording begins with the excitation")
+        shift = f"the command is {word} by {abs(lag) / rate:.4g} s ({abs(lag)} samples)"
+        return Found(word, f"{shift}; the recording begins with the excitation")
     for name, other in others.items():
         if len(other) == len(asked) and _off(got, other) <= TOLERANCE < _off(asked, other):
             return Found("another trial", f"the command is that of {name}")
@@ -119,7 +133,8 @@ def wrong_command(
     first = int(np.argmax(off > 10 * TOLERANCE * size)) or int(np.argmax(off))
     return Found(
         "another command",
-        f"the command is {got[first]:.6g} instead of {asked[first]:.6g} at {first / rate:.4g} s, "
+        f"the command is {told(COMMAND, float(got[first]))} instead of "
+        f"{told(COMMAND, float(asked[first]))} at {first / rate:.4g} s, "
         f"and off by {_off(got, asked):.0%} of its size in all",
     )
 
@@ -149,7 +164,11 @@ def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> Found
 
 
 def clipped(
-    task: Task, series: Mapping[str, Array], asked: Array, limits: Mapping[str, float]
+    task: Task,
+    series: Mapping[str, Array],
+    asked: Array,
+    limits: Mapping[str, float],
+    told: Told = plain,
 ) -> Found | None:
     """A torque or current that stays at one extreme value while it would have gone on.
 
@@ -170,8 +189,10 @@ def clipped(
             level, count = series[name][runs[0][0]], sum(end - begin for begin, end in runs)
             if abs(level) >= AT_LIMIT * limits.get(name, np.inf):
                 continue
-            told = f"{name} stays at {level:.6g} for {count} of {len(series[name])} samples"
-            return Found("clipped", f"{told}, while the trial goes on")
+            stays = (
+                f"{name} stays at {told(name, float(level))} for {count} of {len(values)} samples"
+            )
+            return Found("clipped", f"{stays}, while the trial goes on")
     return None
 
 

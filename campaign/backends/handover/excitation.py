@@ -9,12 +9,16 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from campaign.channels import COMMAND, AxisKind, info
+from campaign.axis_kind import sides_in
+from campaign.channels import COMMAND, VOCABULARY, AxisKind, info
+from campaign.channels import axis_of as axis_of_channel
 from campaign.importing.made import RigFacts
 from campaign.importing.rig_facts import rig_facts
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import Bench
-from campaign.trial import Array, Task, Trial
+from campaign.recording import Array
+from campaign.trial import Task, Trial
+from campaign.units import convert
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,16 @@ def axis_of(trial: Trial) -> AxisKind:
     axis = trial.bench.get("axis")
     kind = axis.get("kind", AxisKind.ROTARY) if isinstance(axis, dict) else AxisKind.ROTARY
     return AxisKind(str(kind))
+
+
+def shown(trial: Trial, channel: str, value: float) -> str:
+    """A value of a channel (SI) in the unit that a reader is shown, with it."""
+    if channel not in VOCABULARY:
+        return f"{value:.6g}"
+    axis = axis_of_channel(channel, sides_in(trial.bench))
+    what = info(channel, trial.task.mode, axis=axis)
+    number = f"{convert(value, what.unit, what.display_unit) if what.unit else value:.6g}"
+    return f"{number} {what.display_unit}".rstrip()
 
 
 def facts_of(trial: Trial) -> RigFacts:

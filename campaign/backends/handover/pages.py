@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from campaign.backends.handover.excitation import Series, axis_of
+from campaign.backends.handover.excitation import Series, axis_of, shown
+from campaign.backends.handover.judging import GO_ON
 from campaign.backends.handover.places import COLUMNS, MANIFEST, Attempt, Verdict, read_json
 from campaign.channels import COMMAND, VOCABULARY, AxisKind, explained, info
 from campaign.plain_text import on_a_page
@@ -152,8 +153,12 @@ def attempt_page(
         *(_sketch(each) for each in series[1:]),
     ]
     if task.stop_rate is not None:
-        unit = info("relative_rate", axis=axis_of(trial)).unit
-        body.append(f"<p>End it as soon as the rate passes {task.stop_rate:.6g} {_text(unit)}.</p>")
+        rate = _text(shown(trial, "relative_rate", task.stop_rate))
+        body.append(
+            f"<p>It may end early: once the rate has passed {rate}, play and record on for "
+            f"{GO_ON / task.sample_rate:.4g} s ({GO_ON} samples), within the limits, and end it "
+            "then. What the load does as it breaks away is in those samples.</p>"
+        )
     body += [
         "<h2>Record</h2>",
         (
@@ -203,6 +208,7 @@ def manifest(
             {"name": window.name, "start": window.start, "stop": window.stop}
             for window in trial.windows
         ],
+        "record_after_stop_rate": GO_ON / task.sample_rate if task.stop_rate else 0.0,
         "limits": trial.bench.get("limits"),
         "controller": trial.bench.get("controller"),
         "compensation": {"method": task.compensation, "parameters": method},
@@ -257,7 +263,7 @@ def _role(role: str) -> str:
 
 def _settings(trial: Trial) -> list[str]:
     task, linear = trial.task, axis_of(trial) is AxisKind.LINEAR
-    angle = _shown(task.start_angle, "relative_angle", trial)
+    angle = shown(trial, "relative_angle", task.start_angle)
     rest = "the hull at rest" if task.base_acceleration.shape == "zero" else "the hull as played"
     loop = {
         "rate": "Close the rate loop: the command is the rate of the load.",
@@ -283,19 +289,12 @@ def _settings(trial: Trial) -> list[str]:
         }
         words = {"angle": "position", "torque": "force"} if linear else {}
         told = [
-            f"{words.get(name, name)} {_shown(float(value), watched[name], trial)}"
+            f"{words.get(name, name)} {shown(trial, watched[name], float(value))}"
             for name, value in limits.items()
             if name in watched and isinstance(value, int | float)
         ]
         lines.append(f"Limits that the rig itself has to keep: {', '.join(told)}.")
     return lines
-
-
-def _shown(value: float, channel: str, trial: Trial) -> str:
-    from campaign.units import convert
-
-    what = info(channel, axis=axis_of(trial))
-    return f"{convert(value, what.unit, what.display_unit):.6g} {what.display_unit}"
 
 
 def _channels(trial: Trial) -> str:

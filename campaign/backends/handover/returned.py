@@ -16,7 +16,8 @@ from campaign.importing.describing import describe
 from campaign.importing.made import AT_REST
 from campaign.importing.mapping import Layout, RecordingEntry
 from campaign.importing.reader import RecordingReader
-from campaign.trial import Array, ChannelInfo, Trial
+from campaign.recording import Array, ChannelInfo
+from campaign.trial import Trial
 
 CLOCK = 1e-3
 """Relative; further apart, two clocks do not run alike: it is another rate."""

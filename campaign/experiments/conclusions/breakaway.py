@@ -34,16 +34,22 @@ def breakaway_conclusions(
     settings: Settings,
     *,
     inertia_known: bool = True,
+    slid: bool = False,
 ) -> tuple[Conclusion, ...]:
     """Of the means over positions, and of the range of positions.
 
-    rates: slopes of the ramps (N m/s).
+    Args:
+        rates: slopes of the ramps (N m/s).
+        slid: whether the load slid in any of them.
     """
     findings = [_marked(each, findings) for each in findings]
     means = _top([each for each in findings if each.conditions.get("statistic") == "mean"])
     torques = of(means, TORQUE)
     if not torques and not inertia_known:
         return (conclusion("No breakaway torque can be told, for the inertia is not known"),)
+    if not torques and slid:
+        told = "The load slid, and no recording of it tells at which torque it broke away"
+        return (conclusion(told),)
     if not torques:
         return (conclusion("No ramp came to a breakaway torque"),)
     ramp = _ramps(rates)

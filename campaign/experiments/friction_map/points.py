@@ -21,8 +21,8 @@ from campaign.identification.ripple import (
 )
 from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.physics.bench import Bench
+from campaign.recording import Recording
 from campaign.result import Array
-from campaign.trial import Recording
 from campaign.units import shown_here
 
 UNSTEADY = 0.25

@@ -14,8 +14,9 @@ import numpy as np
 
 from campaign.channels import missing
 from campaign.estimate import Estimate
+from campaign.recording import Ending, Outcome, Recording
 from campaign.signals import Zero
-from campaign.trial import Ending, Outcome, Recording, Role, Trial
+from campaign.trial import Role, Trial
 
 
 class Finished(Protocol):

@@ -180,12 +180,24 @@ def position_figure(
     return Figure(
         key=f"positions{suffix}",
         title="Breakaway torque and bristle stiffness over position",
-        caption=" ".join(filter(None, told)) + " Bars are the 95 % intervals of each ramp alone; "
-        "that of the mean on the right has what the bench's constants may be off by in it.",
+        caption=f"{' '.join(filter(None, told))} {_bars(ramps)}",
         alt="Breakaway torque and bristle stiffness, one dot with a bar per ramp, and their mean.",
         panels=tuple(panels),
         across=2,
         trials=trials_of(ramps.trials),
+    )
+
+
+def _bars(ramps: Ramps) -> str:
+    """What the bars of single ramps are, where the table has them with more in them."""
+    own = "Bars are the 95 % intervals of each ramp alone"
+    every = (estimate for each in ramps.found for estimate in each.values())
+    if not any(each.has_interval and each.combined != (each.low, each.high) for each in every):
+        return f"{own}."
+    return (
+        f"{own}: whether ramps differ shows by these. What the bench's constants may be off by is "
+        "the same in all ramps: it is in the bar of the mean on the right, and in every interval "
+        "of the table, which are therefore wider than the bars here."
     )
 
 

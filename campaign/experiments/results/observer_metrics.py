@@ -17,9 +17,9 @@ from campaign.identification.stabilization_error import over_blocks, over_trials
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, control_rate
+from campaign.recording import Outcome, Recording
 from campaign.result import Array
 from campaign.signals import Sine
-from campaign.trial import Outcome, Recording
 
 ERROR = "stabilization_error"
 ERROR_THEORY = "error_by_equation_5_4"

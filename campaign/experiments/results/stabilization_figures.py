@@ -24,9 +24,10 @@ from campaign.experiments.shared.pointing_error import (
 from campaign.experiments.shared.swept_words import words
 from campaign.identification.relative_rate import mean
 from campaign.options import Options
+from campaign.recording import Recording
 from campaign.result import Array, Axis, Cell, Curve, Figure, Mark, Panel
 from campaign.signals import Sine
-from campaign.trial import Recording, canonical_json
+from campaign.trial import canonical_json
 
 ERROR = Axis("Position error", "rad", "mrad")
 TORQUE = Axis("Torque", "N m", "N m")

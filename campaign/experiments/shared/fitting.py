@@ -25,6 +25,8 @@ MILLIMETRE = 1e-3
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
+UNKNOWN_LOOP = 1.0
+"""s to settle where nobody says how fast the rate loop is: ten time constants of one of 1.6 Hz."""
 MINUTE = 60.0
 """s that a run of a map takes at most, one way."""
 SLOWEST = 0.1
@@ -50,7 +52,7 @@ def usual(degrees: float) -> float:
 
 def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     """Travel, ramps, settling, windows, speeds and times of a friction-velocity map."""
-    require(bench, ("limits", "controller.rate"), "a plan of runs at constant speed")
+    require(bench, ("limits",), "a plan of runs at constant speed")
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
     allowed = _longest_run(limits.duration, options.rest)
@@ -67,7 +69,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "half of what torque and friction leave": 0.5 * rig.acceleration(0.7 * limits.rate),
         },
     )
-    settling = max(0.3, rig.loop_time)
+    settling, settles = _settling(rig, options)
     fastest = (
         max(own)
         if own
@@ -88,7 +90,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         "settle_time",
         "s",
         {
-            "ten time constants of the loop, at least 0.3 s": settling,
+            settles: settling,
             "what the fastest speed leaves": max(room - 0.5, 0.5 * room),
         },
     )
@@ -218,6 +220,15 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     choices.most("sliding_rate", "deg/s", sliding)
     choices.sample_rate(rig)
     return choices.told
+
+
+def _settling(rig: Rig, options: Any) -> tuple[float, str]:
+    """How long (s) runs at constant speed settle, and why that long."""
+    if "settle_time" in options.model_fields_set:
+        return float(options.settle_time), "as written"
+    if rig.loop_time is None:
+        return UNKNOWN_LOOP, "a usual size; the rate loop is not described"
+    return max(0.3, rig.loop_time), "ten time constants of the loop, at least 0.3 s"
 
 
 def _sliding(rig: Rig, options: Any) -> Reasons:

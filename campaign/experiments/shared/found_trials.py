@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -22,39 +23,51 @@ from campaign.trial import Offered, Task, TrialRequest
 CHOOSE_SINE = "where it is a sine for a while, windows name that part, or start and stop cut it out"
 
 
-def _sine(offered: Offered, channel: str) -> FoundStretch:
+def named_or_found(offered: Offered, found: Sequence[Window]) -> tuple[Window, ...]:
+    """The windows that an analysis needs: as somebody has named them, and else as found."""
+    stated = {window.name: window for window in offered.windows}
+    return tuple(stated.get(window.name, window) for window in found)
+
+
+def _stated(offered: Offered, name: str) -> Window | None:
+    """The window that somebody has named so. Raises ValueError where there are only others."""
+    names = [window.name for window in offered.windows]
+    if names and name not in names:
+        raise ValueError(f"a window {names[0]!r} says nothing here; it is {name!r}")
+    return next((window for window in offered.windows if window.name == name), None)
+
+
+def _sine(offered: Offered, channel: str, window: Window | None) -> FoundStretch:
     """The sine of a channel, at the frequency (Hz) that is known to have been set, if it is.
 
-    Looked for in the first of the windows that were stated, or in all of the recording.
+    Looked for in the window that was stated, or in all of the recording.
     """
     known = offered.conditions.get("frequency")
     frequency = float(known) if isinstance(known, int | float) else None
     signal, rate = offered.read([channel])[channel], offered.sample_rate
     try:
-        if not offered.windows:
+        if window is None:
             return sine_stretch(signal, rate, frequency)
-        first, stop = (round(end * rate) for end in _ends(offered.windows[0]))
+        first, stop = (round(end * rate) for end in (window.start, window.stop))
         sine = found_sine(signal[first:stop], rate, frequency)
     except ValueError as error:
-        if offered.windows:
-            part = f" in the window {offered.windows[0].name!r}"
-            raise ValueError(f"{channel}{part}: {error}") from None
+        if window is not None:
+            raise ValueError(f"{channel} in the window {window.name!r}: {error}") from None
         raise ValueError(f"{channel}: {error}; {CHOOSE_SINE}") from None
     return FoundStretch(from_start(sine, first / rate), first, stop)
 
 
-def _ends(window: Window) -> tuple[float, float]:
-    return window.start, window.stop
-
-
 def _steady(
-    offered: Offered, found: FoundStretch, settle_cycles: int, settle_time: float
+    offered: Offered,
+    window: Window | None,
+    found: FoundStretch,
+    settle_cycles: int,
+    settle_time: float,
 ) -> tuple[float, float, int]:
     """Begin and end (s) of the whole cycles that are measured, and how many they are."""
     frequency = found.sine.frequency
-    if offered.windows:
-        first = offered.windows[0]
-        return first.start, first.stop, round((first.stop - first.start) * frequency)
+    if window is not None:
+        return window.start, window.stop, round((window.stop - window.start) * frequency)
     settle = max(settle_cycles, math.ceil(settle_time * frequency - 1e-9))
     begin = found.first / offered.sample_rate
     lasts = (found.stop - found.first) / offered.sample_rate
@@ -76,9 +89,10 @@ def sine_response(
     settle_time: float,
 ) -> TrialRequest:
     """A response to a sine of a channel. Raises ValueError where that is none."""
-    found = _sine(offered, excitation)
+    stated = _stated(offered, window)
+    found = _sine(offered, excitation, stated)
     sine = found.sine
-    start, stop, cycles = _steady(offered, found, settle_cycles, settle_time)
+    start, stop, cycles = _steady(offered, stated, found, settle_cycles, settle_time)
     return TrialRequest(
         Task(
             mode=mode,
@@ -88,17 +102,19 @@ def sine_response(
             sample_rate=offered.sample_rate,
         ),
         point={"frequency": round(sine.frequency, 9)},
-        note=f"a sine of {sine.frequency:.4g} Hz was found{_where(offered, found)}; "
+        note=f"a sine of {sine.frequency:.4g} Hz was found{_where(offered, stated, found)}; "
         f"{cycles} cycles are measured",
         requires=(GYRO_RATE, excitation),
         windows=(Window(window, start, stop),),
     )
 
 
-def _where(offered: Offered, found: FoundStretch) -> str:
-    """From when until when a sine is in a recording, where that is not all of it."""
+def _where(offered: Offered, stated: Window | None, found: FoundStretch) -> str:
+    """Where a sine is in a recording, where that is not all of it: in which window, or times."""
+    if stated is not None:
+        return f" in the window {stated.name!r}, {stated.start:.4g} to {stated.stop:.4g} s"
     whole = round(offered.duration * offered.sample_rate)
-    if offered.windows or found.stop - found.first >= whole - 1:
+    if found.stop - found.first >= whole - 1:
         return ""
     first, stop = (each / offered.sample_rate for each in (found.first, found.stop))
     return f", from {first:.4g} to {stop:.4g} s"
@@ -124,7 +140,7 @@ def step_found(offered: Offered, names: tuple[str, str]) -> TrialRequest:
             sample_rate=offered.sample_rate,
         ),
         note=f"a step was found at {step.at:.4g} s",
-        windows=offered.windows or windows,
+        windows=named_or_found(offered, windows),
         options={
             "step": step.size,
             "ramp": step.ramp,
@@ -135,11 +151,12 @@ def step_found(offered: Offered, names: tuple[str, str]) -> TrialRequest:
     )
 
 
-def hull_sine(offered: Offered, settle_cycles: int) -> TrialRequest:
+def hull_sine(offered: Offered, window: str, settle_cycles: int) -> TrialRequest:
     """A motion of the hull that is a sine. Raises ValueError where it is none."""
-    found = _sine(offered, BASE_RATE)
+    stated = _stated(offered, window)
+    found = _sine(offered, BASE_RATE, stated)
     sine = found.sine
-    start, stop, cycles = _steady(offered, found, settle_cycles, 0.0)
+    start, stop, cycles = _steady(offered, stated, found, settle_cycles, 0.0)
     omega = 2.0 * np.pi * sine.frequency
     acceleration = sine.amplitude * omega
     return TrialRequest(
@@ -153,7 +170,7 @@ def hull_sine(offered: Offered, settle_cycles: int) -> TrialRequest:
             window=(start, stop),
             sample_rate=offered.sample_rate,
         ),
-        note=f"the hull swings at {sine.frequency:.4g} Hz{_where(offered, found)}; "
+        note=f"the hull swings at {sine.frequency:.4g} Hz{_where(offered, stated, found)}; "
         f"{cycles} cycles are measured",
         options={
             "frequency": round(sine.frequency, 6),

@@ -17,9 +17,10 @@ from campaign.estimate import Window
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import method_label
 from campaign.physics.bench import Bench
+from campaign.recording import Recording
 from campaign.result import Axis, Curve, Figure, Panel
 from campaign.signals import Sine
-from campaign.trial import Recording, Task, TrialRequest
+from campaign.trial import Task, TrialRequest
 
 CYCLES = 1.5
 """of the prescribed rate; the reversal that is shown is the second, when the bristles move."""

@@ -15,9 +15,10 @@ from campaign.channels import POINTING_ERROR
 from campaign.estimate import Estimate, Window
 from campaign.experiments.interface import TrialData, metrics
 from campaign.identification import stabilization_error
+from campaign.recording import Recording
 from campaign.result import Array, ends_of
 from campaign.signals import Sine
-from campaign.trial import Recording, Task, Trial
+from campaign.trial import Task, Trial
 
 MEASURED = "measured"
 """The window that counts: after the transient; whole cycles of a sinusoidal motion."""

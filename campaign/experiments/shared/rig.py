@@ -10,13 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from campaign.physics.bench import Bench, LimitsOptions
-from campaign.physics.complete import (
-    IncompleteBenchError,
-    control_rate,
-    lacking,
-    limits_of,
-    rate_gains_of,
-)
+from campaign.physics.complete import control_rate, lacking, limits_of
 from campaign.physics.friction import friction_models
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
@@ -25,9 +19,6 @@ from campaign.physics.loops_used import loops_of
 
 SLOW = 1e-9
 """rad/s; friction at this rate is that of the onset of sliding."""
-LOOP_TIME = "how long the rate loop takes to settle"
-SIMPLE_LOOP = ("axis.inertia", "motor.torque_constant", "gear.ratio")
-"""What the pace of the rate loop follows from, besides its gain."""
 MOST = 0.9
 """of a limit that an experiment may use up by its own choice."""
 
@@ -132,25 +123,28 @@ class Rig:
         return min(1000.0, control_rate(self.bench) or 1000.0)
 
     @cached_property
-    def loop_time(self) -> float:
+    def loop_time(self) -> float | None:
         """How long (s) the rate loop takes to forget: ten of its slower time constants.
 
-        By its crossover, or what follows from inertia and gain where the bench says too little for
-        that. Raises IncompleteBenchError where it does not even say the gains.
+        By its crossover, or what follows from inertia, torque constant, ratio and gain where the
+        bench says too little for that; None where it does not even say those.
         """
-        gains = rate_gains_of(self.bench, LOOP_TIME)
+        controller = self.bench.controller
+        if controller is None or controller.rate is None:
+            return None
+        gains = controller.rate
         integral = gains.integral_gain
         slow = gains.proportional / integral if integral > 0 else 0.0
         loop = dict(loops_of(self.bench, "none", "rate")).get("sliding")
         crossovers = loop.crossovers if isinstance(loop, LoopMargins) else ()
         fast = 1.0 / min(crossovers) if crossovers else self._response_time(gains.proportional)
-        return 10.0 * max(fast, min(slow, 1.0))
+        return None if fast is None else 10.0 * max(fast, min(slow, 1.0))
 
-    def _response_time(self, proportional: float) -> float:
+    def _response_time(self, proportional: float) -> float | None:
         """J / (N Kt Kpv) (s): of a loop whose motor is not known; 0 where all of it is known."""
         inertia, per_ampere = self.bench.axis.inertia, self.bench.torque_per_current
         if not lacking(self.bench):
             return 0.0  # a loop without a crossover
         if inertia is None or per_ampere is None:
-            raise IncompleteBenchError.of(self.bench, lacking(self.bench, SIMPLE_LOOP), LOOP_TIME)
+            return None
         return inertia / (per_ampere * proportional)

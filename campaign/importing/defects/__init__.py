@@ -1,6 +1,7 @@
-"""What is wrong with a recording, and what can be done about it: pure functions on arrays.
+"""What is wrong with a recording: pure functions on arrays.
 
-Finding and repairing are apart: nothing is repaired because it was found.
+Nothing is repaired because it was found: what a mapping asks for is done where channels are made of
+columns (`importing.made`), times a clock (`importing.even_clock`) and samples read.
 """
 
 from campaign.importing.defects.defect import Defect, Severity

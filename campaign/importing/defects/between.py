@@ -12,7 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.importing.defects.defect import Array, Defect, Severity, step_size
+from campaign.importing.defects.defect import (
+    LONGEST,
+    NO_FILTER,
+    Array,
+    Defect,
+    Severity,
+    correlation,
+    is_sure,
+    nearest_low,
+    step_size,
+)
 
 _LIKE = 0.98
 """The share from which on a factor between a rate and its angle is one."""
@@ -113,6 +123,9 @@ def of_rate(
     if found is None or found.travel < 30:
         return
     one, two = names
+    if found.explained < 0.9 and (late := list(delay(time, angle, rate, names))):
+        yield from late  # what it is a factor of cannot be told before it is put back
+        return
     if found.explained < 0.5:
         what = (
             f"{two} is not the derivative of {one}: it explains {100 * found.explained:.2g} % of "
@@ -125,10 +138,12 @@ def of_rate(
             f"{two} has the opposite sign of the derivative of {one} (factor {found.factor:.4g}, "
             f"R² {found.explained:.3f})"
         )
-        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE, "swap_sign")
+        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE, "sign")
     yield from _factor(found, names, rows, gear)
     if found.explained > 0.9:
-        yield from delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
+        apart = delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
+        # Both agree on how far it moved: a long delay would be that of a part that hardly changes.
+        yield from (each for each in apart if each.severity is Severity.NOTED)
 
 
 def candidates(factor: float, error: float = 0.0, gear: float | None = None) -> list[str]:
@@ -156,7 +171,7 @@ def _factor(
     means = candidates(found.factor, found.error, gear)
     if len(means) == 1:
         what = f"{told}: {means[0]}"
-        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE, "scale")
+        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE, "times")
     elif means:
         what = f"{told}: either {', or '.join(means)}"
         yield Defect("factor", (two, one), what, rows, size, Severity.REFUSED)
@@ -172,21 +187,22 @@ def delay(
     """By how much a rate comes after the derivative of its angle, s, from half a step on."""
     known = np.isfinite(angle) & np.isfinite(rate)
     n = len(time)
-    most = min(200, n // 8)
-    if not known.all() or most < 3:
+    step = float(time[-1] - time[0]) / max(n - 1, 1)
+    if not known.all() or n < 20 or step <= 0:
         return
-    step = float(time[-1] - time[0]) / (n - 1)
-    if step <= 0:
-        return
+    most = min(n // 5, max(200, math.ceil(LONGEST / step)))
     derivative = np.gradient(angle, step)[most : n - most]
     derivative = derivative - derivative.mean()
     width = len(derivative)
-    products = _correlation(rate, derivative)
+    products = correlation(rate, derivative)
     sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (rate, rate**2))
     mean = (sums[width:] - sums[:-width]) / width
-    spread = np.maximum((squares[width:] - squares[:-width]) / width - mean**2, 1e-300)
-    likeness = products / width / np.sqrt(spread) / max(float(derivative.std()), 1e-300)
-    peak = int(np.argmax(likeness))
+    spread = (squares[width:] - squares[:-width]) / width - mean**2
+    # Where the rate stands still it is like nothing.
+    floor = max(1e-9 * float(rate.var()), 1e-300)
+    size = np.sqrt(np.maximum(spread, floor)) * max(float(derivative.std()), 1e-150)
+    likeness = np.clip(np.where(spread > floor, products / width / size, 0.0), -1.0, 1.0)
+    peak = nearest_low(1.0 - np.maximum(likeness, 0.0) ** 2, most, 1e-4)
     at_rest = float(likeness[most])
     if not 0 < peak < 2 * most or likeness[peak] < 0.8:
         return
@@ -196,7 +212,10 @@ def delay(
     before, top, after = likeness[peak - 1 : peak + 2]
     bend = before - 2 * top + after
     lag = (peak - most + (0.5 * (before - after) / bend if bend < 0 else 0.0)) * step
-    if abs(lag) < 0.5 * step:
+    is_long = abs(lag) >= NO_FILTER
+    if abs(lag) < 0.5 * step or (
+        is_long and not is_sure(1.0 - float(likeness[peak]) ** 2, 1.0 - max(at_rest, 0.0) ** 2)
+    ):
         return
     one, two = names
     where = "after" if lag > 0 else "before"
@@ -204,12 +223,5 @@ def delay(
         f"{two} comes {1000 * abs(lag):.3g} ms {where} the derivative of {one} "
         f"({abs(lag) / step:.2g} samples): a delay or a filter"
     )
-    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), Severity.NOTED, "shift")
-
-
-def _correlation(values: Array, part: Array) -> Array:
-    """Sum of products of `part` with `values` from each place on that it fits in."""
-    size = 1 << (len(values) - 1).bit_length()
-    spectrum = np.fft.rfft(values, size) * np.conj(np.fft.rfft(part, size))
-    found: Array = np.fft.irfft(spectrum, size)[: len(values) - len(part) + 1]
-    return found
+    severity = Severity.REPAIRABLE if is_long else Severity.NOTED
+    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), severity, "delay")

@@ -28,6 +28,8 @@ RATE_ERROR = 1e-3
 """Share by which a rate may differ from the stated one."""
 CLOCK_ERROR = 20e-6
 """Share by which two clocks may differ unnoticed: twice what a crystal's data sheet allows."""
+DROP, MARK, RESAMPLE = "drop repeated", "mark gaps", "resample"
+"""What a mapping may have done to times."""
 _BESIDE = 5
 """Samples on either side by which a lasting shift is told from a late stamp."""
 
@@ -104,9 +106,7 @@ def of_time(time: Array, rate: float | None = None) -> Iterator[Defect]:
     lost = np.flatnonzero(~np.isfinite(time))
     if len(lost):
         what = f"{counted(len(lost), 'sample')} without a time, the first in row {lost[0] + 1}"
-        yield Defect(
-            "lost time", (), what, _ends(lost), float(len(lost)), Severity.REPAIRABLE, "drop"
-        )
+        yield Defect("lost time", (), what, _ends(lost), float(len(lost)), Severity.REFUSED)
         time = time[np.isfinite(time)]
     if len(time) < FEWEST:
         return
@@ -124,11 +124,11 @@ def of_time(time: Array, rate: float | None = None) -> Iterator[Defect]:
     yield from _gaps(time, clock)
     if clock.resolution:
         what = f"stamps are rounded to {clock.resolution:.3g} s, of steps of {clock.step:.4g} s"
-        yield Defect("rounded", (), what, (0, last), clock.resolution, Severity.NOTED, "restamp")
+        yield Defect("rounded", (), what, (0, last), clock.resolution, Severity.NOTED)
     if clock.scatter > JITTER * clock.step:
         share = clock.scatter / clock.step
         what = f"steps scatter by {100 * share:.3g} % of {clock.step:.4g} s (standard deviation)"
-        yield Defect("jitter", (), what, (0, last), share, Severity.REPAIRABLE, "resample")
+        yield Defect("jitter", (), what, (0, last), share, Severity.REPAIRABLE, RESAMPLE)
     yield from _drift(time, clock, rate)
 
 
@@ -145,9 +145,7 @@ def _repeated(steps: Array, clock: Ticks) -> Iterator[Defect]:
             f"time goes back {counted(len(back), 'time')}, by up to {most:.3g} s, the first in "
             f"row {back[0] + 1}"
         )
-        yield Defect(
-            "backward", (), what, _ends(back), float(len(back)), Severity.REPAIRABLE, "drop"
-        )
+        yield Defect("backward", (), what, _ends(back), float(len(back)), Severity.REPAIRABLE, DROP)
     same = np.flatnonzero(steps == 0) + 1
     if len(same):
         coarse = clock.resolution > clock.step
@@ -156,7 +154,7 @@ def _repeated(steps: Array, clock: Ticks) -> Iterator[Defect]:
             f"{counted(len(same), 'sample')} with the time of the one before, the first in row "
             f"{same[0] + 1}{why}"
         )
-        repair = "restamp" if coarse else "drop"
+        repair = "sample_rate" if coarse else DROP
         yield Defect(
             "duplicate", (), what, _ends(same), float(len(same)), Severity.REPAIRABLE, repair
         )
@@ -170,13 +168,13 @@ def _gaps(time: Array, clock: Ticks) -> Iterator[Defect]:
             f"{time[row + 1] - time[row]:.4g} s, where steps are {clock.step:.4g} s"
         )
         where = (row, row + 1)
-        yield Defect("gap", (), what, where, float(missing), Severity.REPAIRABLE, "resample")
+        yield Defect("gap", (), what, where, float(missing), Severity.REPAIRABLE, MARK)
     if len(told) > MOST:
         rest = told[MOST:]
         missing = sum(each for _, each in rest)
         what = f"{counted(missing, 'sample')} missing in {counted(len(rest), 'further gap')}"
         where = (rest[0][0], rest[-1][0] + 1)
-        yield Defect("gap", (), what, where, float(missing), Severity.REPAIRABLE, "resample")
+        yield Defect("gap", (), what, where, float(missing), Severity.REPAIRABLE, MARK)
 
 
 def _drift(time: Array, clock: Ticks, rate: float | None) -> Iterator[Defect]:
@@ -188,7 +186,7 @@ def _drift(time: Array, clock: Ticks, rate: float | None) -> Iterator[Defect]:
             f"{100 * (1 / (clock.step * rate) - 1):+.3g} %"
         )
         size = 1 / clock.step - rate
-        yield Defect("stated rate", (), what, rows, size, Severity.REPAIRABLE, "resample")
+        yield Defect("stated rate", (), what, rows, size, Severity.REPAIRABLE, RESAMPLE)
     count = np.arange(len(time), dtype=np.float64)
     for row, missing in zip(clock.gaps, clock.missing, strict=True):
         count[row + 1 :] += missing
@@ -204,7 +202,7 @@ def _drift(time: Array, clock: Ticks, rate: float | None) -> Iterator[Defect]:
             "off an even clock that fits both ends"
         )
         size = 1.5 * float(abs(bend))
-        yield Defect("drift", (), what, rows, size, Severity.REPAIRABLE, "resample")
+        yield Defect("drift", (), what, rows, size, Severity.REPAIRABLE, RESAMPLE)
 
 
 def drift_between(time: Array, other: Array) -> Iterator[Defect]:
@@ -219,4 +217,4 @@ def drift_between(time: Array, other: Array) -> Iterator[Defect]:
         what = f"the other clock runs {1e6 * size:+.4g} ppm against this one, {apart:.3g} s in all"
         step = ticks(time[told]).step
         severity = Severity.REPAIRABLE if step and apart > step else Severity.NOTED
-        yield Defect("drift", (), what, (0, len(time) - 1), size, severity, "scale")
+        yield Defect("drift", (), what, (0, len(time) - 1), size, severity)

@@ -33,7 +33,7 @@ class Defect:
         rows: the first and the last row, from 0.
         size: the number that tells how much: of missing samples, of a factor, s of a delay.
         severity: what it means for the recording.
-        repair: which function of `repairs` is for it; "" where there is none.
+        repair: the word of a mapping that is for it, `sign` or `unwrap`; "" where there is none.
     """
 
     kind: str
@@ -43,6 +43,41 @@ class Defect:
     size: float
     severity: Severity
     repair: str = ""
+
+
+BETTER = 0.25
+"""of what is not explained without a long delay, at most, is not explained with it ..."""
+AMISS = 0.15
+"""... and this share of the channel at least without it: what repeats itself fits nearly as well
+a period later, and friction is late at a reversal by an angle."""
+LONGEST = 2.0
+"""s by which a channel that is late is looked for, as far as a fifth of a recording holds it."""
+NO_FILTER = 0.1
+"""s from which on a delay is no filter's, and is refused unless somebody says it. Friction's own,
+at the reversals of a slow sine, is some 0.05 s."""
+
+
+def is_sure(left: float, now: float) -> bool:
+    """Whether a delay of more than a filter is one.
+
+    By what it leaves unexplained of a channel, and what is not explained without it; shares.
+    """
+    return left <= BETTER * now and now >= AMISS
+
+
+def nearest_low(left: Array, at: int, slack: float) -> int:
+    """Of the minima of `left`, shape (n,), that are nearly the lowest, the one nearest to `at`.
+
+    What repeats itself fits as well a period later: the shortest delay counts. The lowest itself
+    where it is at an end.
+    """
+    least = float(left.min())
+    inner = left[1:-1]
+    low = (inner <= left[:-2]) & (inner <= left[2:]) & (inner <= 1.2 * least + slack)
+    places = np.flatnonzero(low) + 1
+    if not len(places):
+        return int(np.argmin(left))
+    return int(places[np.argmin(np.abs(places - at))])
 
 
 def runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -77,6 +112,14 @@ def usual_step(values: Array) -> float:
     size = np.abs(np.diff(values))
     size = size[np.isfinite(size) & (size > 0)]
     return float(np.quantile(size, 0.99)) if len(size) else 0.0
+
+
+def correlation(values: Array, part: Array) -> Array:
+    """Sum of products of `part` with `values` from each place on that it fits in."""
+    size = 1 << (len(values) - 1).bit_length()
+    spectrum = np.fft.rfft(values, size) * np.conj(np.fft.rfft(part, size))
+    found: Array = np.fft.irfft(spectrum, size)[: len(values) - len(part) + 1]
+    return found
 
 
 def rows_in_words(first: int, last: int) -> str:

@@ -57,7 +57,7 @@ def of_drive(name: str, values: Array, command: Array | None = None) -> Iterator
         )
         severity = Severity.REFUSED if beyond else Severity.REPAIRABLE
         ends = (long[0][0], long[-1][1])
-        yield Defect("clipping", (name,), what, ends, extreme, severity, "" if beyond else "lose")
+        yield Defect("clipping", (name,), what, ends, extreme, severity)
 
 
 def _asked(values: Array, command: Array, stretch: tuple[int, int], usual: float) -> bool:
@@ -131,7 +131,7 @@ def of_drive_sign(
     if not proven:
         what += "; or something else drove, such as gravity or the hull"
     severity = Severity.REPAIRABLE if proven else Severity.NOTED
-    yield Defect("sign", names, what, (0, len(time) - 1), share, severity, "swap_sign")
+    yield Defect("sign", names, what, (0, len(time) - 1), share, severity, "sign")
 
 
 def _mass_sign(time: Array, rate: Array, torque: Array) -> int:

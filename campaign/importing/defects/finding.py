@@ -26,8 +26,9 @@ from campaign.importing.defects.between import of_rate
 from campaign.importing.defects.clock import drift_between, of_time
 from campaign.importing.defects.defect import Array, Defect, Severity
 from campaign.importing.defects.drives import of_drive, of_drive_sign, of_twins
+from campaign.importing.defects.late import of_drive_delay
 from campaign.importing.defects.rates import frozen, slower
-from campaign.importing.defects.samples import of_channel
+from campaign.importing.defects.samples import continuous, of_channel
 
 ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
 DRIVES = (DRIVE_TORQUE, JOINT_TORQUE, MOTOR_CURRENT)
@@ -84,7 +85,7 @@ def find(
             own += [each for each in slower(name, values) if (each.kind, each.size) not in drawn]
         found += own
         scale = next((each.size for each in own if each.kind == "wraparound"), None)
-        sound[name] = values if scale is None else np.unwrap(values, period=scale)
+        sound[name] = values if scale is None else continuous(values, scale)
     found += frozen({name: v for name, v in sound.items() if name not in TOLD})
     for name in DRIVES:
         if name in sound:
@@ -120,6 +121,8 @@ def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> 
     if drive is not None and moving is not None:
         name, there, moves = moving
         found += of_drive_sign(time, there, moves, channels[drive], (drive, name))
+        for each in (each for each in DRIVES if each in channels):
+            found += of_drive_delay(time, moves, channels[each], (each, name))
     for pair in combinations([name for name in DRIVES if name in channels], 2):
         found += of_twins(pair, channels[pair[0]], channels[pair[1]])
     return found

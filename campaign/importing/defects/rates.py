@@ -36,7 +36,7 @@ def slower(name: str, values: Array) -> Iterator[Defect]:
     period = _rhythm(corners, len(values))
     if period:
         what = f"{name} was measured in every {_ordinal(period)} row, and drawn straight in between"
-        yield Defect("filled", (name,), what, rows, float(period), Severity.REPAIRABLE, "unfill")
+        yield Defect("filled", (name,), what, rows, float(period), Severity.REPAIRABLE)
 
 
 def _rhythm(places: NDArray[np.intp], length: int) -> int:

@@ -97,6 +97,14 @@ def _wraparound(name: str, values: Array) -> Iterator[Defect]:
             return
 
 
+def continuous(values: Array, scale: float) -> Array:
+    """An angle whose scale began anew, shape (n,), without its jumps; lost samples stay lost."""
+    known = np.isfinite(values)
+    made = values.copy()
+    made[known] = np.unwrap(values[known], period=scale)
+    return made
+
+
 def _zeros(name: str, values: Array) -> Iterator[Defect]:
     """Zeros that a channel jumps to, and from there back to where it would be."""
     zero = values == 0
@@ -141,7 +149,7 @@ def _spikes(name: str, values: Array) -> Iterator[Defect]:
             f"{high:.4g}"
         )
         ends = (int(rows[0]), int(rows[-1]))
-        yield Defect("spike", (name,), what, ends, float(len(rows)), Severity.REPAIRABLE, "lose")
+        yield Defect("spike", (name,), what, ends, float(len(rows)), Severity.REPAIRABLE)
 
 
 def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Defect]:
@@ -151,15 +159,13 @@ def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Def
         samples = last - first + 1
         where = rows_in_words(first, last)
         what = f"{name} {does} in the middle of motion, {where} ({counted(samples, 'sample')})"
-        yield Defect(
-            "dropout", (name,), what, (first, last), float(samples), Severity.REPAIRABLE, "lose"
-        )
+        yield Defect("dropout", (name,), what, (first, last), float(samples), Severity.REPAIRABLE)
     rest = stretches[MOST:]
     if rest:
         samples = sum(last - first + 1 for first, last in rest)
         what = f"{name} {does} in {counted(len(rest), 'further stretch').replace('chs', 'ches')}"
         ends = (rest[0][0], rest[-1][1])
-        yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE, "lose")
+        yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE)
 
 
 def _limit_of_integers(name: str, values: Array) -> Iterator[Defect]:
@@ -178,4 +184,4 @@ def _limit_of_integers(name: str, values: Array) -> Iterator[Defect]:
                     f"{name} stands at {limit:.0f}, where whole numbers of some bits end, in "
                     f"{counted(int(at.sum()), 'sample')}"
                 )
-                yield Defect("clipping", (name,), what, longest, limit, Severity.REPAIRABLE, "lose")
+                yield Defect("clipping", (name,), what, longest, limit, Severity.REPAIRABLE)

@@ -26,7 +26,8 @@ def tables(path: Path) -> Sequence[Table]:
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError([Problem(path, 0, 0, message)])
     count = len(dialect.numeric)
-    names = dialect.names or tuple(f"column {k}" for k in range(1, count + 1))
+    names = dialect.names or ("",) * count
+    names = tuple(name or f"column {k}" for k, name in enumerate(names, start=1))
     columns = tuple(
         Column(name, unit, f"column {k}", numeric)
         for k, (name, unit, numeric) in enumerate(

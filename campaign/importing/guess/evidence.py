@@ -14,11 +14,19 @@ import numpy as np
 from campaign.importing.defects.between import DEG, Slope, slope
 from campaign.importing.defects.clock import ticks
 from campaign.importing.defects.defect import Array
+from campaign.unit_grammar import parse_unit
 
 EPOCHS = ((1e9, 4e9, "s"), (1e12, 4e12, "ms"), (1e15, 4e15, "us"), (1e18, 4e18, "ns"))
 """Times since 1970, of the years 2001 to 2096, by their size."""
-TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
-"""Units of time, in s."""
+
+
+def seconds_of(unit: str) -> float | None:
+    """What a unit of time is, in s; None for what is none."""
+    try:
+        found = parse_unit(unit)
+    except ValueError:
+        return None
+    return float(found.factor) if found.dimensions == parse_unit("s").dimensions else None
 
 
 def increases(values: Array) -> bool:
@@ -81,6 +89,23 @@ def unit_of_angle(values: Array) -> Likely | None:
     known = values[np.isfinite(values)]
     if len(known) and np.array_equal(known, np.round(known)) and np.ptp(known) > 20:
         return Likely("count", "whole numbers")
+    return None
+
+
+def unit_of_joint(values: Array) -> Likely | None:
+    """Of an angle at the load: one of many turns is rather one in degrees."""
+    known = values[np.isfinite(values)]
+    span = float(np.ptp(known)) if len(known) else 0.0
+    if 8 * math.pi < span <= 720:
+        return Likely("deg", f"in rad it would be {span / (2 * math.pi):.3g} turns")
+    return None
+
+
+def unit_of_temperature(values: Array) -> Likely | None:
+    """By its range: what laboratories have, in °C."""
+    known = values[np.isfinite(values)]
+    if len(known) and known.min() > -60 and known.max() < 220:
+        return Likely("degC", f"it is between {known.min():.4g} and {known.max():.4g}")
     return None
 
 

@@ -7,99 +7,27 @@ gear, constants, offsets and filters are never guessed.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from campaign.channels import MOTOR_ANGLE, MOTOR_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.channels import COMMAND, MOTOR_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.importing.defects import Defect, Severity, find
 from campaign.importing.defects.clock import ticks
-from campaign.importing.guess.evidence import (
-    TICKS,
-    Likely,
-    counts,
-    evenly,
-    factor,
-    increases,
-    unit_of_angle,
-    unit_of_rate,
-    unit_of_time,
-)
-from campaign.importing.guess.names import INDEX, TIME, UNKNOWN, Named, named
+from campaign.importing.guess.axes import axes
+from campaign.importing.guess.beside import beside
+from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGuess
+from campaign.importing.guess.evidence import counts, evenly, increases, seconds_of, unit_of_time
+from campaign.importing.guess.names import OF_ANYTHING, named
+from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
+from campaign.importing.guess.relations import by_numbers, with_units
 from campaign.importing.guess.stated import stated_unit
 from campaign.importing.interface import Array, Table
 from campaign.importing.opening import open_recordings
 
 SAMPLE = 200_000
 """Rows by which is guessed: enough for any motion, and little of a large file."""
-_PAIRS = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE), (RELATIVE_ANGLE, MOTOR_RATE))
-
-
-class Basis(StrEnum):
-    """What a unit rests on."""
-
-    STATED = "stated"  # the file says so
-    LIKELY = "likely"  # the numbers suggest it
-    UNKNOWN = "unknown"
-
-
-@dataclass(frozen=True)
-class ColumnGuess:
-    """A column of a table, and what it may be.
-
-    Attributes:
-        role: a channel of the vocabulary, or `time`, `index`, `unknown`.
-        why: what the role rests on.
-        unit: as `parse_unit` has it; "" where unknown.
-        doubts: what its reader should check, in sentences.
-        low, high: the range of what was looked at; NaN where it holds no numbers.
-        group: which of several axes it is of.
-    """
-
-    name: str
-    place: str
-    role: str
-    why: str = ""
-    unit: str = ""
-    basis: Basis = Basis.UNKNOWN
-    unit_why: str = ""
-    doubts: tuple[str, ...] = ()
-    low: float = np.nan
-    high: float = np.nan
-    group: str = ""
-
-
-@dataclass(frozen=True)
-class TableGuess:
-    """A table of a file.
-
-    Attributes:
-        rows: how many were looked at; `more` says that there are further ones.
-        step: s between samples, by a clock that the file states, or by times whose unit is
-            stated or likely; None where that cannot be told.
-        clock: whether the file states the clock, without a column of times.
-        doubts: what is wrong with it as a whole.
-    """
-
-    file: Path
-    format: str
-    name: str
-    columns: tuple[ColumnGuess, ...]
-    rows: int
-    more: bool = False
-    step: float | None = None
-    clock: bool = False
-    doubts: tuple[str, ...] = ()
-    said: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Guess:
-    """What files may be."""
-
-    tables: tuple[TableGuess, ...]
 
 
 def guess(paths: Sequence[Path]) -> Guess:
@@ -107,10 +35,24 @@ def guess(paths: Sequence[Path]) -> Guess:
     return Guess(tuple(each for path in paths for each in _of_file(path)))
 
 
+@dataclass
+class _Looked:
+    """A table of which the names were read: its columns, and their values by place."""
+
+    table: Table
+    columns: list[ColumnGuess]
+    series: dict[int, Array]
+    rows: int
+
+
 def _of_file(path: Path) -> Iterator[TableGuess]:
     found, tables = open_recordings(path)
-    for table in tables:
-        yield _of_table(path, found.name, table)
+    looked = [_looked_at(table) for table in tables]
+    every = [column for each in looked for column in each.columns]
+    groups = iter(axes([(column.role, column.tag) for column in every]))
+    for each in looked:
+        each.columns = [replace(column, group=next(groups)) for column in each.columns]
+        yield _of_table(path, found.name, each)
 
 
 def _beginning(table: Table, places: Sequence[int]) -> Array:
@@ -121,22 +63,25 @@ def _beginning(table: Table, places: Sequence[int]) -> Array:
     return np.concatenate(blocks)[:SAMPLE] if blocks else np.empty((0, len(places)))
 
 
-def _of_table(path: Path, format_name: str, table: Table) -> TableGuess:
+def _looked_at(table: Table) -> _Looked:
     places = [k for k, column in enumerate(table.columns) if column.numeric]
     values = _beginning(table, places)
     series = {place: values[:, k] for k, place in enumerate(places)}
-    more = len(values) == SAMPLE
     columns = [_by_name(table, place, series.get(place)) for place in range(len(table.columns))]
-    columns = _one_time(columns, series, table)
+    return _Looked(table, _one_time(beside(columns), series, table), series, len(values))
+
+
+def _of_table(path: Path, format_name: str, looked: _Looked) -> TableGuess:
+    table, columns, series = looked.table, looked.columns, looked.series
     time, step = _time(columns, series, table)
     doubts = list(table.doubts)
     if time is None:
         doubts.append("no time is known: state a rate, or which column holds times")
     else:
-        columns = _with_units(columns, series, time)
+        columns = with_units(by_numbers(columns, series, time), series, time)
         doubts += _defects(columns, series, time)
     return TableGuess(
-        path, format_name, table.name, tuple(columns), len(values), more, step,
+        path, format_name, table.name, tuple(columns), looked.rows, looked.rows == SAMPLE, step,
         table.clock is not None, tuple(doubts), dict(table.said),
     )  # fmt: skip
 
@@ -148,30 +93,37 @@ def _by_name(table: Table, place: int, values: Array | None) -> ColumnGuess:
     unit, usable = stated_unit(column.unit)
     says = named(column.name, column.unit)
     role, why = says.role, says.why
-    if role == TIME and not increases(values):
+    if role == TIME and not increases(values[np.isfinite(values)]):
         role, why = UNKNOWN, "a name of times, but they do not increase"
     if role == INDEX and not (counts(values) or increases(values)):
         role, why = UNKNOWN, "a name of an index, but it does not count"
+    if role == RELATIVE_ANGLE and why.startswith("its unit count") and counts(values):
+        role, why = INDEX, "it counts rows"
     doubts = []
+    if role == TIME and (holes := int((~np.isfinite(values)).sum())):
+        doubts.append(f"{holes} of its cells hold no number")
     if role not in (TIME, INDEX, UNKNOWN) and not says.side and role in (
         RELATIVE_ANGLE, RELATIVE_RATE, "drive_torque"
     ):  # fmt: skip
         doubts.append("which side of the gear is not said")
+    if says.doubt:
+        doubts.append(says.doubt)
     if unit and not usable:
         doubts.append(f"{unit!r}, as the file has it, is no unit that is known here")
     basis, unit_why = Basis.UNKNOWN, ""
     chosen = ""
     if usable:
         chosen, basis, unit_why = usable, Basis.STATED, "the file states it"
-        if usable == "1/min" and role in (RELATIVE_RATE, MOTOR_RATE):
+        if usable == "1/min" and role in (RELATIVE_RATE, MOTOR_RATE, COMMAND):
             chosen = "rpm"
     elif says.unit:
-        chosen, basis, unit_why = says.unit, Basis.STATED, "its name ends with it"
+        basis = Basis.STATED if says.sure else Basis.LIKELY
+        chosen, unit_why = says.unit, "its name ends with it"
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     return ColumnGuess(
         column.name, column.place, role, why, chosen, basis, unit_why, tuple(doubts), low, high,
-        says.group,
+        says.tag, spare=says.spare, of_anything=says.doubt == OF_ANYTHING,
     )  # fmt: skip
 
 
@@ -189,7 +141,7 @@ def _one_time(
         each = columns[place]
         if each.name.endswith(("(1,:)", "(:,1)")) and evenly(values):
             columns[place] = replace(each, role=TIME, why="first of a matrix, and runs evenly")
-            break
+            return _of_one_matrix(columns, each.name)
         if each.role != UNKNOWN or (each.why and not nameless):
             continue
         if evenly(values):
@@ -198,6 +150,22 @@ def _one_time(
             )
             break
     return columns
+
+
+def _without_holes(times: Array) -> Array:
+    """Times with those that are missing between the others."""
+    known = np.isfinite(times)
+    rows = np.arange(len(times))
+    filled: Array = times if known.all() else np.interp(rows, rows[known], times[known])
+    return filled
+
+
+def _of_one_matrix(columns: list[ColumnGuess], first: str) -> list[ColumnGuess]:
+    """What stands beside times in a matrix are signals of one axis, and not one of each."""
+    matrix = first[: first.rindex("(")]
+    return [
+        replace(each, tag=()) if each.name.startswith(f"{matrix}(") else each for each in columns
+    ]
 
 
 def _time(
@@ -211,57 +179,19 @@ def _time(
     for place, each in enumerate(columns):
         if each.role != TIME:
             continue
-        values = series[place]
+        values = _without_holes(series[place])
         if each.basis is not Basis.STATED:
             likely = unit_of_time(values)
             if likely is None:
                 continue
             each = replace(each, unit=likely.unit, basis=Basis.LIKELY, unit_why=likely.why)
             columns[place] = each
-        seconds = TICKS.get(each.unit)
+        seconds = seconds_of(each.unit)
         if seconds is None:
             continue
         time = (values - values[0]) * seconds
         return time, ticks(time).step or None
     return None, None
-
-
-def _with_units(
-    columns: list[ColumnGuess], series: dict[int, Array], time: Array
-) -> list[ColumnGuess]:
-    """Units that the numbers suggest, where the file states none."""
-    for place, each in enumerate(columns):
-        if each.role in (RELATIVE_ANGLE, MOTOR_ANGLE) and each.basis is Basis.UNKNOWN:
-            columns[place] = _likely(each, unit_of_angle(series[place]))
-    for angle_role, rate_role in _PAIRS:
-        for k, angle in enumerate(columns):
-            for j, rate in enumerate(columns):
-                alike = angle.role == angle_role and rate.role == rate_role
-                if alike and angle.group == rate.group:
-                    columns[k], columns[j] = _pair(
-                        columns[k], columns[j], time, series[k], series[j]
-                    )
-    return columns
-
-
-def _likely(column: ColumnGuess, likely: Likely | None) -> ColumnGuess:
-    if likely is None:
-        return column
-    return replace(column, unit=likely.unit, basis=Basis.LIKELY, unit_why=likely.why)
-
-
-def _pair(
-    angle: ColumnGuess, rate: ColumnGuess, time: Array, q: Array, v: Array
-) -> tuple[ColumnGuess, ColumnGuess]:
-    """A rate beside its angle: the unit of the one from that of the other, and what is odd."""
-    found = factor(time, q, v)
-    if found is None:
-        return angle, rate
-    told = f"{found.factor:.5g} times the derivative of {angle.name}, R² {found.explained:.4f}"
-    if rate.basis is Basis.UNKNOWN and angle.unit:
-        rate = _likely(rate, unit_of_rate(found, angle.unit))
-    rate = replace(rate, doubts=(*rate.doubts, told))
-    return angle, rate
 
 
 _OF_INTEREST = (Severity.REFUSED, Severity.REPAIRABLE)
@@ -285,6 +215,3 @@ def _defects(
             for role, name in names.items():
                 what = what.replace(role, name)
             yield what
-
-
-__all__ = ["Basis", "ColumnGuess", "Guess", "Named", "TableGuess", "guess"]

@@ -1,18 +1,17 @@
 """Which columns make a recording together: of tables that complete each other, and axis by axis.
 
 A file may hold its channels in tables of their own, by their clocks; or several axes side by side,
-numbered in the names of their columns.
+told apart in the names of their columns. Files whose columns are alike are read alike.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from campaign.importing.guess.guessing import ColumnGuess, TableGuess
-from campaign.importing.guess.names import INDEX, TIME, UNKNOWN
+from campaign.importing.guess.columns import ColumnGuess, TableGuess
+from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
 
 _NO_CHANNELS = (TIME, INDEX, UNKNOWN)
 
@@ -31,36 +30,83 @@ class LayoutGuess:
     """Columns that are read together.
 
     Attributes:
-        name: a key, of letters and digits, that no other has.
+        name: a key, of letters and digits, of the columns.
         tables: where its columns are.
         several: whether each column has to say its table.
+        axis: which of several axes of the file it is; "" where there is one.
+        known: whether the columns of this name were told with an earlier file.
+        files: how many have columns of this name.
     """
 
     name: str
     tables: tuple[TableGuess, ...]
     columns: tuple[Placed, ...]
     several: bool
+    axis: str = ""
+    known: bool = False
+    files: int = 1
 
 
 def layouts(tables: Sequence[TableGuess]) -> list[LayoutGuess]:
     """How tables are read, in the order of their files."""
     found: list[LayoutGuess] = []
-    names: Counter[str] = Counter()
     for together in _together(tables):
-        bare = re.sub(r"[^a-z0-9]+", "_", together[0].file.stem.lower()).strip("_") or "recording"
+        bare = _slug(together[0].file.stem) or "recording"
         placed = [
             Placed(column, table.name, place)
             for table in together
             for place, column in enumerate(table.columns, start=1)
         ]
-        for columns in _axis_by_axis(placed):
-            names[bare] += 1
-            name = bare if names[bare] == 1 else f"{bare}_{names[bare]}"
-            while any(name == other.name for other in found):
-                names[bare] += 1
-                name = f"{bare}_{names[bare]}"
-            found.append(LayoutGuess(name, together, tuple(columns), len(together) > 1))
+        for axis, columns in _axis_by_axis(placed):
+            layout = LayoutGuess("", together, tuple(columns), len(together) > 1, axis)
+            alike = next((k for k, each in enumerate(found) if _alike(each, layout)), None)
+            if alike is not None:
+                found[alike] = _with_ranges(found[alike], layout)
+                found.append(replace(layout, name=found[alike].name, known=True))
+                continue
+            name = f"{bare}_{_slug(axis)}" if axis and _slug(axis) else bare
+            taken = {each.name for each in found}
+            numbers = (f"{name}_{number}" for number in range(2, len(taken) + 3))
+            free = name if name not in taken else next(n for n in numbers if n not in taken)
+            found.append(replace(layout, name=free))
     return found
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _alike(one: LayoutGuess, other: LayoutGuess) -> bool:
+    """Whether the same columns are read in the same way; within a file each table is its own."""
+    return (
+        not one.known
+        and one.tables[0].file != other.tables[0].file
+        and _what_is_read(one) == _what_is_read(other)
+    )
+
+
+def _what_is_read(layout: LayoutGuess) -> list[object]:
+    found: list[object] = [layout.axis, *(table.clock for table in layout.tables)]
+    for each in layout.columns:
+        column = each.column
+        found += [each.table, each.place, column.name, column.role, column.unit, column.basis]
+    return found
+
+
+def _with_ranges(one: LayoutGuess, other: LayoutGuess) -> LayoutGuess:
+    """The first, with the ranges of both."""
+    columns = tuple(
+        replace(
+            first,
+            column=replace(
+                first.column,
+                low=min(first.column.low, second.column.low),
+                high=max(first.column.high, second.column.high),
+            ),
+        )
+        for first, second in zip(one.columns, other.columns, strict=True)
+    )
+    return replace(one, columns=columns, files=one.files + 1)
 
 
 def _together(tables: Sequence[TableGuess]) -> Iterator[tuple[TableGuess, ...]]:
@@ -77,8 +123,8 @@ def _together(tables: Sequence[TableGuess]) -> Iterator[tuple[TableGuess, ...]]:
             yield from ((table,) for table in own)
 
 
-def _channels(table: TableGuess) -> set[str]:
-    return {each.role for each in table.columns if each.role not in _NO_CHANNELS}
+def _channels(table: TableGuess) -> set[tuple[str, str]]:
+    return {(each.role, each.group) for each in table.columns if each.role not in _NO_CHANNELS}
 
 
 def _clock(table: TableGuess) -> tuple[bool, str, str]:
@@ -87,19 +133,16 @@ def _clock(table: TableGuess) -> tuple[bool, str, str]:
     return (table.clock, time.name if time else "", time.unit if time else "")
 
 
-def _axis_by_axis(columns: list[Placed]) -> Iterator[list[Placed]]:
+def _axis_by_axis(columns: list[Placed]) -> Iterator[tuple[str, list[Placed]]]:
     """Columns of each axis with those of all; together where there is but one."""
-    groups: dict[str, set[str]] = {}
-    for each in columns:
-        if each.column.role not in _NO_CHANNELS:
-            groups.setdefault(each.column.role, set()).add(each.column.group)
-    axes = sorted({group for own in groups.values() if len(own) > 1 for group in own if group})
-    if len(axes) < 2:
-        yield columns
+    groups = {each.column.group for each in columns if each.column.role not in _NO_CHANNELS} - {""}
+    if len(groups) < 2:
+        yield "", columns
         return
-    for axis in axes:
-        yield [
-            each
-            for each in columns
-            if each.column.group in ("", axis) or each.column.role in _NO_CHANNELS
-        ]
+    for axis in sorted(groups, key=_naturally):
+        yield axis, [each for each in columns if each.column.group in ("", axis)]
+
+
+def _naturally(text: str) -> list[tuple[int, str]]:
+    """Numbers by size: axis 10 comes after axis 2."""
+    return [(int(word), "") if word.isdigit() else (-1, word) for word in text.split()]

@@ -11,70 +11,76 @@ import unicodedata
 from dataclasses import dataclass
 
 from campaign.channels import (
-    BASE_RATE,
     COMMAND,
     DRIVE_TORQUE,
-    GYRO_RATE,
-    JOINT_TORQUE,
-    MOTOR_ANGLE,
     MOTOR_CURRENT,
     MOTOR_RATE,
-    NORMAL_LOAD,
     REFERENCE,
     RELATIVE_ANGLE,
     RELATIVE_RATE,
-    TEMPERATURE,
 )
-from campaign.importing.guess.stated import stated_unit
-from campaign.importing.guess.words import CHANGES, WORDS, taken_apart
-from campaign.unit_grammar import parse_unit
-
-TIME, INDEX, UNKNOWN = "time", "index", "unknown"
-
-_BELONGS = frozenset(
-    ("cmd", "command", "target", "desired", "ref", "reference", "goal", "motor", "base", "hull")
+from campaign.importing.guess.pieces import Ending, Pieces, pieces
+from campaign.importing.guess.quantities import (
+    FORCES,
+    INDEX,
+    TIME,
+    UNKNOWN,
+    has,
+    is_load,
+    kind_of,
+    kind_of_unit,
 )
+from campaign.importing.guess.roles import role_of
+from campaign.importing.guess.words import CHANGES, KNOWN, WORDS
+
+_THERMOMETER = re.compile(r"T_?\d{1,2}")
+_MOTOR_TORQUE = re.compile(r"T_?[mM]")
+_JOINT = frozenset(("joint", "j", "jnt", "axis", "achse", "axe"))
+"""Words that say of which axis a column is, and nothing else."""
+_BELONGS = CHANGES["hull"] | {
+    *("cmd", "cmds", "command", "commands", "target", "desired", "ref", "reference", "goal"),
+    *("setpoint", "motor", "imu", "gyro"),
+}
+"""What a part of a path adds to its last one."""
+_NOWHERE = frozenset(
+    ["xyz", "tcp", "pose", "wrench", "twist", "orientation", "quaternion", "cartesian"]
+)
+"""Parts of a path whose channels are of no axis."""
 
 _KNOWN = {
     # CANopen drive profile; Siemens drives; the public set of a positioning system.
+    "0x6062": REFERENCE,
+    "0x6063": RELATIVE_ANGLE,
     "0x6064": RELATIVE_ANGLE,
+    "0x606b": COMMAND,
     "0x606c": RELATIVE_RATE,
+    "0x6074": COMMAND,
     "0x6077": DRIVE_TORQUE,
     "0x6078": MOTOR_CURRENT,
     "0x607a": REFERENCE,
     "0x60ff": COMMAND,
     "0x6071": COMMAND,
+    "r0060": COMMAND,
+    "r0062": COMMAND,
+    "r0077": COMMAND,
+    "r0079": COMMAND,
     "r0080": DRIVE_TORQUE,
     "r0031": DRIVE_TORQUE,
     "r0061": MOTOR_RATE,
     "r0063": MOTOR_RATE,
     "r0068": MOTOR_CURRENT,
+    "r0078": MOTOR_CURRENT,
+    "r0482": RELATIVE_ANGLE,
     "qm": RELATIVE_ANGLE,
     "qg": REFERENCE,
     "vir": DRIVE_TORQUE,
     "x-axis": TIME,
 }
 """Names that are what they are by a convention of their own."""
+_OBJECT = re.compile(r"\b(0x60[0-9a-f]{2}|r\d{4})(?![0-9a-z])")
 
-SUFFIXES = {
-    "deg": "deg",
-    "rad": "rad",
-    "mrad": "mrad",
-    "rpm": "rpm",
-    "nm": "N m",
-    "mnm": "mN m",
-    "mm": "mm",
-    "degps": "deg/s",
-    "dps": "deg/s",
-    "radps": "rad/s",
-    "ms": "ms",
-    "us": "us",
-    "ns": "ns",
-    "degc": "degC",
-    "ma": "mA",
-}
-"""Words at the end of a name that are its unit; single letters are none: `q_m` is measured."""
-_PER_SECOND = {"deg": "deg/s", "rad": "rad/s", "mrad": "mrad/s", "mm": "mm/s"}
+
+OF_ANYTHING = "of what it is the target its name does not say"
 
 
 @dataclass(frozen=True)
@@ -85,152 +91,131 @@ class Named:
         role: of the vocabulary, or `time`, `index`, `unknown`.
         why: which word says so; "" where none does.
         unit: at the end of the name; "" where there is none.
-        group: which of several axes it is of, as numbered in its name; "" where there is one.
+        sure: whether that unit can be nothing else.
+        tag: words and numbers that say neither; of several axes they are the name.
         side: whether the name says on which side of the gear it was measured.
+        spare: it gives way to another column of its role: raw counts, a filtered copy.
+        doubt: what a reader should know besides; "" for nothing.
     """
 
     role: str
     why: str = ""
     unit: str = ""
-    group: str = ""
+    sure: bool = False
+    tag: tuple[str, ...] = ()
     side: bool = False
-
-
-def words(name: str) -> list[str]:
-    """A name in pieces, lower case: `state.tau_J[0]` is state, tau, j, 0."""
-    text = unicodedata.normalize("NFKC", name).replace("θ", "theta").replace("ω", "omega")
-    text = text.replace("τ", "tau").replace("φ", "phi")
-    text = re.sub(r"(?<=[a-zà-ÿ])(?=[A-Z])", " ", text)
-    text = re.sub(r"(?<=[A-Za-zÀ-ÿ])(?=\d)|(?<=\d)(?=[A-Za-zÀ-ÿ])", " ", text)
-    pieces = re.findall(r"[a-zà-ÿ]+|\d+", text.lower())
-    return [part for piece in pieces for part in taken_apart(piece)]
+    spare: bool = False
+    doubt: str = ""
 
 
 def named(name: str, unit: str = "") -> Named:
     """What a name says; `unit`, as its file states it, tells names apart that are one letter."""
     plain = unicodedata.normalize("NFKC", name).strip(" \"'").lower()
-    *path, last = [words(part) for part in re.split(r"[./]", name) if words(part)] or [[]]
-    group = _group([piece for part in (*path, last) for piece in part])
-    if plain in _KNOWN:
-        return Named(_KNOWN[plain], f"{plain} is so by convention", "", group)
-    said = [piece for piece in last if not piece.isdigit()]
-    if not said:
-        return Named(UNKNOWN, "", "", group)
-    kind, why = _kind(said)
-    by_unit = _kind_of_unit(unit)
-    if by_unit and ((kind == UNKNOWN and not why) or (kind == TIME and by_unit != TIME)):
-        # A name that says nothing, or a `T` in degrees: the unit says more.
-        kind, why = by_unit, f"its unit {unit}, and nothing else"
+    found = pieces(name)
+    tag = _tag(found)
+    convention = _OBJECT.search(plain)
+    known = convention[1] if convention else plain
+    if known in _KNOWN:
+        ending = found.ending
+        return Named(_KNOWN[known], f"{known} is so by convention", ending.unit, ending.sure, tag)
+    said = _said(found)
+    if not said and not found.ending.unit:
+        return Named(UNKNOWN, tag=tag)
+    in_path = [word for part in found.parts[:-1] for word in part]
+    if nowhere := next((word for word in (*in_path, *said) if word in _NOWHERE), ""):
+        return Named(UNKNOWN, nowhere, tag=tag)
+    kind, why, ending, said = _kind_and_unit(said, found, unit)
+    doubt = ""
+    if _MOTOR_TORQUE.fullmatch(name.strip()) and kind == TIME:
+        kind, why = "torque", "a T of the motor"
+    elif _THERMOMETER.fullmatch(name.strip()) and not unit:
+        kind, why = "warmth", "a T with a number"
+    elif kind == UNKNOWN and not why and not unit and tag and _JOINT.issuperset(said):
+        kind, why, doubt = "angle", " ".join(said), "its name says which joint, and not what of it"
+    elif kind == "rate" and "angular" in said and found.parts[-1] in (("x",), ("y",), ("z",)):
+        said = ["gyro", *said]
     # `cmd.tau`, `motor.speed`: what a part belongs to changes its meaning, and never gives it one.
-    said = [*(piece for part in path for piece in part if piece in _BELONGS), *said]
-    suffix = _unit_at_end(said, kind)
+    said = [*(word for word in in_path if word in _BELONGS), *said]
+    fitting = ending if kind_of_unit(ending.unit) == kind else Ending()
     if kind in (TIME, INDEX, UNKNOWN):
-        return Named(kind, why, suffix, group)
-    role, side = _role(kind, said)
-    return Named(role, why, suffix, group, side)
+        return Named(kind, why, fitting.unit, fitting.sure, tag)
+    role, side = role_of(kind, said, found.ending.unit or unit)
+    if role == UNKNOWN:
+        return Named(role, why, tag=tag)
+    spare = not {"raw", "filt", "filtered", "filter", "lpf", "smooth", "smoothed"}.isdisjoint(said)
+    if has(said, "estimate"):
+        doubt = "an estimate of the drive or of an observer, not what a sensor showed"
+    elif kind == "target":
+        doubt = OF_ANYTHING
+    return Named(role, why, fitting.unit, fitting.sure, tag, side, spare, doubt)
 
 
-def _group(pieces: list[str]) -> str:
-    """The number of the axis: the last that is one digit or two."""
-    numbers = [piece for piece in pieces if piece.isdigit() and len(piece) <= 2]
-    return numbers[-1] if numbers else ""
-
-
-_DIMENSIONS = {
-    parse_unit(unit).dimensions: kind
-    for unit, kind in (
-        ("rad", "angle"),
-        ("m", "angle"),
-        ("rad/s", "rate"),
-        ("m/s", "rate"),
-        ("N m", "torque"),
-        ("N", "torque"),
-        ("A", "current"),
-        ("degC", "warmth"),
-        ("s", TIME),
+def _tag(found: Pieces) -> tuple[str, ...]:
+    """What tells axes apart: short numbers, and words that mean nothing here."""
+    all_words = [word for part in found.parts for word in part]
+    return tuple(
+        word
+        for word in all_words
+        if (len(word) <= 2 if word.isdigit() else word not in KNOWN) and word not in FORCES
     )
-}
 
 
-def _kind_of_unit(unit: str) -> str:
-    """The quantity that a stated unit is of; "" for those that say nothing here."""
-    _, usable = stated_unit(unit)
-    return _DIMENSIONS.get(parse_unit(usable).dimensions, "") if usable else ""
+def _said(found: Pieces) -> list[str]:
+    """The words of the last part that says more than `data` or `x`; numbers are no words."""
+    for part in reversed(found.parts):
+        words = [word for word in part if not word.isdigit()]
+        if any(word not in CHANGES["neutral"] and word not in ("x", "y", "z") for word in words):
+            return _derived(words)
+    return [word for word in (found.parts[-1] if found.parts else ()) if not word.isdigit()]
 
 
-def _has(said: list[str], change: str) -> bool:
-    return not CHANGES[change].isdisjoint(said)
+def _derived(words: list[str]) -> list[str]:
+    """`d theta` is a rate, as `theta dot` is, and `q dot dot` an acceleration."""
+    angles = WORDS["angle"] | {"x", "y", "s", "alpha"}
+    if len(words) > 1 and words[0] in ("d", "dd") and words[1] in angles:
+        return ["omega" if words[0] == "d" else "acceleration", *words[2:]]
+    if "dot" in words:
+        rest = [word for word in words if word != "dot"]
+        return [*rest, "acceleration" if words.count("dot") > 1 else "dot"]
+    # `current_position`: the present one.
+    if words and words[0] in ("current", "curr", "cur", "present") and len(words) > 1:
+        moving = WORDS["angle"] | WORDS["rate"] | WORDS["torque"] | WORDS["warmth"] | WORDS["time"]
+        if any(len(word) > 2 and word in moving for word in words[1:]):
+            return words[1:]
+    return words
 
 
-def _kind(said: list[str]) -> tuple[str, str]:
-    """The quantity that the words say, and the word that says it."""
-    if said[0] in ("m", "t") and len(said) > 1:
-        # One letter for torque or temperature: what stands beside it decides.
-        if said[0] == "t" and _has(said, "place"):
-            return "warmth", " ".join(said)
-        sided = _has(said[1:], "motor") or _has(said[1:], "load")
-        if (sided and said[1:] != ["m"]) or (said[0] == "m" and _has(said, "target")):
-            return "torque", " ".join(said)
-    if said[-1] == "dot" and not WORDS["angle"].isdisjoint(said):
-        return "rate", " ".join(said)
-    kinds = [k for k, listed in WORDS.items() if not listed.isdisjoint(said)]
-    if "load" in said and not kinds:
-        if _has(said, "normal"):
-            return "normal", "normal load"
-        return ("torque", "load cell") if _has(said, "sensor") else (UNKNOWN, "")
-    if not kinds:
-        return ("rate", "gyro") if _has(said, "gyro") else (UNKNOWN, "")
-    kind = kinds[0]
-    word = next(each for each in said if each in WORDS[kind])
-    if kind == "neither" or kind in ("index", "time"):
-        return {"neither": UNKNOWN, "index": INDEX, "time": TIME}[kind], word
-    if kind == "current" and "phase" in said:
-        return UNKNOWN, "phase current"
-    return kind, word
+def _kind_and_unit(
+    said: list[str], found: Pieces, stated: str
+) -> tuple[str, str, Ending, list[str]]:
+    """The quantity, what says so, the unit at the end where it is one, and the words without it.
 
-
-def _role(kind: str, said: list[str]) -> tuple[str, bool]:
-    """The channel, and whether the name says its side of the gear."""
-    target, motor, load = (_has(said, each) for each in ("target", "motor", "load"))
-    if kind in ("warmth", "normal"):
-        return (TEMPERATURE if kind == "warmth" else NORMAL_LOAD), True
-    if kind == "angle":
-        if target:
-            return REFERENCE, False
-        return (MOTOR_ANGLE, True) if motor and not load else (RELATIVE_ANGLE, load)
-    if target:
-        return COMMAND, False
-    if kind == "current":
-        return MOTOR_CURRENT, True
-    if kind == "rate":
-        if _has(said, "gyro"):
-            return GYRO_RATE, True
-        if _has(said, "hull"):
-            return BASE_RATE, True
-        rotor = motor or "drehzahl" in said or "rpm" in said
-        return (MOTOR_RATE, True) if rotor and not load else (RELATIVE_RATE, load)
-    if _has(said, "normal") or "fn" in said:
-        return NORMAL_LOAD, True
-    sensed = (
-        _has(said, "sensor") or not {"friction", "ft", "fr"}.isdisjoint(said) or "j" in said[1:]
-    )
-    return (JOINT_TORQUE, True) if sensed else (DRIVE_TORQUE, False)
-
-
-def _unit_at_end(said: list[str], kind: str) -> str:
-    """The unit that the last words are; only one that the quantity can have."""
-    if len(said) < 2:
-        return ""
-    last = said[-1]
-    per_second = said[-2] in _PER_SECOND and last in ("s", "sec") and len(said) > 2
-    if per_second and kind == "rate":
-        return _PER_SECOND[said[-2]]
-    fits = {
-        "time": ("ms", "us", "ns"),
-        "angle": ("deg", "rad", "mrad", "mm"),
-        "rate": ("rpm", "degps", "dps", "radps"),
-        "torque": ("nm", "mnm"),
-        "current": ("ma",),
-        "warmth": ("degc",),
-    }.get(kind, ())
-    return SUFFIXES[last] if last in fits else ""
+    A letter at the end may be a word (`F_n` is a normal force): it is a unit where the rest says a
+    quantity that has it.
+    """
+    ending = found.ending
+    if ending.squared:
+        return UNKNOWN, "an acceleration", Ending(), said
+    kind, why = kind_of(said)
+    by_unit = kind_of_unit(stated or ending.unit)
+    letter = ending.unit and not ending.sure and not ending.clear
+    if letter and not stated and kind not in (by_unit, "target", "normal"):
+        whole = [word for word in found.whole if not word.isdigit()]
+        whole = _derived(whole)
+        of_whole, its_why = kind_of(whole)
+        if of_whole != UNKNOWN or kind != UNKNOWN:
+            return of_whole, its_why, Ending(), whole
+    if kind == UNKNOWN and not why and is_load(said, stated or ending.unit):
+        return "normal", "a load in N", ending, said
+    if by_unit and kind == TIME and by_unit != TIME:
+        # A `T` in degrees, or in N m: the unit says more.
+        return by_unit, f"its unit {stated or ending.unit}, and nothing else", ending, said
+    if by_unit and kind in (UNKNOWN, "target") and (not why or kind == "target"):
+        strange = [w for w in said if len(w) > 2 and w not in KNOWN]
+        if by_unit in ("angle", TIME, "current") and strange and kind != "target":
+            return UNKNOWN, "", ending, said  # some length, duration or current
+        if said == ["z"]:
+            return UNKNOWN, "", ending, said
+        told = f"its unit {stated or ending.unit}, and nothing else"
+        return by_unit, f"{why}, in {stated or ending.unit}" if why else told, ending, said
+    return kind, why, ending, said

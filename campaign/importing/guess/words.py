@@ -5,38 +5,81 @@ In the order of `WORDS` an earlier kind outweighs a later one: `q2_tau` is a tor
 
 from __future__ import annotations
 
-_TIME = "t time times timestamp stamp zeit temps tiempo tempo elapsed clock secs seconds runtime"
-_INDEX = "index idx sample samples seq sequence nr no row count counter point step"
+from functools import cache
+
+_TIME = (
+    "t time times timestamp timestamps stamp zeit temps tiempo tempo elapsed clock secs seconds "
+    "second sec millis micros runtime laufzeit messzeit uhrzeit utc epoch zeitstempel nano "
+    "nanos milli micro milliseconds microseconds nanoseconds"
+)
+_INDEX = (
+    "index idx sample samples seq sequence nr no row count counter point step cycle cycles "
+    "packet iteration iter tick nummer loop"
+)
 _ANGLE = (
-    "q qm pos position positions angle ang theta phi winkel lage weg enc encoder displacement "
-    "distance actpos istposition stellung posizione"
+    "q qm qpos pos posn position positions angle angles angular ang theta phi winkel lage weg "
+    "enc encoder encoders displacement distance actpos istposition stellung posizione posicion "
+    "deg rad deplacement travel stroke hub verfahrweg drehwinkel rotation abstand dist strecke"
 )
 _RATE = (
-    "dq qd qdot dtheta dphi thetadot phidot w omega vel velo velocity velocities speed rate "
-    "drehzahl geschwindigkeit actvelo rpm n vitesse velocita"
+    "dq qd qdot dtheta dphi thetadot phidot w omega vel velo velocity velocities speed speeds "
+    "spd rate drehzahl geschwindigkeit drehgeschwindigkeit winkelgeschwindigkeit actvelo rpm n "
+    "vitesse velocita velocidad rps qvel geschw drehz winkelgeschw vit wm wr tacho rpms"
 )
 _TORQUE = (
-    "tau torque torques trq tq moment drehmoment effort force kraft acttorque couple coppia mom"
+    "tau torque torques trq tq tor trk moment drehmoment effort efforts force forces kraft "
+    "kraefte acttorque couple coppia mom drehm momente fuerza forza thrust loadcell te tem"
 )
-_CURRENT = "current currents curr cur strom i iq courant corrente amps"
-_WARMTH = "temp temperature temperatures temperatur"
+_CURRENT = (
+    "current currents curr cur strom i iq courant courants corrente corriente amps amp ampere isq"
+)
+_WARMTH = "temp temperature temperatures temperatur temperaturen thermo thermocouple celsius"
 _NEITHER = (
-    "voltage volt volts spannung u vbus pwm status enable enabled flag error err mode id name "
-    "ext external cof coefficient vibration acc accel acceleration beschleunigung ddq qdd ddtheta "
-    "names droop pulses power leistung pressure druck model sim simulated estimate estimated est "
-    "hat predicted lugre dahl stribeck coulomb viscous cv frame header quality residual"
+    "voltage voltages volt volts spannung u vbus pwm status enable enabled flag flags error err "
+    "mode id ids name ext external cof coefficient coeff mu vibration vib acc accel "
+    "accelerometer accelx accely accelz acceleration accelerations beschleunigung ddq qdd "
+    "ddtheta ddot thetaddot names droop pulses power leistung puissance pressure druck model "
+    "sim simulated predicted lugre dahl stribeck coulomb viscous cv frame header quality "
+    "residual tcp pose wrench cartesian quaternion quat twist mag jerk energy duty fault faults "
+    "controlword statusword saturated sat stiffness damping inertia gain kp ki kd init initial "
+    "koeffizient magnetometer home offset bias limit limits threshold diff deviation following "
+    "schleppfehler fehler abweichung regelabweichung erreur ecart battery batt supply latency "
+    "jitter deadline dt humidity feuchte depth wear thickness verschleiss derivative derived "
+    "flux resistance program feed feedrate tension spannungs delta ae ecr ffw feedforward hall "
+    "erpm erps reibwert reibzahl uncertainty sigma std stddev variance covariance cov "
+    "confidence innovation"
 )
+_ESTIMATE = "estimate estimated est hat kalman observer observed"
 _TARGET = (
-    "target targets cmd command commanded soll sollwert demand demanded setpoint set desired des "
-    "ref reference goal d g"
+    "target targets cmd cmds command commands commanded soll sollwert demand demanded setpoint "
+    "set desired des ref reference goal d g sp tgt request requested req consigne vorgabe "
+    "action wanted required limited tar"
 )
-_MOTOR = "motor mot m servo shaft antrieb antriebs antriebsseite"
-_LOAD = "load link joint gimbal output l j abtrieb abtriebs last"
-_HULL = "base hull platform ship vessel basis"
-_GYRO = "gyro imu inertial"
-_SENSOR = "sensor cell loadcell transducer dms"
-_NORMAL = "normal"
-_PLACES = "winding bearing housing ambient amb env oil lager wicklung coil"
+_MOTOR = (
+    "motor motors mot mtr moteur m servo shaft antrieb antriebs antriebsseite rotor wm wr "
+    "spindle spindel"
+)
+_LOAD = "load link joint joints jnt gimbal output out l j abtrieb abtriebs abtriebsseite last arm"
+_HULL = "base hull platform plattform ship vessel basis carrier"
+_GYRO = "gyro gyr gyroscope imu inertial los gx gy gz"
+_SENSOR = (
+    "sensor cell loadcell transducer dms messwelle messflansch torquemeter strain futek hbm kistler"
+)
+_NORMAL = "normal axial radial axialkraft radialkraft anpress preload vorspannung"
+_FRICTION = "friction frictional fric reib reibung frottement attrito rozamiento"
+_PLACES = (
+    "winding bearing housing ambient amb env oil lager wicklung coil coolant stator yoke tooth "
+    "magnet ring gehaeuse umgebung oel mos fet mosfet air room rotor"
+)
+_NEUTRAL = (
+    "act actual ist istwert wert meas measured measure measurement msr fb feedback fbk present "
+    "filt filtered filter lpf raw smooth smoothed avg average averaged mean value values val "
+    "data real in of the du de la le und mit nach gesamt aussen innen after max min nominal nom "
+    "per rms axis achse axe rel relative gleit sliding haft roll schlitten tisch mesure mesuree "
+    "column channel float int double signal sig lin linear lineaire rotational rotary angulaire "
+    "vorschub reibung quer resulting joint robot main pub topic field state states "
+    "momentenbildend drehmomentbildend mech mechanical number"
+)
 
 WORDS = {
     kind: frozenset(listed.split())
@@ -61,20 +104,39 @@ CHANGES = {
         ("gyro", _GYRO),
         ("sensor", _SENSOR),
         ("normal", _NORMAL),
+        ("friction", _FRICTION),
         ("place", _PLACES),
+        ("estimate", _ESTIMATE),
+        ("neutral", _NEUTRAL),
     )
 }
+KNOWN = frozenset(word for listed in (*WORDS.values(), *CHANGES.values()) for word in listed)
 
-_PARTS = tuple(
-    word for listed in (*WORDS.values(), *CHANGES.values()) for word in listed if len(word) >= 3
-)
+_SIDES = "left right front rear upper lower inner outer links rechts vorn hinten gauche droite"
+"""Words that tell axes apart; they say nothing else."""
+_PARTS = frozenset(word for word in (*KNOWN, *_SIDES.split()) if len(word) >= 3)
+_LINKS = ("", "s", "es", "n", "en")
+"""What German puts between the words of a compound."""
 
 
-def taken_apart(word: str) -> list[str]:
-    """A compound as its two words, where both are known: `motorstrom`; else the word alone."""
-    known = {*_PARTS}
-    if word in known or len(word) < 6:
-        return [word]
-    cuts = range(3, len(word) - 2)
-    both = ([word[:k], word[k:]] for k in cuts if word[:k] in known and word[k:] in known)
-    return next(both, [word])
+@cache
+def taken_apart(word: str) -> tuple[str, ...]:
+    """A compound as its words, where all are known: `motorstrom`; else the word alone."""
+    if word in KNOWN or len(word) < 6:
+        return (word,)
+    return _parts(word) or (word,)
+
+
+def _parts(word: str) -> tuple[str, ...]:
+    """The words that make up all of `word`, the longest first; none where they do not."""
+    for end in range(len(word), 2, -1):
+        first = word[:end]
+        if first not in _PARTS:
+            continue
+        if end == len(word):
+            return (first,)
+        for link in _LINKS:
+            rest = word[end:]
+            if rest.startswith(link) and (others := _parts(rest[len(link) :])):
+                return (first, *others)
+    return ()

@@ -1,0 +1,284 @@
+"""From files that nobody described to a report, by no more than what a guessed mapping asks for."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from campaign.cli.import_command import guess_mapping
+from campaign.errors import ProtocolError
+from campaign.importing.guess import Basis, guess, mapping_text
+from campaign.importing.interface import RecordingError
+from tests.importing import rig
+from tests.importing.newcomer import completed, imported
+from tests.importing.test_mapping import planned
+from tests.importing.wild import DEG, text, together
+
+
+def test_two_joints_every_15_ms_with_odd_names(tmp_path: Path):
+    """Degrees, whole milliseconds, milliamperes; no torque but what the current makes."""
+    one, two = (rig.trapezoids(seed, rate=1 / 0.015, length=60.0) for seed in (70, 71))
+    columns = [one.t * 1000.0]
+    for m in (one, two):
+        columns += [m.q * DEG, m.v * DEG, m.i * 1000.0]
+    names = [f"{j}_{w}" for j in ("Schulter", "Ellbogen") for w in ("Winkel", "Geschw", "Strom")]
+    head = ";".join(["Zeitstempel", *names]) + "\n"
+    text(together(*columns), head, ";", ",")(tmp_path / "log.csv")
+    run = imported(
+        [tmp_path / "log.csv"],
+        units={"motor_current": "mA", "drive_torque": "mA"},
+        times=f"{rig.TORQUE_CONSTANT / 1000} N m/mA",
+    )
+    found = run.results.findings
+    assert {"axis_schulter", "axis_ellbogen"} == set(found.test)
+    for name in ("axis_schulter", "axis_ellbogen"):
+        own = found[(found.test == name) & (found.quantity == "coulomb_torque")]
+        assert len(own)
+        assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
+
+
+def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
+    m = rig.trapezoids(72, rate=500.0, length=20.0)
+    acceleration = np.gradient(m.v, 1 / 500.0)
+    data = np.column_stack([m.t, m.q, m.v, acceleration, m.tau, m.i, 35 + m.t / 10])
+    scipy.io.savemat(tmp_path / "joint3.mat", {"data": data, "robot": "arm"})
+    (table,) = guess([tmp_path / "joint3.mat"]).tables
+    assert [column.role for column in table.columns] == [
+        "time",
+        "relative_angle",
+        "relative_rate",
+        *["unknown"] * 4,
+    ]
+    assert all("its name does not say so" in column.doubts for column in table.columns[1:3])
+    assert "an acceleration" in table.columns[3].why
+    run = imported(
+        [tmp_path / "joint3.mat"],
+        units={"relative_angle": "rad", "relative_rate": "rad/s"},
+        channels={
+            "data(:,5)": ("drive_torque", "N m"),
+            "data(:,7)": ("temperature", "degC"),
+        },
+    )
+    found = run.results.findings
+    own = found[found.quantity == "coulomb_torque"]
+    assert len(own)
+    assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
+
+
+def test_signals_beside_their_times_in_a_matrix_are_no_axes(tmp_path: Path):
+    m = rig.sines(12)
+    own = {"theta": np.vstack([m.t, m.target, m.q])}
+    scipy.io.savemat(tmp_path / "a.mat", own)
+    told = tomllib.loads(mapping_text(guess([tmp_path / "a.mat"])))
+    assert [test["name"] for test in told["test"]] == ["recorded"]
+
+
+def test_a_tribometer_with_normal_load_and_sliding_distance(tmp_path: Path):
+    """Distance only grows, and friction only opposes: its own force sensor has no direction."""
+    chance = np.random.default_rng(5)
+    t = np.arange(12_000) / 100.0
+    speed = 0.05 * (1.0 + np.floor(t / 30.0))
+    friction = 4.0 + 10.0 * speed + chance.normal(0, 0.02, len(t))
+    load = 20.0 + chance.normal(0, 0.05, len(t))
+    distance = np.cumsum(speed) / 100.0
+    rows = together(t, load, friction, friction / load, distance, 23 + t / 50)
+    head = (
+        "Ball;steel\nTime [s]\tNormal load [N]\tFriction force [N]\tCOF\tSliding distance [m]\t"
+        "Temp [°C]\n"
+    )
+    text(rows, head, "\t")(tmp_path / "pod.txt")
+    mapping = mapping_text(guess([tmp_path / "pod.txt"]))
+    assert completed(mapping, {}).count("[columns.pod.") == 5
+    run = imported([tmp_path / "pod.txt"], units={})
+    found = run.results.findings
+    own = found[found.quantity == "viscous_friction"]
+    assert len(own) == 1
+    assert own.low.iloc[0] <= 10.0 <= own.high.iloc[0]
+    assert own.unit.iloc[0] == "N s/m"
+
+
+def test_files_that_are_alike_share_their_columns(tmp_path: Path):
+    """Those in another unit have columns of their own, whose numbers would mislead."""
+    for number, (size, unit) in enumerate([(DEG, "deg"), (DEG, "deg"), (1.0, "rad")], start=1):
+        m = rig.sines(number)
+        rows = together(m.t, size * m.q * number, m.tau)
+        text(rows, f"time [s],angle [{unit}],torque [Nm]\n")(tmp_path / f"run{number}.csv")
+    files = [tmp_path / f"run{number}.csv" for number in (1, 2, 3)]
+    found = guess(files)
+    told = tomllib.loads(mapping_text(found, tmp_path))
+    (test,) = told["test"]
+    assert [each["columns"] for each in test["recording"]] == ["run1", "run1", "run3"]
+    assert {name: each["relative_angle"]["unit"] for name, each in told["columns"].items()} == {
+        "run1": "deg",
+        "run3": "rad",
+    }
+    highest = max(table.columns[1].high for table in found.tables[:2])
+    assert f"to {highest:.6g}; taken for relative_angle" in mapping_text(found)
+
+
+def test_columns_that_are_not_known_have_a_block_to_fill_in(tmp_path: Path):
+    """In HDF5 as in text; filled in as they ask they are part of a mapping."""
+    t = np.arange(400) / 100.0
+    own = {"time": t, "zork": np.sin(t), "Blorb": np.cos(3 * t)}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values in own.items():
+            file[name] = values
+    text(together(*own.values()), ",".join(own) + "\n")(tmp_path / "a.csv")
+    for name in ("a.h5", "a.csv"):
+        mapping = mapping_text(guess([tmp_path / name]), tmp_path)
+        for column in ("zork", "Blorb"):
+            assert f'# [columns.a.CHANNEL]\n# column = "{column}"\n# unit = "..."' in mapping
+        filled = completed(
+            mapping, {}, {"zork": ("drive_torque", "N m"), "Blorb": ("temperature", "degC")}
+        )
+        assert tomllib.loads(filled)["columns"]["a"] == {
+            "time": {"column": "time", "unit": "s"},
+            "drive_torque": {"column": "zork", "unit": "N m"},
+            "temperature": {"column": "Blorb", "unit": "degC"},
+        }
+
+
+JOINTS = ("shoulder", "elbow")
+
+
+def axes_of(folder: Path, names: list[str]) -> list[str]:
+    m = rig.sines(7)
+    rows = together(m.t, *(m.q * (k + 1) for k in range(len(names))))
+    text(rows, ",".join(["t", *names]) + "\n")(folder / "a.csv")
+    told = tomllib.loads(mapping_text(guess([folder / "a.csv"])))
+    return [test["name"] for test in told["test"]]
+
+
+@pytest.mark.parametrize(
+    ("names", "axes"),
+    [
+        (["q1", "q2", "q10"], ["axis_1", "axis_2", "axis_10"]),
+        (["X1_ActualPosition", "Y1_ActualPosition"], ["axis_x", "axis_y"]),
+        (
+            [f"/js/{joint}/{what}" for what in ("position", "effort") for joint in JOINTS],
+            ["axis_elbow", "axis_shoulder"],
+        ),
+        (
+            ["observations.q[1]", "observations.q[2]", "action[1]", "action[2]"],
+            ["axis_1", "axis_2"],
+        ),
+        (["pos[0]", "pos[1]", "tau[0]", "tau[1]"], ["axis_0", "axis_1"]),
+        # Of these one alone is no axis: two thermometers, two speeds of one machine, two sides.
+        (["position", "Temperature1", "Temperature2"], ["recorded"]),
+        (["front speed", "rear speed"], ["recorded"]),
+        (["motor_position", "load_position"], ["recorded"]),
+        (["q1", "q1_filt", "tau1"], ["recorded"]),
+    ],
+)
+def test_which_columns_are_axes_of_their_own(tmp_path: Path, names: list[str], axes: list[str]):
+    assert axes_of(tmp_path, names) == axes
+
+
+@pytest.mark.parametrize(
+    ("head", "roles"),
+    [
+        # An index without a name, as data frames are written; units alone; a unit by its long name.
+        (",time,q,dq\n", ["index", "time", "relative_angle", "relative_rate"]),
+        ("[count];[s];[°];[Nm]\n", ["index", "time", "relative_angle", "drive_torque"]),
+        # Each row ends with a separator, above as below; the index has neither a name nor a unit.
+        (",Time,Winkel,Moment,\n,s,deg,Nm,\n", ["index", "time", "relative_angle", "drive_torque"]),
+        ("# ,Time,Winkel,Moment\n# ,s,deg,Nm\n", ["index", "time", "relative_angle"]),
+        ("T_l,Time [sec],theta_l,T_m\n", ["drive_torque", "time", "relative_angle"]),
+    ],
+)
+def test_headings_as_programs_write_them(tmp_path: Path, head: str, roles: list[str]):
+    m = rig.sines(11)
+    separator = ";" if ";" in head else ","
+    rows = together(np.arange(len(m.t)), m.t, m.q, m.v)
+    if head.endswith(",\n"):
+        rows = [[*row, ""] for row in rows]
+    text(rows, head, separator)(tmp_path / "a.csv")
+    (table,) = guess([tmp_path / "a.csv"]).tables
+    assert table.step == pytest.approx(1e-3)
+    assert [column.role for column in table.columns][: len(roles)] == roles
+    told = tomllib.loads(mapping_text(guess([tmp_path / "a.csv"])))["columns"]["a"]
+    if "deg" in head:
+        assert [told[role]["unit"] for role in roles[1:3]] == ["s", "deg"]
+
+
+def test_times_with_holes_are_times(tmp_path: Path):
+    m = rig.sines(12)
+    rows = [[*row] for row in together(m.t, m.q)]
+    rows[7][0] = ""
+    text(rows, "time [s],angle\n")(tmp_path / "a.csv")
+    (table,) = guess([tmp_path / "a.csv"]).tables
+    assert table.columns[0].role == "time"
+    assert table.columns[0].doubts == ("1 of its cells hold no number",)
+    assert table.step == pytest.approx(1e-3)
+
+
+def test_units_that_contradict_each_other_do_not_stand(tmp_path: Path):
+    """Degrees, says the heading, and the rate in rad/s is the derivative as it is."""
+    m = rig.sines(9)
+    text(together(m.t, m.q, m.v, m.tau), "time [s],angle [deg],rate [rad/s],torque [Nm]\n")(
+        tmp_path / "a.csv"
+    )
+    time, angle, rate, torque = guess([tmp_path / "a.csv"]).tables[0].columns
+    assert [each.basis for each in (angle, rate)] == [Basis.LIKELY, Basis.LIKELY]
+    assert "0.017453 is due" in angle.unit_why
+    assert [each.basis for each in (time, torque)] == [Basis.STATED, Basis.STATED]
+    section = tomllib.loads(mapping_text(guess([tmp_path / "a.csv"])))["columns"]["a"]
+    assert "unit" not in section["relative_angle"]
+    assert "unit" not in section["relative_rate"]
+
+
+def test_times_that_contradict_a_rate_do_not_stand_either(tmp_path: Path):
+    m = rig.sines(9)
+    text(together(m.t * 1000.0, m.q, m.v), "time [s],angle [rad],rate [rad/s]\n")(
+        tmp_path / "a.csv"
+    )
+    columns = guess([tmp_path / "a.csv"]).tables[0].columns
+    assert {each.basis for each in columns} == {Basis.LIKELY}
+
+
+def test_what_follows_has_the_unit_of_what_it_follows(tmp_path: Path):
+    m = rig.sines(10)
+    own = {
+        "time [s]": m.t,
+        "angle [deg]": m.q * DEG,
+        "angle_ref": m.q * DEG + 0.01,
+        "setpoint": m.q * DEG * 0.99,
+        "current [A]": m.i,
+        "torque": m.i * 1.7,
+    }
+    text(together(*own.values()), ",".join(own) + "\n")(tmp_path / "a.csv")
+    columns = guess([tmp_path / "a.csv"]).tables[0].columns
+    _, _, reference, setpoint, _, torque = columns
+    assert (reference.role, reference.unit, reference.basis) == ("reference", "deg", Basis.LIKELY)
+    assert (setpoint.role, setpoint.unit, setpoint.basis) == ("reference", "deg", Basis.LIKELY)
+    assert any("1.7 times current" in doubt for doubt in torque.doubts)
+
+
+def test_all_that_a_mapping_lacks_is_told_at_once(tmp_path: Path):
+    mapping = (
+        '[columns.a.time]\ncolumn = "t"\n[columns.a.relative_angle]\ncolumn = "pos"\n'
+        '[columns.a.drive_torque]\ncolumn = "j"\nunit = "N m"\n'
+        '[columns.a.motor_current]\ncolumn = "i"\nunit = "V"\n'
+        '[[test]]\nname = "any"\nkind = "motion"\nbench = "platform"\n'
+        '[[test.recording]]\nfile = "a.csv"\n'
+    )
+    with pytest.raises(ProtocolError) as error:
+        planned(tmp_path, mapping)
+    lines = str(error.value).splitlines()
+    told = ["unit of column 't'", "unit of column 'pos'", "no column 'j'", "motor_current"]
+    assert len(lines) == len(told)
+    for line, what in zip(lines, told, strict=True):
+        assert what in line
+
+
+def test_a_file_that_is_not_there_has_a_nearest(tmp_path: Path):
+    (tmp_path / "Run_07.csv").write_text("t,pos\n0,1\n1,2\n")
+    with pytest.raises(RecordingError, match=r"did you mean 'Run_07\.csv'"):
+        guess_mapping([tmp_path / "run07.csv"])
+    with pytest.raises(RecordingError, match=r"No such file or directory$"):
+        guess_mapping([tmp_path / "something else entirely.mat"])
