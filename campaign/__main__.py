@@ -21,7 +21,11 @@ def main() -> None:
         interrupts.leave()
     except SystemExit as leaving:
         interrupts.deaf()
+        import gc
         import threading
+
+        # The system takes everything back at once: a million objects are not searched for cycles.
+        gc.freeze()
 
         # Python would end itself by SIGINT, had a KeyboardInterrupt passed through `exec`; and
         # after an error it would wait for a stuck backend's thread.

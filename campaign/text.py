@@ -10,6 +10,8 @@ from campaign.axis_kind import words_here
 
 MOST_DIGITS = 9
 """that a number with an interval is shown with."""
+MOST_DECIMALS = 7
+"""of such a number below 0.01; one that needs more has an exponent."""
 _ROUNDING = 1e-12  # share of a number below which its half-width is a rounding error
 _LEAST = 1e-290  # half-width below which no digit of it could be written
 
@@ -40,8 +42,9 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
 
     Half-widths have two significant digits and the number ends where they do, before the point as
     behind it (401000 ± 12000), but has no more than `MOST_DIGITS` in all. What is very large or
-    very small has one exponent for all: `(4.01 ± 0.12) × 10⁹`. An interval that is open on one
-    side says which side it has; one that is a rounding error of the number is shown as none.
+    very small has one exponent for all: `(4.01 ± 0.12) × 10⁹`; so has what is small and would have
+    more than `MOST_DECIMALS`. An interval that is open on one side says which side it has; one that
+    is a rounding error of the number is shown as none.
     """
     if value is None or not math.isfinite(value) or (low is None and high is None):
         return number(value)
@@ -60,7 +63,8 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
     if size - place + 1 > MOST_DIGITS:
         middle, *ends = (number(each, MOST_DIGITS) for each in (value, low, high))
         return _with_ends(middle, number(half, 2), ends if lopsided else [])
-    power = 0 if 1e-4 <= largest < 1e6 else size
+    many = largest < 1e-2 and place < -MOST_DECIMALS
+    power = 0 if 1e-4 <= largest < 1e6 and not many else size
     middle, wide, *ends = (_to(each, place, power) for each in (value, half, low, high))
     shown = _with_ends(middle, wide, ends if lopsided else [])
     if not power:

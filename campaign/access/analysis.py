@@ -19,8 +19,9 @@ from campaign.physics.bench import Bench
 from campaign.published.evidence import Evidence, evidence_of
 from campaign.published.provenance import NOTHING_ALTERED, Provenance, provenance_of
 from campaign.published.values import Published, published_values
+from campaign.recording import Outcome
 from campaign.result import Result
-from campaign.trial import Outcome, Role, Tree
+from campaign.trial import Role, Tree
 
 FORMER_SOURCES = {"sim": "simulation", "serial": "hardware", "replay": "recording"}
 """By backend: where samples came from when archives did not say so themselves."""
@@ -114,7 +115,7 @@ def analyse_run(
         measure_anew: measure the recordings by this program, whatever is archived with them.
         found: what was found already, by test.
     """
-    known = found or {}
+    known = {} if found is None else found  # asked test by test: the last may not be found yet
     return tuple(
         _analysed(
             run,

@@ -18,7 +18,8 @@ from campaign.archive import RunHeader, RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words, lost_trials, of_test
 from campaign.errors import ArchiveError, UsageError
-from campaign.trial import Outcome, trial_number
+from campaign.recording import Outcome
+from campaign.trial import trial_number
 
 if TYPE_CHECKING:
     import pandas as pd

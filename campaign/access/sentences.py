@@ -24,6 +24,8 @@ WRITTEN = 8
 """Most digits that somebody is taken to have written of a setting; one with more was computed."""
 LARGE = 1e6
 """Factors from here on are told with an exponent."""
+NEAR = 0.8, 1.25
+"""Ratios between these are told in percent: nobody says 1.065 times more."""
 NO_NOISE, NO_INTERVAL = " (no noise, so no interval)", " without an interval"
 """Behind the first ratio of a sentence that has no interval, because nothing scatters or for
 another reason: the remarks have it, and behind each it would hide the numbers."""
@@ -153,6 +155,9 @@ def _factor(part: Factor) -> str:
     if side == 0:
         ends = "" if _narrow(estimate) else _ends(low, high, " times")
         return f"no difference that the data show{ends}"
+    positive = all(end > 0 for end in (low, high) if end is not None)
+    if NEAR[0] < estimate.value < NEAR[1] and positive and _says_side(part):
+        return _in_percent(part)
     word, value = part.above, _finite(estimate.value)
     if side < 0:  # the reciprocal, whose ends change places
         word, value, low, high = part.below, _reciprocal(value), _reciprocal(high), _reciprocal(low)
@@ -161,6 +166,30 @@ def _factor(part: Factor) -> str:
     if value is None or estimate.kind in ("at least", "at most"):
         return f"at least {_number(low, low, high)} times {word}"
     return f"{_number(value, low, high)} times {word}{_ends(low, high)}"
+
+
+def _says_side(part: Factor) -> bool:
+    """Whether its words say of which side it is: a quarter more is, turned round, a fifth less."""
+    return part.above.startswith(("less", "more"))
+
+
+def _percent(part: Factor, ratio: float) -> float:
+    """How many percent more or less a ratio means, as a size."""
+    return 100.0 * abs((1.0 / ratio if part.above.startswith("less") else ratio) - 1.0)
+
+
+def _in_percent(part: Factor) -> str:
+    """A ratio near 1, and surely on one side of it, by what it is away from 1."""
+    estimate = part.estimate
+    word = part.above if estimate.value > 1 else part.below
+    value = _percent(part, estimate.value)
+    ends = sorted(_percent(part, end) for end in estimate.combined if end is not None)
+    if estimate.kind in ("at least", "at most"):
+        return f"at least {number(ends[0], 3)} % {word}"
+    if len(ends) < 2:
+        return f"{number(value, 3)} % {word} (at least {number(ends[0], 3)})"
+    told = number(value, 3) if _narrow(estimate) else interval(value, *ends)
+    return f"{told} % {word}"
 
 
 def _without_noise(part: Factor) -> str:
@@ -173,7 +202,12 @@ def _without_noise(part: Factor) -> str:
     if float(f"{value:.3g}") == 1:
         return f"no difference in three digits in this simulation{NO_NOISE}"
     if value < 1:
-        value, word = 1 / value, part.below
+        word = part.below
+    if NEAR[0] < value < NEAR[1] and _says_side(part):
+        # Three digits of the ratio are one behind the point of what it is away from 1.
+        percent = round(_percent(part, value), 1)
+        return f"{number(percent, 3)} % {word} in this simulation{NO_NOISE}"
+    value = value if value > 1 else 1 / value
     return f"{number(value, 3, 3)} times {word} in this simulation{NO_NOISE}"
 
 

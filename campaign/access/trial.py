@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from campaign.archive import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
-from campaign.trial import Ending, Recording, Trial
+from campaign.recording import Ending, Recording
+from campaign.trial import Trial
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -45,6 +45,7 @@ class Reproduced:
         kind: `at least` and `at most` are bounds: `value` is where what was tried ends, `low` or
             `high` the same less what the bench's constants may be off by.
         origin: where it comes from; one that is `not determined` decides nothing.
+        reason: why it has no interval, or what is not in the one that it has.
     """
 
     value: float
@@ -52,6 +53,7 @@ class Reproduced:
     high: float | None = None
     kind: Kind = "number"
     origin: Origin = Origin.MEASURED
+    reason: str = ""
 
     @property
     def is_determined(self) -> bool:
@@ -81,7 +83,7 @@ def reproduced(finding: Finding, unit: str) -> Reproduced:
     low, high = (
         None if end is None else float(convert(end, finding.unit, unit)) for end in known.combined
     )
-    return Reproduced(value, low, high, known.kind, known.origin)
+    return Reproduced(value, low, high, known.kind, known.origin, known.reason)
 
 
 def judge(cell: Cell, found: Reproduced) -> Verdict:

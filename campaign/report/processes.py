@@ -22,6 +22,7 @@ from typing import Any
 
 from campaign.access.analysis import Found, find, name_of
 from campaign.archive import RunReader
+from campaign.archive.reading.heaps import known_heaps, told_of_heaps
 from campaign.experiments import experiments
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.page.drawings import Drawable, Key
@@ -152,7 +153,7 @@ def _pool(run: RunReader, processes: int) -> Iterator[ProcessPoolExecutor]:
     _, context = _context()
     others = set(multiprocessing.active_children())
     # What was read and checked here is handed over: reading it again takes ten times as long.
-    handed = pickle.dumps(run, pickle.HIGHEST_PROTOCOL)
+    handed = pickle.dumps((run, known_heaps()), pickle.HIGHEST_PROTOCOL)
     pool = ProcessPoolExecutor(processes, context, _begin, (handed,))
     try:
         yield pool
@@ -184,7 +185,8 @@ def _begin(handed: bytes) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.set_threshold(*SELDOM)
-    _run = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    told_of_heaps(heaps)
     gc.freeze()
 
 

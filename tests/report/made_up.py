@@ -14,6 +14,7 @@ from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.recording import ChannelInfo, Ending, Outcome, Recording, SafeState
 from campaign.result import (
     Axis,
     Column,
@@ -25,7 +26,7 @@ from campaign.result import (
     Result,
     Table,
 )
-from campaign.trial import ChannelInfo, Ending, Outcome, Recording, SafeState, Task, Trial
+from campaign.trial import Task, Trial
 from campaign.units import AngularAcceleration, Frequency
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -10,10 +10,10 @@ from campaign.archive import RunHeader
 from campaign.experiments import experiments
 from campaign.experiments.interface import bench_of
 from campaign.protocol import load_protocol, make_plan
+from campaign.recording import Ending, Outcome
 from campaign.report.content.conditions import conditions_of
 from campaign.report.content.written_units import units_of
 from campaign.result import Result
-from campaign.trial import Ending, Outcome
 
 SHIPPED = Path(__file__).resolve().parents[2] / "protocols"
 

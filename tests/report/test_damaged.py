@@ -9,8 +9,9 @@ import numpy as np
 from campaign.access.analysis import analyse_run
 from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
 from campaign.experiments.interface import TestData
+from campaign.recording import ChannelInfo, Ending, Outcome
 from campaign.result import Result
-from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
+from campaign.trial import Task, Trial
 
 TIME = "2026-11-21T09:36:58Z"
 

@@ -6,10 +6,12 @@ from itertools import pairwise
 import matplotlib.backends.backend_svg as backend
 import numpy as np
 import pytest
+from matplotlib.axis import Axis as DrawnAxis
 from matplotlib.figure import Figure as Canvas
 
 from campaign.report.drawing.decimate import kept
-from campaign.report.drawing.figures import draw
+from campaign.report.drawing.figures import canvas, draw
+from campaign.report.drawing.settled import settled
 from campaign.report.processes import seldom_collecting
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
@@ -29,6 +31,7 @@ def marked() -> Figure:
 
 
 def test_a_figure_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw(marked())  # what measures is made for the first of all sheets
     drawn, begun = [], []
     whole, begin = Canvas.draw, backend.RendererSVG.__init__
 
@@ -44,7 +47,36 @@ def test_a_figure_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(backend.RendererSVG, "__init__", counting)
     assert "a dot" in draw(marked())
     assert len(drawn) == 1
-    assert len(begun) == 2  # one that measures, and one that writes
+    assert len(begun) == 1  # which writes
+
+
+def test_ticks_are_worked_out_once_for_each_measuring_and_drawing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    worked_out, original = [], DrawnAxis._update_ticks
+
+    def counted(self):
+        worked_out.append(self)
+        return original(self)
+
+    monkeypatch.setattr(DrawnAxis, "_update_ticks", counted)
+    t = np.linspace(0.0, 1.0, 50)
+    panel = Panel(X, Y, (Curve(t, t**2, "square"),), "a panel")
+    draw(Figure("key", "A title", "a caption", "what it shows", (panel,)))
+    assert len(worked_out) == 4  # of two axes, which are measured and drawn
+
+
+def test_axes_are_asked_again_when_they_may_move() -> None:
+    with canvas(4.0, 3.0) as sheet:
+        ax = sheet.subplots()
+        ax.set_ylim(0.0, 1.0)
+        with settled([ax]):
+            assert len(ax.yaxis._update_ticks()) > 2
+        ax.set_ylim(40.0, 60.0)
+        with settled([ax]):
+            places = [tick.get_loc() for tick in ax.yaxis._update_ticks()]
+        assert len(places) > 2
+        assert min(places) >= 40.0
 
 
 def slowly_kept(x, y, points):

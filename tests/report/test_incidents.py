@@ -17,12 +17,13 @@ from campaign.archive.layout.journal import (
     TrialsFollowed,
 )
 from campaign.errors import ArchiveError
+from campaign.recording import Channel, Ending, Fault, Outcome, Recording, SafeState
 from campaign.report.build import render
 from campaign.report.content.drift import drift_table, drifts_of
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.low_margins import low_margin_table
 from campaign.report.content.tables import table_csv
-from campaign.trial import Channel, Ending, Fault, Outcome, Recording, Role, SafeState
+from campaign.trial import Role
 
 
 class InMemory(ArchivedTrial):

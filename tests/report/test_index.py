@@ -186,10 +186,12 @@ def test_what_is_too_large_is_left_alone_and_what_is_too_long_is_cut(results: Pa
 def test_trials_are_counted(tmp_path: Path):
     run = RunSummary(
         "a", tmp_path / "a.partial", 1, created="2026-11-21T09:00:00+00:00",
-        status=RunStatus.INCOMPLETE, planned=20, trials=18, failed=1, title="", protocol="sea",
+        status=RunStatus.INCOMPLETE, planned=20, trials=18, failed=1, interrupted=2, title="",
+        protocol="sea",
     )  # fmt: skip
     entry = entry_of(run)
-    assert entry.verdict == ("17 of 20 trials completed, 1 failed, 2 not executed.",)
+    told = "15 of 20 trials completed, 1 failed, 2 interrupted, 2 not executed."
+    assert entry.verdict == (told,)
     assert (entry.title, entry.status) == ("sea", "incomplete (not sealed)")
     assert (entry.when, entry.link, entry.thumbnail) == ("2026-11-21 09:00", "", "")
 

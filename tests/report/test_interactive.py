@@ -21,6 +21,7 @@ from campaign.report.drawing.decimate import decimate
 from campaign.report.drawing.figure_csv import points_of_each
 from campaign.report.drawing.figures import draw
 from campaign.report.page import interactive as module
+from campaign.report.page.folder import ShownFigure
 from campaign.report.page.interactive import growing, zooms
 from campaign.result import Axis, Curve, Figure, Panel
 
@@ -29,6 +30,7 @@ VENDORED = {
     "uPlot.min.css": "df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04",
 }
 AXIS = Axis("t", "s", "s")
+SHOWN = ShownFigure(1, "figure-1", "Title", "c", "", "k.svg")
 
 
 def figure(*curves: Curve) -> Figure:
@@ -46,6 +48,21 @@ def zoomed(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> str
         zoom=True,
     )
     return report.path.read_text(encoding="utf-8")
+
+
+def test_quotes_of_the_data_stand_as_they_are_and_nothing_leaves_their_element(
+    zoomed: str,
+) -> None:
+    (data,) = re.findall(r'<template id="interactive-data">(.*?)</template>', zoomed, re.DOTALL)
+    assert data.startswith('{"figure-')
+    assert not re.search(r"[<>]|&(?!lt;|gt;|amp;)", data)
+    hostile = figure(Curve(np.arange(9.0), np.arange(9.0), "a </template><script>&quot;", "a"))
+    (panel,) = module._figure(hostile, None)["panels"]
+    assert panel["curves"][0]["label"] == "a </template><script>&quot;"
+    shown = replace(SHOWN, anchor="figure-1", data=hostile)
+    told = str(module.interactive([shown]).data)
+    assert "<" not in told
+    assert json.loads(html.unescape(told))["figure-1"]["panels"] == [panel]
 
 
 def test_without_what_it_adds_the_page_is_the_static_one_to_the_byte(

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         (1.4804747, 1.4804747 - 2e-10, 1.4804747 + 2e-10, "1.4804747 ± 2.0 × 10⁻¹⁰"),
         (1.5e-7, 1.4e-7, 1.6e-7, "(1.50 ± 0.10) × 10⁻⁷"),
         (4.0063e9, 3.8863e9, 4.1263e9, "(4.01 ± 0.12) × 10⁹"),
+        (5.94806e-4, 5.94761e-4, 5.94851e-4, "(5.94806 ± 0.00045) × 10⁻⁴"),
         (1.116842e-5, 1.116790e-5, 1.116894e-5, "(1.116842 ± 0.000052) × 10⁻⁵"),
         (1.5e-7, 1.4e-7, 1.9e-7, "1.50 (1.40 to 1.90) × 10⁻⁷"),
         (0.0, -2e-7, 2e-7, "(0.0 ± 2.0) × 10⁻⁷"),
@@ -71,7 +72,7 @@ def test_what_is_shown_holds_what_was_found() -> None:
         told = interval(value, low, high).replace("−", "-")
         digits, _, power = told.partition(" × 10")
         largest = max(abs(value), 0.5 * (high - low))
-        assert not power or not 1e-4 <= largest < 1e6
+        assert not power or not 1e-2 <= largest < 1e6
         if "×" in digits or "to" not in digits:
             continue
         unit = 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
@@ -96,6 +97,24 @@ def table(columns: dict[str, list[Cell]], **how: dict[str, object]) -> Table:
         Column(name, name.upper(), "N m", "mN m", **how.get(name, {})) for name in columns
     )
     return Table("key", "Title", described, rows)
+
+
+def test_digits_that_no_reader_needs_are_left_to_the_file() -> None:
+    """A simulation without noise tells nine digits, of which five are shown."""
+    cells: list[Cell] = [estimate(1.4852135, 1e-6), estimate(1.4879, 1e-4), estimate(2.0, 0.0)]
+    shown = show(table({"a": cells}))
+    assert [row[0].text for row in shown.rows] == ["1485.2", "1487.90 ± 0.10", "2000 ± 0"]
+    (remark,) = shown.notes
+    assert "narrower than its digits; the CSV file has it" in remark
+    assert "\n1485.2135,1485.2125," in table_csv(table({"a": cells}))
+    assert not show(table({"a": cells[1:]})).notes
+
+
+def test_rounding_errors_of_estimates_are_nothing() -> None:
+    """The width of a loop that a static model does not have, beside the one of another model."""
+    widths = (0.15, -8.9e-16, 1.4e-16)
+    cells: list[Cell] = [estimate(each, None, reason="no noise") for each in widths]
+    assert [row[0].text for row in show(table({"a": cells})).rows] == ["150", "0", "0"]
 
 
 ALONE = estimate(half=None, reason="a single trial")

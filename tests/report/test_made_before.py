@@ -204,7 +204,7 @@ def test_a_process_seldom_looks_for_garbage() -> None:
     before = gc.get_threshold()
     signals = signal.getsignal(signal.SIGINT)
     try:
-        processes._begin(pickle.dumps(None))
+        processes._begin(pickle.dumps((None, {})))
         assert gc.get_threshold() == processes.SELDOM
     finally:
         gc.set_threshold(*before)

@@ -16,6 +16,7 @@ from campaign.archive import RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
+from campaign.recording import Ending, Outcome, SafeState
 from campaign.report.build import build_report, render
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
@@ -31,7 +32,6 @@ from campaign.result import (
     Panel,
     Result,
 )
-from campaign.trial import Ending, Outcome, SafeState
 
 DIFFERENCE = re.compile(r"\b(less|more|better|worse)\b")
 

@@ -21,12 +21,12 @@ import pytest
 from campaign.archive import RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, TestData
+from campaign.recording import Ending, Outcome
 from campaign.report.build import Report, build_report
 from campaign.report.one_figure import WRITTEN, write_figure
 from campaign.report.output import MARKER, replaced_folder
 from campaign.report.page.folder import LINKED, Folder
 from campaign.result import Axis, Column, Curve, Figure, Panel, Result, Table
-from campaign.trial import Ending, Outcome
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 FOREIGN_VOID = {"path", "use", "rect", "circle", "image", "stop"}

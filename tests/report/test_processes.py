@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
-from campaign.access.analysis import Found
+from campaign.access.analysis import Found, analyse_run
 from campaign.archive import open_run
 from campaign.archive.reading import run_reader
 from campaign.experiments import experiments
@@ -109,6 +110,27 @@ def test_what_is_found_is_waited_for_when_it_is_asked_for(
         for each in begun:
             each.set_result(Found(Result(), (), "", ()))
         assert set(found) == {"calm", "steps"}
+
+
+def test_a_test_that_is_found_is_gone_on_with_before_the_last_is(archive: Path) -> None:
+    run = open_run(archive)
+    asked: list[str] = []
+
+    class Awaited(Mapping[str, Found]):
+        """As of processes: it has a length when all of them are ready."""
+
+        def __getitem__(self, name: str) -> Found:
+            asked.append(name)
+            return Found(Result(), (), "", ())
+
+        def __iter__(self) -> Iterator[str]:
+            raise AssertionError("all are waited for")
+
+        def __len__(self) -> int:
+            raise AssertionError("all are waited for")
+
+    tests = analyse_run(run, experiments(), found=Awaited())
+    assert [each.name for each in tests] == asked == ["calm", "steps"]
 
 
 def test_the_journal_is_parsed_once_for_a_report(

@@ -16,10 +16,15 @@ import pytest
 from campaign.access.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
+from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment
+from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.published.scoreboard import Line, score
+from campaign.published.verdicts import reproduced
+from campaign.recording import Outcome, SafeState
 from campaign.report.build import build_report
-from campaign.trial import Outcome, SafeState
+from campaign.report.content.lines import shown_line
+from campaign.result import Finding
 
 TESTS = {"stabilization": ("5.2", "5.8")}
 AXIS = {"name": "azimuth", "inertia": "36 kg m^2"}
@@ -146,3 +151,25 @@ def test_where_the_samples_come_from(
 ) -> None:
     run = made_up.made_up_run(tmp_path, tests=TESTS, **header)
     assert {line.source for line in found(run, made_up.EXPERIMENTS)} == {source}
+
+
+def test_an_interval_of_one_trial_says_that_it_is(made_up: ModuleType, tmp_path: Path) -> None:
+    """A sentence leaves that of a ratio out, and the table has it: each must say why."""
+    line, *_ = found(made_up.made_up_run(tmp_path, tests=TESTS), made_up.EXPERIMENTS)
+    assert line.found is not None
+    value = line.found.value
+
+    def notes(**how: object) -> set[str]:
+        told = dataclasses.replace(line, found=dataclasses.replace(line.found, **how))
+        return set(shown_line(told).notes) - set(shown_line(line).notes)
+
+    ends = {"low": 0.9 * value, "high": 1.1 * value}
+    said = "the interval is of one trial: how trials scatter is not in it"
+    assert notes(reason=f"{OF_ONE_TRIAL}; and more", **ends) == {said}
+    assert notes(reason="of blocks", **ends) == set()
+    assert notes(reason=OF_ONE_TRIAL, low=None, high=None) == set()
+
+
+def test_the_reason_of_an_interval_comes_with_the_number() -> None:
+    known = Estimate("error", 0.5, "mrad", 0.4, 0.6, 0.95, reason=OF_ONE_TRIAL)
+    assert reproduced(Finding.of(known, {}), "mrad").reason == OF_ONE_TRIAL

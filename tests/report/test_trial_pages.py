@@ -18,6 +18,16 @@ from campaign.archive.layout.journal import Decision, TrialFinished
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate, Window
+from campaign.recording import (
+    Channel,
+    ChannelInfo,
+    Ending,
+    Event,
+    Fault,
+    Outcome,
+    Recording,
+    SafeState,
+)
 from campaign.report.build import build_report
 from campaign.report.content.settings import point_settings, settings_of, task_settings
 from campaign.report.content.trial_account import _metric, _recorded
@@ -39,18 +49,7 @@ from campaign.report.page.trial_links import trial_links
 from campaign.report.page.trial_page import charts, legible
 from campaign.report.palette import SERIES
 from campaign.signals import MultiSine, Polyline, Sine
-from campaign.trial import (
-    Channel,
-    ChannelInfo,
-    Ending,
-    Event,
-    Fault,
-    Outcome,
-    Recording,
-    SafeState,
-    Task,
-    Trial,
-)
+from campaign.trial import Task, Trial
 
 AT = "2026-11-21T09:36:58Z"
 HOSTILE = "<script>alert(1)</script>\"'&"

@@ -28,7 +28,8 @@ from campaign.archive.layout.files import why
 from campaign.archive.layout.header import PlannedTrial, RunStatus
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
-from campaign.trial import Outcome, SafeState, Tree, canonical_json
+from campaign.recording import Outcome, SafeState
+from campaign.trial import Tree, canonical_json
 
 JOURNAL = "journal.jsonl"
 

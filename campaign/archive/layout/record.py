@@ -21,17 +21,8 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
 
 from campaign.archive.layout.checksums import text_digest
 from campaign.estimate import Estimate, Window
-from campaign.trial import (
-    ChannelInfo,
-    Ending,
-    Event,
-    Fault,
-    Outcome,
-    SafeState,
-    Tree,
-    Trial,
-    canonical_json,
-)
+from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
+from campaign.trial import Tree, Trial, canonical_json
 
 SHARED = ("bench", "options")
 """Fields of a trial that stand in `trees`."""

@@ -10,6 +10,7 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from campaign.archive.layout.journal import Entry, RunEnded, RunResumed, RunStarted, TrialFinished
+from campaign.trial import Outcome
 
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 _Kind = TypeVar("_Kind", bound=Entry)
@@ -41,6 +42,11 @@ class Lines:
     def finished(self) -> dict[int, TrialFinished]:
         """By trial, in the order of their numbers; of several attempts the last one counts."""
         return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
+
+    @property
+    def interrupted(self) -> int:
+        """How many trials somebody stopped, which have not failed."""
+        return sum(each.outcome is Outcome.INTERRUPTED for each in self.finished.values())
 
     @property
     def attempts(self) -> list[TrialFinished]:

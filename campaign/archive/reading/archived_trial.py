@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from campaign.estimate import Estimate, Window
-from campaign.trial import ChannelInfo, Ending, Recording, Trial
+from campaign.recording import ChannelInfo, Ending, Recording
+from campaign.trial import Trial
 
 
 class Samples(Protocol):

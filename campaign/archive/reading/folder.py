@@ -25,7 +25,7 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.measured import measured_in, with_metrics
 from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
-from campaign.trial import SafeState
+from campaign.recording import SafeState
 
 
 def open_folder(folder: Path) -> RunReader:

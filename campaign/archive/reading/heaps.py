@@ -6,8 +6,7 @@ by their sizes; where damage made the size of the free space zero, it walks on t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,14 +15,31 @@ _HEADER = 16  # bytes, of a collection as well as of an object in it
 _BLOCK = 1 << 20
 
 
+Looked = tuple[Path, int, int]
+"""A file as it was looked at: its path, size (bytes) and time of change (ns)."""
+_known: dict[Looked, bool] = {}
+
+
 def heaps_are_sound(path: Path) -> bool:
     """Whether HDF5 gets through every heap of the file; read once while the file is the same."""
     stat = path.stat()
-    return _sound(path, stat.st_size, stat.st_mtime_ns)
+    looked = path, stat.st_size, stat.st_mtime_ns
+    if looked not in _known:
+        _known[looked] = _sound(path, stat.st_size)
+    return _known[looked]
 
 
-@lru_cache(maxsize=64)
-def _sound(path: Path, size: int, _changed: int) -> bool:
+def known_heaps() -> dict[Looked, bool]:
+    """What this process knows of files, to be told another, which then reads none of them anew."""
+    return dict(_known)
+
+
+def told_of_heaps(known: Mapping[Looked, bool]) -> None:
+    """What another process knows of files that are still the same."""
+    _known.update(known)
+
+
+def _sound(path: Path, size: int) -> bool:
     with path.open("rb") as file:
         return all(_collection_ends(file, start, size) for start in list(_collections(file)))
 

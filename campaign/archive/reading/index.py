@@ -19,11 +19,11 @@ from campaign.archive.layout.run_folder import HEADER
 from campaign.archive.reading.summary import RunSummary, summarise
 
 INDEX = ".campaign-index.json"
-_VERSION = 2
+_VERSION = 3
 _LARGEST = 1 << 26  # bytes; an index of ten thousand runs has a tenth of it
 
 _TEXTS = ("name", "created", "ended", "title", "protocol", "backend", "operator", "problem")
-_COUNTS = ("bytes", "planned", "trials", "failed", "untold")
+_COUNTS = ("bytes", "planned", "trials", "failed", "interrupted", "untold")
 _LISTS = ("tests", "benches", "tags")
 
 

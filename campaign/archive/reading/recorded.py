@@ -18,7 +18,8 @@ from campaign.archive.reading import guarded
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.series import series_at
 from campaign.errors import ArchiveError
-from campaign.trial import Array, Channel, ChannelInfo, Ending, Event, Recording, Trial
+from campaign.recording import Array, Channel, ChannelInfo, Ending, Event, Recording
+from campaign.trial import Trial
 
 TIME = ChannelInfo("time", "s", "Time", "s")
 PLOTTED = ("data", "preview")

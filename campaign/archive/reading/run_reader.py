@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,13 +16,14 @@ from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import ArchiveError
-from campaign.trial import SafeState, Tree, Trial
+from campaign.recording import SafeState
+from campaign.trial import Tree, Trial
 
 
 @dataclass(frozen=True)
 class Glance:
     """What `campaign list` tells of a sealed run; `planned`, `finished` and `failed` count trials,
-    those that followed included.
+    those that followed included; `failed` without the `interrupted` ones, which somebody stopped.
     """
 
     header: RunHeader
@@ -31,6 +32,16 @@ class Glance:
     ended: str
     finished: int
     failed: int
+    interrupted: int
+
+
+def interrupted_trials(status: RunStatus, journal: Callable[[], str]) -> int:
+    """How many trials of a sealed run somebody stopped; only where there may be some its journal
+    is read.
+    """
+    if status not in (RunStatus.INTERRUPTED, RunStatus.FAULT):
+        return 0  # the plan was worked through
+    return read_lines(journal().encode()).interrupted
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,11 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.measured import measured_in, with_metrics
 from campaign.archive.reading.provenance import read_provenance
 from campaign.archive.reading.recorded import archived_trial, parse_record
-from campaign.archive.reading.run_reader import Glance, RunReader
+from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
 from campaign.archive.reading.seal import SEAL, SealedTexts
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome, SafeState, Tree
+from campaign.recording import Outcome, SafeState
+from campaign.trial import Tree
 
 NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
 """The texts of `/run` that are notes, but for the sources."""
@@ -75,13 +76,16 @@ def read_glance(path: Path) -> Glance:
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
+        status = RunStatus(texts.text("outcome/status"))
+        interrupted = interrupted_trials(status, lambda: texts.text("journal/data"))
         return Glance(
             header=header,
             planned=header.trials + _followed(texts, header),
-            status=RunStatus(texts.text("outcome/status")),
+            status=status,
             ended=texts.text("end_time"),
             finished=texts.integer("outcome/trials_finished"),
-            failed=texts.integer("outcome/trials_failed"),
+            failed=texts.integer("outcome/trials_failed") - interrupted,
+            interrupted=interrupted,
         )
 
 

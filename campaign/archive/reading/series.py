@@ -17,7 +17,7 @@ from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import SeriesDigest, series_digest
 from campaign.archive.reading.guarded import own_id
 from campaign.errors import ArchiveError
-from campaign.trial import Array
+from campaign.recording import Array
 
 _LARGEST_CHUNK = 1 << 22  # samples
 _SHUFFLED = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE]

@@ -14,7 +14,7 @@ from typing import TypeVar
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import ArchiveError
-from campaign.trial import Recording
+from campaign.recording import Recording
 
 _Made = TypeVar("_Made")
 

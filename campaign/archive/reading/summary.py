@@ -11,7 +11,7 @@ from campaign.archive.layout.journal import JOURNAL, RunStarted
 from campaign.archive.layout.run_folder import read_header
 from campaign.archive.layout.story import read_lines
 from campaign.errors import ArchiveError
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,10 @@ class RunSummary:
         title, operator: as the header has them.
         tests: names, in the protocol's order.
         benches: names, each once, in the order of the tests.
-        trials: finished ones, failed ones included; `planned` counts the whole plan.
+        trials: finished ones, those that did not complete included; `planned` counts the whole
+            plan.
+        failed, interrupted: those that did not complete by themselves, and those that somebody
+            stopped, which have not failed.
         untold: how many planned trials the journal, damaged, does not tell of: they may have been
             executed.
         problem: why the run cannot be read; everything but name, path and bytes is empty then.
@@ -45,6 +48,7 @@ class RunSummary:
     planned: int = 0
     trials: int = 0
     failed: int = 0
+    interrupted: int = 0
     untold: int = 0
     problem: str = ""
 
@@ -99,7 +103,8 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
         tags=header.tags,
         planned=planned,
         trials=len(finished),
-        failed=sum(f.outcome is not Outcome.COMPLETED for f in finished),
+        failed=sum(f.outcome not in (Outcome.COMPLETED, Outcome.INTERRUPTED) for f in finished),
+        interrupted=story.interrupted,
         untold=max(0, planned - len(finished)) if story.damaged else 0,
     )
 
@@ -125,4 +130,5 @@ def _summarise_file(path: Path, size: int) -> RunSummary:
         planned=run.planned,
         trials=run.finished,
         failed=run.failed,
+        interrupted=run.interrupted,
     )

@@ -21,12 +21,12 @@ from campaign.archive.reading.damage_words import hidden_trials, lost_trials
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import Published
+from campaign.recording import Outcome
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.opening import Opening, opening_of
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables
 from campaign.result import Table
-from campaign.trial import Outcome
 
 ANEW = "the program that made this page, whatever is archived"
 

@@ -19,8 +19,9 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.errors import ArchiveError
+from campaign.recording import Outcome, Recording
 from campaign.result import Array, Axis, Column, Curve, Figure, Mark, Panel, Table, Value
-from campaign.trial import Outcome, Recording, Role, Task
+from campaign.trial import Role, Task
 
 ONE_EACH = "one recording each: how they scatter from one to the next is what this table shows"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.published.headline import is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
@@ -64,10 +65,18 @@ def shown_line(line: Line) -> ShownLine:
         sign=SIGNS[look.marker] if look else "",
         verdict=str(line.verdict),
         good=line.verdict in GOOD,
-        notes=tuple(note for note in (cell.reason, *cell.notes) if note),
+        notes=tuple(note for note in (cell.reason, *cell.notes, _of_one_trial(line)) if note),
         test=line.test,
         place=place_words(line),
     )
+
+
+def _of_one_trial(line: Line) -> str:
+    """What is not in its interval; a sentence leaves such an interval of a ratio out."""
+    found = line.found
+    if found is None or not found.has_interval or OF_ONE_TRIAL not in found.reason:
+        return ""
+    return "the interval is of one trial: how trials scatter is not in it"
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ def _described(test: AnalysedTest) -> Iterator[Described]:
 
 
 def _channel(made: Made) -> str:
-    if made.how == "derivative":
-        return f"{made.name}: derivative of {made.source}"
+    if made.how in ("derivative", "integral"):
+        return f"{made.name}: {made.how} of {made.source}"
     if made.how == "copy":
         return f"{made.name}: from {made.source}"
     column = made.cells.name if made.cells is not None else ""

@@ -11,9 +11,10 @@ from pydantic.fields import FieldInfo
 from campaign.axis_kind import each_speaking_of, spoken_of, words_here
 from campaign.channels import COMMAND, UNITS, AxisKind, info
 from campaign.channels import Quantity as PhysicalQuantity
+from campaign.recording import ChannelInfo
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.text import number, pretty_unit
-from campaign.trial import ChannelInfo, Task, Tree
+from campaign.trial import Task, Tree
 from campaign.units import Quantity, convert
 
 LISTED = 12

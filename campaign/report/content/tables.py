@@ -25,6 +25,9 @@ REASONS = 6
 """Most reasons for a missing interval that stand below a table."""
 UNIT = "unit"
 """Name of a column that says the unit of its row."""
+NARROW, SHORT = 1e-5, 5
+"""Half-width, as a share of its number, below which the page leaves an interval out, and the digits
+that the number then has: a simulation without noise has nine, which mean nothing to a reader."""
 ROUNDING = 1e-12
 """Share of a column's largest number below which one is a rounding error, shown as 0."""
 
@@ -100,6 +103,11 @@ def remarks(table: Table) -> Iterator[str]:
             pieces = [*pieces[: REASONS - 1], f"and others, for {more} more reasons"]
         if pieces:
             yield f"{head}: {'; '.join(pieces)}."
+    if any(_is_narrow(row.get(c.name)) for c in table.columns for row in table.rows[:ROWS]):
+        yield (
+            "Where a number with five digits stands without an interval, that is narrower than its "
+            "digits; the CSV file has it."
+        )
     sources = dict.fromkeys(
         source for column in table.columns for source in _of_unknown_size(table, column)
     )
@@ -306,6 +314,9 @@ def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[Sh
 
     def text(cell: Cell, value: Value) -> str:
         if isinstance(cell, Estimate) and value is not None:
+            least = ROUNDING * largest
+            if not cell.has_interval and isinstance(value, float) and 0 < abs(value) < least:
+                return "0"
             return _with_interval(cell, column)
         if column.name == UNIT and isinstance(value, str):
             return pretty_unit(value)
@@ -324,7 +335,15 @@ def _with_interval(cell: Estimate, column: Column) -> str:
     if sign:
         value, low, high = (low if high is None else high), None, None
     mark = "" if cell.origin is Origin.MEASURED else f" ({cell.origin})"
-    return f"{sign}{interval(value, low, high)}{mark}"
+    told = number(value, SHORT) if _is_narrow(cell) else interval(value, low, high)
+    return f"{sign}{told}{mark}"
+
+
+def _is_narrow(cell: Cell) -> bool:
+    """Whether an interval is too narrow to be read; one of no width at all is told as such."""
+    if not isinstance(cell, Estimate) or not cell.has_interval:
+        return False
+    return ROUNDING * abs(cell.value) < cell.half_width < NARROW * abs(cell.value)
 
 
 def _text(value: Value, negligible: float) -> str:

@@ -18,6 +18,7 @@ from campaign.channels import COMMAND
 from campaign.errors import ArchiveError, CampaignError
 from campaign.estimate import Estimate, Window
 from campaign.experiments.interface import Experiment, bench_of, options_of
+from campaign.recording import Recording
 from campaign.report.content.settings import (
     point_settings,
     settings_of,
@@ -26,7 +27,7 @@ from campaign.report.content.settings import (
 )
 from campaign.result import Column, Table, Value
 from campaign.text import interval, number, pretty_unit
-from campaign.trial import Recording, Role, Tree, Trial
+from campaign.trial import Role, Tree, Trial
 from campaign.units import convert
 
 SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s", "m/s^2": "mm/s^2"}

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 from campaign.archive import RunReader
 from campaign.archive.reading.damage_words import lost_trials
 from campaign.errors import UsageError
-from campaign.trial import Outcome
+from campaign.recording import Outcome
 
 HOW = "write failed, all, N, N..M, or several of them with commas"
 TOLD = 8

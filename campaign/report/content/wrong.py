@@ -11,7 +11,7 @@ from campaign.archive import ArchivedTrial, RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
 from campaign.experiments.conclusions.stabilization import method
-from campaign.trial import Outcome, SafeState
+from campaign.recording import Outcome, SafeState
 
 WORDS = {
     Outcome.LIMIT: "ended at a limit",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,15 +30,22 @@ def figure_csv(figure: Figure) -> str:
     out as its drawing is, to its own points, extremes included.
     """
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    text.write(f"{','.join(COLUMNS)}\n")
     points = points_of_each(figure)
     titles = _names([panel.title for panel in figure.panels])
     for panel, title in zip(figure.panels, titles, strict=True):
         units = _unit(panel.x), _unit(panel.y)
         names = _names([curve.label or curve.series for curve in panel.curves])
         for curve, name in zip(panel.curves, names, strict=True):
-            writer.writerows((title, name, *row, *units) for row in _rows(curve, panel, points))
+            before, behind = _quoted(title, name), _quoted(*units)
+            text.writelines(f"{before},{row},{behind}\n" for row in _rows(curve, panel, points))
+    return text.getvalue()
+
+
+def _quoted(*cells: str) -> str:
+    """Cells of a row, quoted where they need it."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
     return text.getvalue()
 
 
@@ -48,7 +55,8 @@ def points_of_each(figure: Figure) -> int:
     return max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
 
 
-def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[tuple[str, ...]]:
+def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[str]:
+    """`x,y,low,high` of each point that is written."""
     x, y = _displayed(curve.x, panel.x), _displayed(curve.y, panel.y)
     count = min(len(x), len(y))
     x, y, low, high = x[:count], y[:count], curve.low, curve.high
@@ -57,13 +65,12 @@ def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[tuple[str, ...]]:
         low, high, y = edge, curve.y, np.full(count, np.nan)
     if low is not None and high is not None:
         ends = [_displayed(end, panel.y) for end in (low, high)]
-        columns: tuple[Array, ...] = (x, y, *ends)
+        columns = [_texts(each) for each in (x, y, *ends)]
     else:
         thinned = "points" not in curve.style
         x, y = decimate(x, y, points) if thinned else (x, y)
-        empty = np.full(len(x), np.nan)
-        columns = (x, y, empty, empty)
-    return zip(*(map(_text, column.tolist()) for column in columns), strict=False)
+        columns = [_texts(x), _texts(y), repeat(""), repeat("")]
+    return map(",".join, zip(*columns, strict=False))
 
 
 def _names(titles: list[str]) -> list[str]:
@@ -83,5 +90,9 @@ def _unit(axis: Axis) -> str:
     return axis.display or axis.unit
 
 
-def _text(value: float) -> str:
-    return f"{value:.{DIGITS}g}" if math.isfinite(value) else ""
+def _texts(values: Array) -> Iterable[str]:
+    """Each number in `DIGITS`; nothing for one that is not finite."""
+    texts = map(f"%.{DIGITS}g".__mod__, values.tolist())
+    if np.isfinite(values).all():
+        return texts
+    return (text if text[-1].isdigit() else "" for text in texts)

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
+from campaign.report.drawing.settled import settled
 from campaign.report.drawing.ticks import set_ticks
 from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
 from campaign.result import Axis, Figure, Panel
@@ -41,6 +43,7 @@ from campaign.text import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_svg import RendererSVG
     from matplotlib.figure import Figure as Canvas
 
 Array = NDArray[np.float64]
@@ -139,7 +142,7 @@ def series_of(figure: Figure) -> list[str]:
 def canvas(width: float, height: float) -> Iterator[Canvas]:
     """An empty matplotlib figure (inches) under the report's own style, whatever the user's is."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
     from campaign.report.drawing.margins import Margins
@@ -148,12 +151,20 @@ def canvas(width: float, height: float) -> Iterator[Canvas]:
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         sheet = Canvas(figsize=(width, height), dpi=72)  # as an SVG document is drawn
-        # One renderer measures all texts of the sheet; else each question begins a document anew.
-        size = 72 * width, 72 * height
-        measuring = RendererSVG(*size, io.StringIO(), image_dpi=72)  # type: ignore[no-untyped-call]
-        FigureCanvasSVG(sheet).get_renderer = lambda: measuring  # type: ignore[attr-defined]
+        FigureCanvasSVG(sheet).get_renderer = _measuring  # type: ignore[attr-defined]
         sheet.set_layout_engine(Margins())
         yield sheet
+
+
+@cache
+def _measuring() -> RendererSVG:
+    """What measures the texts of all sheets, and so remembers those that many have.
+
+    Without one, each question would begin a document anew. Its size means nothing to a text's.
+    """
+    from matplotlib.backends.backend_svg import RendererSVG
+
+    return RendererSVG(72.0, 72.0, io.StringIO(), image_dpi=72)  # type: ignore[no-untyped-call]
 
 
 def to_svg(sheet: Canvas) -> str:
@@ -168,7 +179,8 @@ def to_svg(sheet: Canvas) -> str:
         engine.execute(sheet)
         sheet.set_layout_engine(None)
     out = io.StringIO()
-    sheet.savefig(out, format="svg", metadata=METADATA)
+    with settled(sheet.axes):
+        sheet.savefig(out, format="svg", metadata=METADATA)
     keep_as_pdf(sheet)
     text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
     text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.layout_engine import LayoutEngine
 from matplotlib.transforms import Bbox
 
+from campaign.report.drawing.settled import settled
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
@@ -76,7 +78,8 @@ def _ticks(ax: Axes) -> list[Any]:
 
 
 def _around(ax: Axes) -> Room:
-    outer, inner = ax.get_tightbbox(for_layout_only=True), ax.get_window_extent()
+    with settled([ax]):
+        outer, inner = ax.get_tightbbox(for_layout_only=True), ax.get_window_extent()
     if outer is None:
         return Room(0.0, 0.0, 0.0, 0.0)
     figure = ax.get_figure(root=True)

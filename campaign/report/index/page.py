@@ -147,9 +147,12 @@ def _status(run: RunSummary) -> str:
 
 def _trials(run: RunSummary) -> str:
     """`18 of 20 trials completed, 1 failed, 1 not executed.`"""
-    parts = [f"{run.trials - run.failed} of {run.planned} trials completed"]
+    completed = run.trials - run.failed - run.interrupted
+    parts = [f"{completed} of {run.planned} trials completed"]
     if run.failed:
         parts.append(f"{run.failed} failed")
+    if run.interrupted:
+        parts.append(f"{run.interrupted} interrupted")
     if run.untold:
         they = "it was" if run.untold == 1 else "they were"
         parts.append(f"of {run.untold} the journal does not say any more whether {they} executed")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from campaign.archive.reading.damage_words import in_words
 from campaign.channels import RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.identification.relative_rate import relative_rate
+from campaign.recording import Channel, Recording
 from campaign.report.content import tables
 from campaign.report.content.trial_account import TrialAccount, account_of, lost_account
 from campaign.report.drawing.legible import LEGIBLE
@@ -22,7 +23,6 @@ from campaign.report.page.templates import Templates
 from campaign.report.page.trial_links import FOLDER, trial_file
 from campaign.report.palette import looks, variables
 from campaign.text import number, pretty_unit
-from campaign.trial import Channel, Recording
 from campaign.units import convert
 
 Array = NDArray[np.float64]

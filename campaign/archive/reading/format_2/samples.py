@@ -14,7 +14,7 @@ from pydantic import BaseModel, TypeAdapter
 from campaign.archive.reading import guarded
 from campaign.archive.reading.recorded import LazyChannels
 from campaign.errors import ArchiveError
-from campaign.trial import Channel, ChannelInfo, Ending, Event, Recording
+from campaign.recording import Channel, ChannelInfo, Ending, Event, Recording
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.format_2.attempts import read_earlier
 from campaign.archive.reading.format_2.trials import read_trials
 from campaign.archive.reading.provenance import read_provenance
-from campaign.archive.reading.run_reader import Glance, RunReader
-from campaign.trial import SafeState
+from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
+from campaign.recording import SafeState
 
 
 def read_sealed(path: Path) -> RunReader:
@@ -56,13 +56,16 @@ def read_glance(path: Path) -> Glance:
         run = guarded.group_at(file, "run", "NXentry")
         outcome = guarded.group_at(run, "outcome", "NXcollection")
         header = read_header(run, DamageList(path))
+        status = RunStatus(guarded.text_at(outcome, "status"))
+        interrupted = interrupted_trials(status, lambda: _note(path, run, "journal"))
         return Glance(
             header=header,
             planned=header.trials,
-            status=RunStatus(guarded.text_at(outcome, "status")),
+            status=status,
             ended=guarded.text_at(run, "end_time"),
             finished=guarded.integer_at(outcome, "trials_finished"),
-            failed=guarded.integer_at(outcome, "trials_failed"),
+            failed=guarded.integer_at(outcome, "trials_failed") - interrupted,
+            interrupted=interrupted,
         )
 
 

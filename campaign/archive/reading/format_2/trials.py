@@ -18,7 +18,8 @@ from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.format_2.samples import StoredSamples
 from campaign.errors import ArchiveError
-from campaign.trial import Ending, Fault, Outcome, SafeState, Tree, Trial, canonical_json
+from campaign.recording import Ending, Fault, Outcome, SafeState
+from campaign.trial import Tree, Trial, canonical_json
 
 _ENTRY = re.compile(r"trial_([0-9]{5,10})")
 _TREE: TypeAdapter[Tree] = TypeAdapter(Tree)
