@@ -1,0 +1,233 @@
+"""Crossovers, margins and bandwidth of a loop, from a fitted function or from its points.
+
+Of a fit they have intervals by the delta method. What lies beyond the last frequency is a bound: no
+fit is followed there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.identification.frequency.measured import MeasuredResponse, closed_from_open
+from campaign.identification.frequency.modes import of_fit
+from campaign.identification.frequency.orders import Chosen, with_order
+from campaign.identification.frequency.rational import RationalFit
+from campaign.identification.frequency_response import Array, ComplexArray
+from campaign.identification.servo import (
+    MINUS_3_DB,
+    ONE_SIDED,
+    Crossing,
+    ServoCharacteristics,
+    characteristics,
+)
+
+GRID = 8000
+"""Frequencies between the first and the last at which crossings are looked for."""
+DECIBEL = 20.0 / math.log(10.0)
+METHOD = "rational function with a delay, delta method"
+STEP = 1e-5
+"""of the logarithm of frequency, for slopes."""
+
+
+def measured_margins(loop: MeasuredResponse) -> ServoCharacteristics:
+    """Of a measured open loop, between its points; the interval holds noise and interpolation."""
+    return characteristics(closed_from_open(loop).response)
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """Log L and its derivatives by the parameters, of a fit of L or of T = L / (1 + L)."""
+
+    fit: RationalFit
+    closed: bool
+
+    def logarithm(self, frequency: Array) -> ComplexArray:
+        """Log L, its phase between -pi and pi, shape (n,)."""
+        value = self.fit.value(frequency)
+        if self.closed:
+            value = value / (1.0 - value)
+        return np.asarray(np.log(np.where(np.abs(value) > 0, value, 1e-300)))
+
+    def jacobian(self, frequency: float) -> ComplexArray:
+        """Derivative of log L by the parameters, shape (p,)."""
+        at = np.array([frequency])
+        by = self.fit.log_jacobian(at)[0]
+        return np.asarray(by / (1.0 - self.fit.value(at)[0]) if self.closed else by)
+
+    def slope(self, frequency: float) -> complex:
+        """Derivative of log L by log frequency."""
+        at = frequency * np.exp(np.array([-STEP, STEP]))
+        before, after = self.logarithm(at)
+        change = complex(after - before)
+        turn = math.remainder(change.imag, 2.0 * math.pi)
+        return complex(change.real, turn) / (2.0 * STEP)
+
+
+def fitted_margins(fit: RationalFit, closed: bool = False) -> ServoCharacteristics:
+    """Bandwidth, crossovers and margins of the loop.
+
+    Args:
+        fit: of the open loop L with unit feedback; `closed`: of T = L / (1 + L).
+
+    A gain margin is read wherever L is real and negative above the first gain crossover; without
+    one it is bounded by the gain at the last frequency. Without a gain crossover it is said on
+    which side of the band it lies.
+    """
+    loop = _Loop(fit, closed)
+    frequency = np.geomspace(fit.lowest, fit.highest, GRID)
+    log = loop.logarithm(frequency)
+    gain = [
+        _crossing(loop, "0 dB", at, _gain, _phase, ("gain_crossover", "phase_margin", "rad"))
+        for at in _zeros(frequency, log.real)
+    ]
+    widths = [
+        _crossing(loop, "-3 dB", at, _fall, None, ("bandwidth", "", ""))
+        for at in _zeros(frequency, _fall(log), falling=True)
+    ]
+    half = []
+    if gain:
+        names = ("phase_crossover", "gain_margin", "dB")
+        half = [
+            _crossing(loop, "-180 deg", at, _phase, _margin, names)
+            for at in _zeros(frequency, np.imag(-np.exp(log)))
+            if at > gain[0].frequency.value and math.cos(loop.logarithm(np.array([at]))[0].imag) < 0
+        ]
+    phases = [each.margin for each in gain if each.margin is not None]
+    least = min(phases, key=lambda each: abs(each.value), default=None)
+    margins = [each.margin for each in half if each.margin is not None]
+    bound = None if half else _gain_bound(loop, bool(gain))
+    gain_margin = min(margins, key=lambda each: each.value, default=None) or bound
+    bandwidth = widths[0].frequency if widths else _outside("bandwidth", fit, _fall(log))
+    return ServoCharacteristics(
+        bandwidth,
+        gain_margin or _none("gain_margin", "dB", "the gain does not fall below 1 in the band"),
+        least or _none("phase_margin", "rad", _where(log.real)),
+        bound,
+        (*widths, *gain, *half),
+    )
+
+
+def chosen_margins(chosen: Chosen, closed: bool = False) -> ServoCharacteristics:
+    """Those of the order chosen, with what others say that are not ruled out."""
+    best = fitted_margins(chosen.fit, closed)
+    others = [fitted_margins(each, closed) for each in chosen.near]
+
+    def told(estimate: Estimate, name: str) -> Estimate:
+        if estimate.kind != "number":
+            return estimate
+        values = [getattr(each, name) for each in others]
+        return with_order(estimate, [each.value for each in values if each.kind == "number"])
+
+    return replace(
+        best,
+        bandwidth=told(best.bandwidth, "bandwidth"),
+        gain_margin=told(best.gain_margin, "gain_margin"),
+        phase_margin=told(best.phase_margin, "phase_margin"),
+    )
+
+
+Quantity = Callable[[ComplexArray], Array]
+
+
+def _gain(log: ComplexArray) -> Array:
+    return np.asarray(log.real)
+
+
+def _phase(log: ComplexArray) -> Array:
+    """Over -180 deg, within half a turn."""
+    return np.asarray(np.angle(-np.exp(1j * log.imag)))
+
+
+def _margin(log: ComplexArray) -> Array:
+    return np.asarray(-DECIBEL * log.real)
+
+
+def _fall(log: ComplexArray) -> Array:
+    """Log of |T| over -3 dB."""
+    return np.asarray(-np.log(np.abs(1.0 + np.exp(-log)) * MINUS_3_DB))
+
+
+def _zeros(frequency: Array, values: Array, falling: bool = False) -> list[float]:
+    """Where values pass zero, by linear interpolation over log frequency (Hz)."""
+    sign = np.sign(values)
+    passed = (sign[:-1] > 0) & (sign[1:] <= 0)
+    if not falling:
+        passed |= (sign[:-1] < 0) & (sign[1:] >= 0)
+    found = []
+    for k in np.flatnonzero(passed):
+        share = values[k] / (values[k] - values[k + 1])
+        found.append(float(frequency[k] * (frequency[k + 1] / frequency[k]) ** share))
+    return found
+
+
+def _crossing(
+    loop: _Loop,
+    level: str,
+    at: float,
+    zero: Quantity,
+    value: Quantity | None,
+    names: tuple[str, str, str],
+) -> Crossing:
+    """With intervals: the place moves until `zero` vanishes again, the value with it."""
+    log, by, slope = loop.logarithm(np.array([at])), loop.jacobian(at), loop.slope(at)
+    covariance, misfit = loop.fit.scatter, loop.fit.misfit
+
+    def derivative(quantity: Quantity, change: ComplexArray) -> Array:
+        step = 1e-6
+        sides = [quantity(log + 1j * step * k) for k in (-1.0, 1.0)]
+        by_phase = float(sides[1][0] - sides[0][0]) / (2.0 * step)
+        sides = [quantity(log + step * k) for k in (-1.0, 1.0)]
+        by_gain = float(sides[1][0] - sides[0][0]) / (2.0 * step)
+        return np.asarray(by_gain * change.real + by_phase * change.imag)
+
+    along = float(derivative(zero, np.array(slope)))
+    moved = -derivative(zero, by) / (along if abs(along) > 0 else 1e-300)
+
+    def error(gradient: Array) -> float:
+        return math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
+
+    place = of_fit(names[0], at, "Hz", at * error(moved), misfit, METHOD)
+    if value is None:
+        return Crossing(level, place)
+    total = derivative(value, by) + float(derivative(value, np.array(slope))) * moved
+    margin = of_fit(names[1], float(value(log)[0]), names[2], error(total), misfit, METHOD)
+    return Crossing(level, place, margin)
+
+
+def _gain_bound(loop: _Loop, crossed: bool) -> Estimate | None:
+    """-|L| at the last frequency less 1.645 standard errors (dB); None where that is no margin."""
+    last = loop.fit.highest
+    by = loop.jacobian(last).real
+    error = math.sqrt(max(float(by @ loop.fit.scatter @ by), 0.0))
+    level = DECIBEL * (float(loop.logarithm(np.array([last]))[0].real) + ONE_SIDED * error)
+    if not crossed or level >= 0 or loop.fit.misfit:
+        return None
+    reason = f"a bound: gain at {last:.4g} Hz less 1.645 standard errors, if it rises no more"
+    return Estimate("gain_margin", -level, "dB", method=METHOD, kind="at least", reason=reason)
+
+
+def _outside(name: str, fit: RationalFit, above: Array) -> Estimate:
+    if np.all(above > 0):
+        return _bound(name, fit.highest, "at least", "the band ends before it")
+    if np.all(above < 0):
+        return _bound(name, fit.lowest, "at most", "the band begins after it")
+    return _none(name, "Hz", "the gain does not fall through -3 dB in the band")
+
+
+def _bound(name: str, value: float, kind: Any, reason: str) -> Estimate:
+    return Estimate(name, value, "Hz", method=METHOD, kind=kind, reason=f"a bound: {reason}")
+
+
+def _none(name: str, unit: str, reason: str) -> Estimate:
+    return Estimate.without_interval(name, math.nan, unit, reason)
+
+
+def _where(gain: Array) -> str:
+    side = "above" if np.all(gain > 0) else "below"
+    return f"the open loop does not cross 0 dB in the band: its gain is {side} 1 all along"

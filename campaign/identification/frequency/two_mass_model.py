@@ -1,0 +1,109 @@
+"""The responses of two inertias on a spring, and where a fit of them is started."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from campaign.identification.frequency.measured import MeasuredResponse
+from campaign.identification.frequency.rational import delays_to_try
+from campaign.identification.frequency_response import Array, ComplexArray
+
+Side = Literal["motor", "load"]
+STARTS = 8
+"""Best places of a grid that a fit is started from."""
+RATIOS = (0.25, 0.4, 0.55, 0.7, 0.82, 0.92, 0.97)
+"""Antiresonance over resonance at which it is started."""
+DAMPINGS = (0.01, 0.05, 0.2)
+"""Damping ratios of the antiresonance at which it is started."""
+
+
+def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexArray:
+    """Rate over torque at `frequency` (Hz), shape (n,).
+
+    `point` begins with log J1, log (J2 / J1), log k, d, b1, b2, kg (SI).
+    """
+    s = 2j * np.pi * frequency
+    first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
+    second = first * ratio
+    coupling = spring / s + point[3]
+    motor, load = first * s + point[4] + point[6] / s, second * s + point[5]
+    under = motor * load + coupling * (motor + load)
+    under = np.where(np.abs(under) > 0, under, 1e-300)
+    over = load + coupling if side == "motor" else coupling
+    return np.asarray(over / under * np.exp(-s * delay))
+
+
+def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> Array:
+    """What a step of each parameter is measured in.
+
+    1 for logarithms, damping and stiffness of the whole inertia at the middle frequency, a tenth of
+    its period for delays.
+    """
+    measured = responses[sides[0]]
+    middle = 2.0 * np.pi * float(np.sqrt(measured.frequency[0] * measured.frequency[-1]))
+    inertia = float(np.median(1.0 / (2.0 * np.pi * measured.frequency * np.abs(measured.values))))
+    rest = inertia * middle
+    sizes = [1.0, 1.0, 1.0, 0.1 * rest, 0.1 * rest, 0.1 * rest, rest * middle]
+    return np.array([*sizes, *[0.1 / middle] * len(sides)])
+
+
+def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> list[Array]:
+    """The best of a grid of resonances, antiresonances and dampings, by the logarithm of gain."""
+    frequency = np.concatenate([responses[side].frequency for side in sides])
+    candidates = np.geomspace(frequency.min() * 1.05, frequency.max() * 1.2, 48)
+    rows: list[tuple[float, Array]] = []
+    for resonance in candidates:
+        for ratio in RATIOS:
+            for damping in DAMPINGS:
+                second = 1.0 / ratio**2 - 1.0  # J2 over J1 = 1
+                zero = 2.0 * np.pi * resonance * ratio
+                spring = second * zero**2
+                point = np.zeros(7 + len(sides))
+                point[1], point[2] = math.log(second), math.log(spring)
+                point[3] = 2.0 * damping * math.sqrt(spring * second)
+                off = np.concatenate(
+                    [
+                        np.log(
+                            np.abs(model(responses[side].frequency, point, side, 0.0))
+                            / np.maximum(np.abs(responses[side].values), 1e-300)
+                        )
+                        for side in sides
+                    ]
+                )
+                scale = float(np.median(off))  # the model's gain falls with the inertia
+                point[[0, 2]] += scale
+                point[3] *= math.exp(scale)
+                rows.append((float(np.mean(np.minimum(np.abs(off - scale), 1.0))), point))
+    rows.sort(key=lambda row: row[0])
+    kept = [point for _, point in rows[:STARTS]]
+    delays = [float(np.median(delays_to_try(responses[side]))) for side in sides]
+    delayed = []
+    for point in kept[: STARTS // 2]:
+        later = point.copy()
+        later[7:] = delays
+        delayed.append(later)
+    return kept + delayed
+
+
+def mode_damping(point: Array) -> float:
+    """Damping ratio of the resonance: of the poles of `model` with the largest frequency."""
+    first, ratio, spring = np.exp(point[:3])
+    coupling = np.array([spring, point[3]])  # times s, lowest power first
+    motor = np.array([point[6], point[4], first])  # times s
+    load = np.array([point[5], first * ratio])
+    product = np.polynomial.polynomial
+    # (motor / s) (load) + (coupling / s) (motor / s + load), all times s².
+    under = product.polyadd(
+        product.polymul(product.polymul(motor, load), [0.0, 1.0]),
+        product.polymul(coupling, product.polyadd(motor, product.polymul(load, [0.0, 1.0]))),
+    )
+    roots = product.polyroots(under)
+    pairs = roots[np.abs(roots.imag) > 0]
+    if not len(pairs):
+        return 1.0
+    root = pairs[np.argmax(np.abs(pairs))]
+    return float(-root.real / abs(root))

@@ -1,0 +1,177 @@
+"""A motion made ready for regression: filtered without phase, differentiated, decimated.
+
+What is measured is a position (or a rate); a regression needs rate and acceleration, and both sides
+of it filtered alike. Source: Janot, Vandanjon, Gautier, "A generic instrumental variable approach
+for industrial robot identification", IEEE Trans. Control Syst. Technol. 22 (2014), section II.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+ORDER = 4
+"""of the Butterworth low-pass, which runs forward and backward."""
+DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND = 8, 0.05, 0.8
+"""Chebyshev low-pass of the decimation: order, ripple (dB), share of the new Nyquist frequency."""
+LOW_PASS, LOW_PASS_SHARE = 100.0, 0.2
+"""Hz, and share of the sample rate: the smaller is the corner, where nobody says another."""
+REGRESSION_RATE = 100.0
+"""Hz; samples are decimated to about this where nobody says how far."""
+SHORTEST = 8
+"""Decimated samples that a piece of a motion must have to be used."""
+
+
+@dataclass(frozen=True)
+class Filtering:
+    """How a motion is made ready.
+
+    Attributes:
+        low_pass: corner of the position's (or the rate's) zero-phase low-pass (Hz).
+        decimation: of how many samples one is kept, behind a low-pass of its own; 1 for all.
+        skip: samples at the beginning that are left out, after differentiation.
+        slowest: rate (rad/s, or m/s) below which rows count as standing still and are left out,
+            with one beside them: there friction is whatever holds the axis.
+    """
+
+    low_pass: float
+    decimation: int = 1
+    skip: int = 0
+    slowest: float = 0.0
+
+    @classmethod
+    def for_rate(cls, sample_rate: float) -> Self:
+        """What is taken where nobody says anything, for samples at this rate (Hz)."""
+        corner = min(LOW_PASS, LOW_PASS_SHARE * sample_rate)
+        return cls(corner, max(1, round(sample_rate / REGRESSION_RATE)))
+
+    @property
+    def half_band(self) -> Self:
+        """With half of the band that rows have: noise is less, and so is what bends."""
+        return replace(self, decimation=2 * self.decimation)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """An evenly sampled motion and what drove it, before decimation; arrays of shape (n,).
+
+    Attributes:
+        time: s.
+        position: rad, or m of a linear axis.
+        rate, acceleration: its derivatives, without phase.
+        force: what drives the axis (N m, or N), as recorded.
+        temperature: K; None where nobody recorded it.
+    """
+
+    time: Array
+    position: Array
+    rate: Array
+    acceleration: Array
+    force: Array
+    temperature: Array | None = None
+
+    @property
+    def sample_rate(self) -> float:
+        """Hz."""
+        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+
+
+def motion_of_position(
+    time: Array, position: Array, force: Array, low_pass: float, temperature: Array | None = None
+) -> Motion:
+    """From a measured position, shape (n,): low-passed once, differentiated twice."""
+    rate = sample_rate_of(time)
+    smooth = zero_phase(position, low_pass, rate)
+    first = np.gradient(smooth, 1.0 / rate)
+    return Motion(time, smooth, first, np.gradient(first, 1.0 / rate), force, temperature)
+
+
+def motion_of_rate(
+    time: Array, rate: Array, force: Array, low_pass: float, temperature: Array | None = None
+) -> Motion:
+    """From a measured rate, shape (n,); the position begins at zero, and drifts with its bias."""
+    per_second = sample_rate_of(time)
+    smooth = zero_phase(rate, low_pass, per_second)
+    steps = 0.5 * (smooth[1:] + smooth[:-1]) / per_second
+    position = np.concatenate([[0.0], np.cumsum(steps)])
+    return Motion(time, position, smooth, np.gradient(smooth, 1.0 / per_second), force, temperature)
+
+
+def sample_rate_of(time: Array) -> float:
+    """Hz, of even times (s), shape (n,)."""
+    return float((len(time) - 1) / (time[-1] - time[0]))
+
+
+def zero_phase(samples: Array, low_pass: float, sample_rate: float) -> Array:
+    """Butterworth low-pass, forward and backward, shape (n,); as it is where the corner is beyond
+    what can be sampled.
+
+    Raises ValueError for fewer samples than the filter needs to begin with.
+    """
+    from scipy.signal import butter, filtfilt
+
+    if low_pass >= 0.5 * sample_rate:
+        return np.asarray(samples, dtype=float)
+    b, a = butter(ORDER, low_pass / (0.5 * sample_rate))
+    _refuse_short(len(samples), 3 * ORDER)
+    return np.asarray(filtfilt(b, a, samples, padlen=3 * ORDER))
+
+
+def decimated(columns: Array, factor: int) -> Array:
+    """Every `factor`-th row of `columns`, shape (n, k), behind a zero-phase Chebyshev low-pass.
+
+    The phase is that of MATLAB's `decimate`: the last sample is always among those kept. Both sides
+    of a regression pass the same filter, so that it weights them alike. What is constant passes as
+    it is: a filter of even order would take its ripple from it.
+    """
+    from scipy.signal import cheby1, filtfilt
+
+    if factor == 1:
+        return columns
+    _refuse_short(len(columns), 3 * DECIMATOR_ORDER)
+    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
+    smooth = filtfilt(b, a, columns, axis=0, padlen=3 * DECIMATOR_ORDER)
+    smooth *= (a.sum() / b.sum()) ** 2
+    return np.asarray(smooth[first_kept(len(columns), factor) :: factor])
+
+
+def first_kept(count: int, factor: int) -> int:
+    """Index of the first of `count` samples that decimation keeps."""
+    return factor - 1 - (factor * -(-count // factor) - count)
+
+
+def kept_times(motion: Motion, filtering: Filtering) -> Array:
+    """Times (s) of the rows that are left of a motion."""
+    time = motion.time[filtering.skip :]
+    if filtering.decimation == 1:
+        return time
+    return time[first_kept(len(time), filtering.decimation) :: filtering.decimation]
+
+
+def later(samples: Array, delay: float, sample_rate: float) -> Array:
+    """What a signal of shape (n,) is `delay` (s) later, by cubic interpolation; ends are held."""
+    from scipy.interpolate import CubicSpline
+
+    if delay == 0.0:
+        return samples
+    place = np.arange(len(samples), dtype=float)
+    wanted = np.clip(place - delay * sample_rate, 0.0, len(samples) - 1.0)
+    return np.asarray(CubicSpline(place, samples)(wanted))
+
+
+def whole_pieces(good: NDArray[np.bool_], fewest: int) -> Sequence[slice]:
+    """Runs of at least `fewest` samples that are all there; good: shape (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    runs = edges.reshape(-1, 2)
+    return [slice(int(a), int(b)) for a, b in runs if b - a >= fewest]
+
+
+def _refuse_short(count: int, padding: int) -> None:
+    if count <= padding:
+        raise ValueError(f"{count} samples are too few to be filtered; {padding + 1} are needed")

@@ -1,0 +1,71 @@
+"""The rows of a regression: a motion's columns and force, filtered alike and decimated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from campaign.identification.inverse.motion import (
+    Array,
+    Filtering,
+    Motion,
+    decimated,
+    kept_times,
+    later,
+)
+from campaign.identification.inverse.regression import Piece
+from campaign.identification.inverse.terms import Terms, columns
+
+
+def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+    """Columns (n, k) and force (n,) of a motion, the force `delay` (s) later than recorded.
+
+    Rows that are left out as standing still are zero: the others keep their places in time.
+    """
+    piece = all_rows(motion, terms, filtering, delay)
+    if filtering.slowest == 0.0:
+        return piece
+    moves = moving(motion, filtering)
+    return Piece(piece.columns * moves[:, None], piece.force * moves, piece.time)
+
+
+def all_rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+    """The same with those that stand still."""
+    force = later(motion.force, delay, motion.sample_rate)
+    whole = np.column_stack([columns(motion, terms), force])[filtering.skip :]
+    fewer = decimated(whole, filtering.decimation)
+    return Piece(fewer[:, :-1], fewer[:, -1], kept_times(motion, filtering))
+
+
+def moving(motion: Motion, filtering: Filtering) -> Array:
+    """1 for rows in which the axis moves, and 0 for others, shape (n,)."""
+    rate = decimated(motion.rate[filtering.skip :, None], filtering.decimation)[:, 0]
+    slow = np.abs(rate) < filtering.slowest
+    beside = slow.copy()
+    beside[1:] |= slow[:-1]
+    beside[:-1] |= slow[1:]
+    return np.asarray(~beside, dtype=float)
+
+
+def in_blocks(pieces: Sequence[Piece], count: int) -> list[list[slice]]:
+    """About `count` blocks of rows that follow each other, of nearly equal length, per piece."""
+    total = sum(len(piece.force) for piece in pieces)
+    parts = []
+    for piece in pieces:
+        own = max(1, round(count * len(piece.force) / total))
+        edges = np.linspace(0, len(piece.force), own + 1).astype(int)
+        parts.append([slice(int(a), int(b)) for a, b in pairwise(edges)])
+    return parts
+
+
+def part(piece: Piece, which: slice) -> Piece:
+    """Some rows of a piece."""
+    return Piece(piece.columns[which], piece.force[which], piece.time[which])
+
+
+def relative(residuals: Sequence[Array], forces: Sequence[Array]) -> float:
+    """Norm of what is left over, over that of the force."""
+    over = sum(float(each @ each) for each in residuals)
+    return float(np.sqrt(over / sum(float(each @ each) for each in forces)))

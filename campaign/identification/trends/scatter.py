@@ -1,0 +1,331 @@
+"""Regression on few points that scatter by more than their own errors, and may know of each other.
+
+The model is y = X b + own + between. `own` has the known covariance of the points' intervals.
+`between` is what runs scatter besides: a first-order autoregression in the order of the points,
+with standard deviation tau and correlation rho of neighbours, both unknown. With few points neither
+can be estimated and then taken as known: intervals would be too narrow by far. So they are
+integrated over. For each tau and rho, b is normal (generalised least squares); what is said of b is
+the mixture of those normals, weighted by the restricted likelihood (Harville, Journal of the
+American Statistical Association 72, 1977) times
+
+- 1 / (s + tau), s being the typical own error: the reference prior 1 / tau where the points' own
+  errors are of no weight, so that independent points without own errors have exactly Student's t;
+  nearly flat below s, as Gelman (Bayesian Analysis 1, 2006) advises for a variance that may be 0;
+- for the points' own errors, even chances that they are as large as stated, or that they are
+  `LEAST_OWN` of that or more (flat in the logarithm): what intervals have in common, such as one
+  model's misfit, is in each of them and in no difference, and then points scatter by far less than
+  their intervals are wide;
+- a flat one for rho from 0 to `MOST_RHO`: with few points, which say nothing of rho, intervals hold
+  on average over it. A negative rho makes slopes better known, not worse, and is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MOST_RHO = 0.9
+"""Largest correlation of neighbouring runs that is allowed for."""
+LEAST_OWN = 0.02
+"""Least share of the stated own errors that may be independent."""
+OWNS = 6
+"""Nodes in that share; half of the weight is on all of it."""
+RHOS = 12
+"""Nodes (Gauss and Legendre) in the correlation."""
+COARSE, FINE = 8, 60
+"""Nodes in tau: per decade when its range is looked for, and within the range."""
+NEGLIGIBLE = 18.0
+"""How far below the largest the logarithm of a weight may lie and still count."""
+FLOOR = 1e-7
+"""Own error of a point, as a share of the scatter, where it has none: matrices stay regular."""
+WIDEST = 1e3
+"""Largest tau that is tried, in standard deviations of the values."""
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """What is known of one number: normals with weights.
+
+    Attributes:
+        weight: shape (g,), sum 1.
+        mean, deviation: shape (g,).
+    """
+
+    weight: Array
+    mean: Array
+    deviation: Array
+
+    @classmethod
+    def of(cls, log_weight: Array, mean: Array, deviation: Array) -> Self:
+        """From logarithms of weights, without those that do not count."""
+        kept = log_weight > np.max(log_weight) - NEGLIGIBLE
+        return cls(_weights(log_weight[kept]), mean[kept], deviation[kept])
+
+    @property
+    def value(self) -> float:
+        """The median."""
+        return self.quantile(0.5)
+
+    def below(self, number: float) -> float:
+        """Share that lies below a number."""
+        from scipy.special import ndtr
+
+        return float(self.weight @ ndtr((number - self.mean) / self.deviation))
+
+    def quantile(self, share: float) -> float:
+        """The number below which this share lies."""
+        from scipy.optimize import brentq
+        from scipy.special import ndtri
+
+        ends = self.mean + float(ndtri(share)) * self.deviation
+        low, high = float(np.min(ends)), float(np.max(ends))
+        wide = high - low
+        if not wide > 0:
+            return low
+        return float(
+            brentq(
+                lambda x: self.below(x) - share,
+                low - 1e-6 * wide,
+                high + 1e-6 * wide,
+                xtol=1e-9 * wide,
+            )
+        )
+
+    def interval(self, level: float) -> tuple[float, float]:
+        """Equal tails."""
+        return self.quantile(0.5 - 0.5 * level), self.quantile(0.5 + 0.5 * level)
+
+    @property
+    def p(self) -> float:
+        """Two-sided, of 0: twice the smaller tail, so that it is below 5 % where 95 % exclude 0."""
+        from scipy.special import ndtr
+
+        scaled = self.mean / self.deviation
+        tails = self.weight @ ndtr(scaled), self.weight @ ndtr(-scaled)
+        return min(1.0, 2.0 * float(min(tails)))
+
+
+@dataclass(frozen=True)
+class Fits:
+    """One number of each of m models y = a + b x, over nodes of tau and rho.
+
+    Attributes:
+        log_weight: logarithm of restricted likelihood times prior times step, shape (g, m).
+        value, deviation: of b, shape (g, m).
+        pivot: the x at which y is known independently of b, shape (g, m).
+        level, level_deviation: of y there, shape (g,).
+        tau, rho: of the nodes, shape (g,).
+    """
+
+    log_weight: Array
+    value: Array
+    deviation: Array
+    pivot: Array
+    level: Array
+    level_deviation: Array
+    tau: Array
+    rho: Array
+
+    def mixture(self, model: int = 0) -> Mixture:
+        """Of one model."""
+        return Mixture.of(self.log_weight[:, model], self.value[:, model], self.deviation[:, model])
+
+    def line(self, x: float, model: int = 0) -> Mixture:
+        """Of a + b x, the model's own y without scatter."""
+        far = x - self.pivot[:, model]
+        return Mixture.of(
+            self.log_weight[:, model],
+            self.level + far * self.value[:, model],
+            np.hypot(self.level_deviation, far * self.deviation[:, model]),
+        )
+
+    def averaged(self, models: NDArray[np.intp]) -> Mixture:
+        """Of several models, shape (k,) of their places, each with the weight that it earned."""
+        return Mixture.of(
+            self.log_weight[:, models].ravel(),
+            self.value[:, models].ravel(),
+            self.deviation[:, models].ravel(),
+        )
+
+    @property
+    def evidence(self) -> Array:
+        """Logarithm of each model's integrated likelihood, shape (m,); differences count."""
+        top = self.log_weight.max(axis=0)
+        return np.asarray(top + np.log(np.exp(self.log_weight - top).sum(axis=0)))
+
+    @property
+    def typical_deviation(self) -> Array:
+        """Weighted mean deviation of each model's number, shape (m,)."""
+        weight = np.exp(self.log_weight - self.log_weight.max(axis=0))
+        return np.asarray(np.sum(weight * self.deviation, axis=0) / np.sum(weight, axis=0))
+
+    def expected(self, of: Array, model: int = 0) -> float:
+        """Mean of `tau` or `rho` under one model's weights."""
+        return float(_weights(self.log_weight[:, model]) @ of)
+
+
+def fits(values: Array, columns: Array, own: Array) -> Fits:
+    """Fit y = a + b x, for each of m columns x by itself.
+
+    Args:
+        values: y, shape (n,), in the order in which neighbours may know of each other.
+        columns: x, shape (n, m), none of them constant.
+        own: covariance of the points' own errors, shape (n, n); zeros where there are none.
+
+    Raises ValueError for fewer than three points, for values that are not finite or do not differ,
+    and for constant columns.
+    """
+    n = len(values)
+    if n < 3:
+        raise ValueError(f"{n} points; three are the least")
+    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(own))):
+        raise ValueError("values and their errors must be finite")
+    if np.any(np.ptp(columns, axis=0) == 0):
+        raise ValueError("what is regressed on does not vary")
+    size = float(np.std(values))
+    if not size > 1e-12 * float(np.max(np.abs(values))):
+        raise ValueError("the values do not differ")
+    # Units of the scatter and of the columns: the quadrature needs no others.
+    spread = np.std(columns, axis=0)
+    y = (values - np.mean(values)) / size
+    x = (columns - np.mean(columns, axis=0)) / spread
+    scaled = own / size**2
+    typical = float(np.sqrt(np.median(np.diag(scaled))))
+    rotated = [_rotated(y, x, scaled, rho) for rho in _nodes()[0]]
+    shares = _shares(scaled)
+    taus = _range(rotated, typical, shares)
+    found = [
+        _fit(each, taus, typical, math.log(weight), shares)
+        for each, weight in zip(rotated, _nodes()[1], strict=True)
+    ]
+    log_weight, value, deviation, pivot, level, level_deviation = (
+        np.concatenate(parts) for parts in zip(*found, strict=True)
+    )
+    unit = size / spread
+    return Fits(
+        log_weight,
+        value * unit,
+        deviation * unit,
+        pivot * spread + np.mean(columns, axis=0),
+        level * size + float(np.mean(values)),
+        level_deviation * size,
+        np.tile(np.outer(shares[0], taus).ravel(), RHOS) * size,
+        np.repeat(_nodes()[0], len(taus) * len(shares[0])),
+    )
+
+
+def _nodes() -> tuple[Array, Array]:
+    places, weights = np.polynomial.legendre.leggauss(RHOS)
+    return 0.5 * MOST_RHO * (places + 1.0), 0.5 * MOST_RHO * weights
+
+
+def _shares(own: Array) -> tuple[Array, Array]:
+    """Shares of the own errors that are independent, and logarithms of their weights.
+
+    All of them where there are none, and where some of them are known to be common to some points.
+    """
+    if not own.any() or np.any(own != np.diag(np.diag(own))):
+        return np.ones(1), np.zeros(1)
+    places, weights = np.polynomial.legendre.leggauss(OWNS - 1)
+    shares = LEAST_OWN ** (0.5 * (places + 1.0))
+    return np.append(1.0, shares), np.log(0.5 * np.append(1.0, 0.5 * weights))
+
+
+@dataclass(frozen=True)
+class _Rotated:
+    """Everything in coordinates in which both covariances are diagonal: own 1, between `size`."""
+
+    y: Array
+    one: Array
+    x: Array
+    size: Array
+    logarithm: float
+
+
+def _rotated(y: Array, x: Array, own: Array, rho: float) -> _Rotated:
+    from scipy.linalg import eigh, solve_triangular
+
+    n = len(y)
+    known = own + FLOOR**2 * np.eye(n)
+    lower = np.linalg.cholesky(known)
+    steps = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    between = rho**steps
+    half = solve_triangular(lower, between, lower=True)
+    size, turn = eigh(solve_triangular(lower, half.T, lower=True))
+    rows = turn.T @ solve_triangular(lower, np.column_stack([y, np.ones(n), x]), lower=True)
+    return _Rotated(
+        rows[:, 0],
+        rows[:, 1],
+        rows[:, 2:],
+        np.maximum(size, 0.0),
+        2.0 * float(np.sum(np.log(np.diag(lower)))),
+    )
+
+
+def _range(rotated: list[_Rotated], typical: float, shares: tuple[Array, Array]) -> Array:
+    """Nodes of tau that hold nearly all of the weight, shape (`FINE`,), even in the logarithm."""
+    least = max(0.02 * typical, FLOOR)
+    decades = math.log10(WIDEST / least)
+    taus = np.geomspace(least, WIDEST, max(8, round(COARSE * decades)))
+    best = np.full(len(taus), -np.inf)
+    for each in (rotated[0], rotated[-1]):
+        log_weight = _fit(each, taus, typical, 0.0, shares)[0]
+        near = np.max(log_weight - log_weight.max(axis=0), axis=1)
+        best = np.maximum(best, near.reshape(-1, len(taus)).max(axis=0))
+    kept = np.flatnonzero(best > -NEGLIGIBLE)
+    first, last = max(kept[0] - 1, 0), min(kept[-1] + 1, len(taus) - 1)
+    return np.geomspace(taus[first], taus[last], FINE)
+
+
+def _fit(
+    at: _Rotated, taus: Array, typical: float, weight: float, shares: tuple[Array, Array]
+) -> tuple[Array, ...]:
+    """As the first fields of `Fits`, for one rho: shapes (k t, m) and (k t,).
+
+    There are t nodes of tau over the share of the own errors, and k of that share: it is a factor
+    of all deviations, so that nothing has to be worked out anew for it.
+    """
+    spread = 1.0 + taus[:, None] ** 2 * at.size
+    w = 1.0 / spread
+    ones, ones_y = w @ at.one**2, w @ (at.one * at.y)
+    cross, square = w @ (at.one[:, None] * at.x), w @ at.x**2
+    across = w @ (at.x * at.y[:, None])
+    inner = square - cross**2 / ones[:, None]
+    rest = across - cross * (ones_y / ones)[:, None]
+    value = rest / inner
+    constant = w @ at.y**2 - ones_y**2 / ones
+    left = np.maximum(constant[:, None] - rest * value, 0.0)
+    log_spread = np.sum(np.log(spread), axis=1) + at.logarithm
+    prior = np.log(taus / (typical + taus))  # in the logarithm of tau
+    base = (
+        weight
+        + prior[:, None]
+        - 0.5 * (log_spread[:, None] + np.log(ones)[:, None] + np.log(inner))
+    )
+    share, log_share = shares
+    n = len(at.y)
+    log_weight = np.concatenate(
+        [base + w - (n - 2) * math.log(k) - 0.5 * left / k**2
+         for k, w in zip(share, log_share, strict=True)]
+    )  # fmt: skip
+    deviation, level_deviation = 1.0 / np.sqrt(inner), 1.0 / np.sqrt(ones)
+    count = len(share)
+    return (
+        log_weight,
+        np.tile(value, (count, 1)),
+        np.concatenate([k * deviation for k in share]),
+        np.tile(cross / ones[:, None], (count, 1)),
+        np.tile(ones_y / ones, count),
+        np.concatenate([k * level_deviation for k in share]),
+    )
+
+
+def _weights(logarithms: Array) -> Array:
+    weight = np.exp(logarithms - np.max(logarithms))
+    return np.asarray(weight / np.sum(weight))

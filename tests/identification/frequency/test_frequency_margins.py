@@ -1,0 +1,127 @@
+"""Margins of fitted loops: closed forms, coverage over random loops, bounds beyond the band."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from campaign.identification.frequency.margins import (
+    chosen_margins,
+    fitted_margins,
+    measured_margins,
+)
+from campaign.identification.frequency.measured import closed_from_open
+from campaign.identification.frequency.orders import chosen_order
+from campaign.identification.frequency.rational import rational_fit
+from tests.identification.coverage import holds, rejected
+from tests.identification.frequency.measured import noisy, scatter_as_told
+from tests.identification.loops import random_loop
+
+# L = w / s exp(-s t): 0 dB at w, phase margin 90 deg - w t, -180 deg at pi / (2 t).
+CROSSOVER, DELAY = 2 * math.pi * 5.0, 0.01
+PHASE_MARGIN = math.pi / 2 - CROSSOVER * DELAY
+GAIN_MARGIN = 20 * math.log10(math.pi / (2 * DELAY) / CROSSOVER)
+
+
+def loop(frequency: np.ndarray) -> np.ndarray:
+    s = 2j * np.pi * frequency
+    return CROSSOVER / s * np.exp(-s * DELAY)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_an_integrator_with_a_delay_has_its_closed_form(closed: bool) -> None:
+    frequency = np.geomspace(0.5, 60.0, 80)
+    truth = loop(frequency)
+    measured = noisy(frequency, truth, 1e-3 * np.abs(truth), np.random.default_rng(1))
+    if closed:
+        # T = w exp(-s t) / (s + w exp(-s t)) is no such function; up to the crossover it nearly is.
+        kept = frequency < 12
+        part = closed_from_open(measured).at(kept)
+        found = chosen_margins(chosen_order(part), closed=True)
+        assert found.phase_margin.value == pytest.approx(PHASE_MARGIN, abs=0.01)
+        return
+    found = fitted_margins(rational_fit(measured, (0, 1)))
+    assert holds(found.phase_margin, PHASE_MARGIN)
+    assert holds(found.gain_margin, GAIN_MARGIN)
+    assert found.phase_margin.half_width < 0.002
+    assert found.gain_margin.half_width < 0.1
+    crossings = {each.level: each for each in found.crossings}
+    assert crossings["0 dB"].frequency.value == pytest.approx(5.0, rel=1e-3)
+    assert crossings["-180 deg"].frequency.value == pytest.approx(25.0, rel=1e-3)
+
+
+def test_beyond_the_last_frequency_there_is_a_bound() -> None:
+    frequency = np.geomspace(0.5, 15.0, 80)
+    truth = loop(frequency)
+    measured = noisy(frequency, truth, 1e-3 * np.abs(truth), np.random.default_rng(2))
+    found = fitted_margins(rational_fit(measured, (0, 1)))
+    assert found.gain_margin.kind == "at least"
+    assert found.gain_margin.value == pytest.approx(20 * math.log10(3), abs=0.1)
+    assert found.gain_margin.value < GAIN_MARGIN
+    short = measured.at(frequency < 4.0)
+    found = fitted_margins(rational_fit(short, (0, 1)))
+    assert math.isnan(found.phase_margin.value)
+    assert "above 1" in found.phase_margin.reason
+    assert (found.bandwidth.kind, found.bandwidth.value) == (
+        "at least",
+        pytest.approx(short.frequency[-1]),
+    )
+
+
+def test_margins_hold_the_truth_as_often_as_they_say() -> None:
+    held: dict[str, list[bool]] = defaultdict(list)
+    wide: dict[str, list[float]] = defaultdict(list)
+    for seed in range(30):
+        random = np.random.default_rng(seed)
+        truth = random_loop(random)
+        frequency = np.geomspace(truth.scale / 10, truth.scale * 12, 60)
+        values = truth.loop(2j * np.pi * frequency)
+        measured = noisy(
+            frequency, values, random.choice([0.003, 0.01]) * np.abs(values), random, of=8
+        )
+        fitted = chosen_margins(chosen_order(measured))
+        between = measured_margins(measured)
+        for name in ("bandwidth", "phase_margin", "gain_margin"):
+            told, expected = getattr(fitted, name), getattr(truth, name)
+            if told.kind == "at least":
+                held[name].append(told.value <= expected)
+                continue
+            held[name].append(holds(told, expected))
+            wide[name].append(told.half_width / getattr(between, name).half_width)
+    assert not rejected(held, "less")
+    # A function through all points knows more than the points around a crossing.
+    assert np.nanmedian(wide["phase_margin"]) < 0.7
+
+
+def test_errors_are_the_scatter_of_repeated_measurements() -> None:
+    frequency = np.geomspace(0.5, 60.0, 40)
+    truth = loop(frequency)
+    level = 0.02 * np.abs(truth)
+    found = [
+        fitted_margins(
+            rational_fit(noisy(frequency, truth, level, np.random.default_rng(k), of=30), (0, 1))
+        )
+        for k in range(150)
+    ]
+    for name in ("bandwidth", "phase_margin", "gain_margin"):
+        ratio = scatter_as_told([getattr(each, name) for each in found])
+        assert ratio == pytest.approx(1, abs=0.16), name  # 150 tell it within 6 %
+
+
+def test_what_other_orders_say_is_a_systematic_part() -> None:
+    """With a lag that scatter nearly hides, the order is open, and the interval says so."""
+    shifts = []
+    for seed in range(12):
+        frequency = np.geomspace(0.5, 60.0, 60)
+        truth = loop(frequency) / (1 + 2j * np.pi * frequency / 2500.0)
+        measured = noisy(frequency, truth, 0.01 * np.abs(truth), np.random.default_rng(seed), of=20)
+        chosen = chosen_order(measured)
+        alone, told = fitted_margins(chosen.fit).gain_margin, chosen_margins(chosen).gain_margin
+        others = [fitted_margins(each).gain_margin.value for each in chosen.near]
+        expected = max(abs(each - alone.value) for each in others) / 3**0.5 if others else 0.0
+        assert told.systematic_uncertainty == pytest.approx(expected)
+        shifts.append(expected)
+    assert np.median(shifts) > 0
