@@ -189,6 +189,7 @@ GROUPS = {
     "export format": "campaign.exports",
     "report format": "campaign.report_formats",
     "recording format": "campaign.recording_formats",
+    "identification method": "campaign.identification_methods",
 }
 """Entry point group by room."""
 

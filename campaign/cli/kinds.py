@@ -15,6 +15,7 @@ from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.export import exports
+from campaign.identifying import methods
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
@@ -119,7 +120,7 @@ def _show_channels() -> None:
 
 def _rooms() -> Iterator[Kinds[Any]]:
     yield from (experiments(), friction_models(), compensation_methods(), backends())
-    yield from (exports(), formats())
+    yield from (exports(), formats(), methods())
 
 
 def _whose(room: Kinds[Any], name: str) -> str:

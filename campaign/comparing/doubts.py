@@ -17,9 +17,10 @@ from collections.abc import Iterator
 from campaign.access.analysis import AnalysedTest
 from campaign.comparing.pairing import same_value
 from campaign.estimate import Origin
+from campaign.recording import Outcome
 from campaign.result import Finding
 from campaign.text import interval
-from campaign.trial import Outcome, Role
+from campaign.trial import Role
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
 """Quantities that are functions of other numbers of the same test."""

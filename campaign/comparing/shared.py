@@ -62,3 +62,19 @@ def _at(plant: Tree | None, path: str) -> str:
         return canonical_json(value_at(plant, tuple(path.split("."))))
     except (LookupError, TypeError):
         return "unknown"
+
+
+def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
+    """What a test rests on, by the name of its systematic part: the same text, the same constant.
+
+    The rules are those of `shared_sources`, for more than two runs.
+    """
+    if not test.source or test.bench is None:
+        return {}
+    found = {
+        source: repr((test.source, test.bench.name, known, sorted(_true(test, path, plants))))
+        for path, source in SOURCES.items()
+        if (known := _known(test, path)) is not None
+    }
+    with speaking_of(test.sides):
+        return {words_here(source): told for source, told in found.items()}

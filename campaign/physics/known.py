@@ -11,7 +11,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Self, get_args
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from campaign.axis_kind import BOTH_ROTARY
 from campaign.options import Options
@@ -60,6 +66,19 @@ class FingerprintOptions(Options):
     """Of each compensation, by its name."""
 
 
+class IdentifiedOptions(Options):
+    """What `campaign identify` took the values from that it wrote."""
+
+    run: str
+    """The run, and its test where one was named."""
+    digest: str
+    """Which stands for all of that run."""
+    program: str
+    """And its version."""
+    command: str
+    """That was given."""
+
+
 class KnownOptions(Options):
     """What is known of a bench, and which published cells it was made from.
 
@@ -82,6 +101,16 @@ class KnownOptions(Options):
     """Pairs of paths in `values` whose errors go together, with their correlation coefficient."""
     fingerprint: FingerprintOptions | None = None
     """Which bench all of this is said of."""
+    identified: IdentifiedOptions | None = None
+    """Which recordings values were identified from."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A bench that nobody identified is archived as before: trials keep their fingerprints."""
+        tree: dict[str, Any] = dump(self)
+        if self.identified is None:
+            tree.pop("identified", None)
+        return tree
 
     @property
     def describes(self) -> bool:

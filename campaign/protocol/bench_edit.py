@@ -31,6 +31,9 @@ def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
 
     try:
         changed = _edited(text, entries)
+        faults = _faults(changed)
+        if faults:
+            raise UsageError(f"{name}: with what is to be written it is no bench: {faults}")
         bench = _bench(changed)
         stated = fingerprint(bench).model_dump(mode="json")
         changed = _edited(changed, {"fingerprint": stated})
@@ -53,6 +56,14 @@ def _bench(text: str) -> Bench:
     if isinstance(found, list):
         raise ValueError("; ".join(message for _, _, message in found))
     return found
+
+
+def _faults(text: str) -> str:
+    """What is wrong with a bench; "" where nothing is."""
+    tree = tomllib.loads(text)
+    tree.pop("schema", None)
+    found = find_faults(Bench, tree)
+    return "; ".join(message for _, _, message in found) if isinstance(found, list) else ""
 
 
 def _edited(text: str, entries: Mapping[str, Any]) -> str:

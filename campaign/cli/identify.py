@@ -1,0 +1,190 @@
+"""`campaign identify`: a rig's parameters from archived runs, with what they rest on."""
+
+from __future__ import annotations
+
+import textwrap
+import tomllib
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.text import Text
+
+from campaign.archive.layout.files import why, write_atomically
+from campaign.axis_kind import speaking_of
+from campaign.cli.damage import say_damaged
+from campaign.cli.output import error_console, print_line, print_note, print_table
+from campaign.errors import ExitCode, UsageError, worst_exit_code
+from campaign.identifying import methods
+from campaign.identifying.bench_document import bench_text, nothing_to_write
+from campaign.identifying.identification import Identification, Section, identify
+from campaign.identifying.material import Chosen, choose
+from campaign.identifying.page import next_measurement, refuse_foreign, write_identification
+from campaign.identifying.tables import changes_table, told, words
+from campaign.interrupts import unwinding
+from campaign.resources import templates_folder
+from campaign.text import pretty_unit
+
+WIDTH = 80
+
+
+@unwinding()
+def identify_run(
+    run: str,
+    results: Path,
+    *,
+    models: Sequence[str] = (),
+    validate: str | None = None,
+    compare: str | None = None,
+    bench: Path | None = None,
+    page: Path | None = None,
+    settings: Sequence[str] = (),
+    open_it: bool = False,
+) -> tuple[Path, ExitCode]:
+    """Identify, and write the page and, where it is asked for, the bench; the page's path.
+
+    Raises UsageError where no method could use the run, before anything is written.
+    """
+    chosen = choose(results, run)
+    unseen = choose(results, validate) if validate else None
+    compared = choose(results, compare) if compare else None
+    output = page or _beside(chosen)
+    refuse_foreign(output)  # before minutes of work, and before a bench is written
+    if bench is not None:
+        _refuse_foreign_bench(bench)
+    with _waiting() as say:
+        found = identify(
+            chosen,
+            methods(),
+            models=models,
+            validation=unseen,
+            compared=compared,
+            settings=settings,
+            say=say,
+        )
+    if all(each.identified is None for each in found.sections):
+        reasons = "; ".join(f"{each.method.name}: {each.problem}" for each in found.sections)
+        raise UsageError(f"{chosen.name}: nothing can be identified from it ({reasons})")
+    command = _command(run, models, validate, compare, settings)
+    text = None
+    if bench is not None and not nothing_to_write(found):
+        text = bench_text(found, command)
+    written = bench.name if bench is not None and text is not None else ""
+    made = write_identification(found, output, templates_folder(), command, written)
+    _say(found)
+    if bench is not None:
+        if text is None:
+            print_note(f"page: {made}")
+            raise UsageError("--output: nothing that was found has a place in a bench file")
+        _write_bench(bench, text)
+        print_note(f"bench: {bench}")
+    if open_it and not webbrowser.open(made.resolve().as_uri()):
+        print_note("no browser was found; open the file by hand", style="yellow")
+    sides = [each.run for each in (chosen, unseen, compared) if each is not None]
+    return made, worst_exit_code([say_damaged(each.path, each.damaged) for each in sides])
+
+
+@contextmanager
+def _waiting() -> Iterator[Callable[[str], None]]:
+    """A line redrawn in place on a terminal; elsewhere one for each method."""
+    console = error_console()
+    if console.is_terminal and not console.is_dumb_terminal:
+        with console.status("reading") as status:
+            yield lambda text: status.update(Text(text))
+        return
+    told: set[str] = set()
+
+    def say(text: str) -> None:
+        head = text.split(": ")[0]
+        if head not in told:
+            told.add(head)
+            print_note(head)
+
+    yield say
+
+
+def _command(
+    run: str,
+    models: Sequence[str],
+    validate: str | None,
+    compare: str | None,
+    settings: Sequence[str],
+) -> str:
+    """What makes the same again; names of runs as they were given, and no folders of anybody."""
+    parts = ["campaign identify", _named(run)]
+    parts += [f"--model {name}" for name in models]
+    parts += [f"--validate {_named(validate)}"] if validate else []
+    parts += [f"--compare {_named(compare)}"] if compare else []
+    parts += [f"--set '{text}'" for text in settings]
+    return " ".join(parts)
+
+
+def _named(run: str) -> str:
+    return Path(run).name
+
+
+def _beside(chosen: Chosen) -> Path:
+    test = f"-{chosen.test}" if chosen.test else ""
+    return chosen.run.path.with_name(f"{chosen.run.path.stem}{test}-identification")
+
+
+def _refuse_foreign_bench(path: Path) -> None:
+    """Raises UsageError for what is there and no bench, such as a run or a protocol."""
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder; name a file for the bench")
+    if not path.exists():
+        return
+    try:
+        tree = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path}: {why(error)}") from None
+    except ValueError:
+        tree = {}
+    if "axis" not in tree:
+        raise UsageError(f"{path} is there already and is no bench; name another file")
+
+
+def _write_bench(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, text)
+    except OSError as error:
+        raise UsageError(f"{path}: {why(error)}") from None
+
+
+def _say(found: Identification) -> None:
+    with speaking_of(found.bench.sides):
+        for section in found.sections:
+            if section.identified is None:
+                _wrapped(f"{section.method.name}: not identified: {section.problem}")
+                continue
+            _tell(section)
+            if section.problem:
+                print_note(f"not compared: {section.problem}", style="yellow")
+            if section.changes and found.compared is not None:
+                changes = changes_table(found.chosen.name, found.compared.name, section)
+                heads = ("parameter", "before", "after", "change", "verdict")
+                print_table(heads, [[str(row[head]) for head in heads] for row in changes.rows])
+        advice = next_measurement(found)
+        if advice:
+            _wrapped(advice)
+
+
+def _tell(section: Section) -> None:
+    print_line(f"{section.method.name} ({section.method.summary})")
+    rows = [
+        (
+            words(each.estimate.name),
+            told(each.estimate, each.display),
+            pretty_unit(each.display or each.estimate.unit),
+            each.bench,
+        )
+        for each in section.parameters
+    ]
+    print_table(("parameter", "value, 95 %", "unit", "key of the bench"), rows)
+
+
+def _wrapped(text: str) -> None:
+    for line in textwrap.wrap(text, WIDTH):
+        print_line(line)

@@ -1,0 +1,107 @@
+"""`campaign trend`: do a rig's numbers drift over its runs, have they jumped, do they follow?"""
+
+from __future__ import annotations
+
+import textwrap
+import webbrowser
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+
+from campaign.archive import find_run, open_run
+from campaign.cli.damage import say_damaged
+from campaign.cli.output import print_line, print_note, print_table
+from campaign.errors import ExitCode, worst_exit_code
+from campaign.experiments import experiments
+from campaign.identifying import methods
+from campaign.interrupts import unwinding
+from campaign.resources import templates_folder
+from campaign.trending.page import write_trends
+from campaign.trending.tables import detectable_words, headline, not_judged, sentences
+from campaign.trending.trends import JUMP, TREND, Trends, Verdict, follow
+
+WIDTH = 80
+"""Columns of a terminal that is not wide."""
+STEM = 90
+"""Letters of a run's name that a folder is called by."""
+REASONS = 6
+"""Most reasons for not judging that the terminal lists."""
+SHOWN = 12
+"""Most numbers without a trend that the terminal lists; the page has them all."""
+NAMED = 3
+"""Most runs that the command on the page names."""
+
+
+@unwinding()
+def trend_of_archives(
+    names: Sequence[str],
+    results: Path,
+    output: Path | None,
+    over: str,
+    models: Sequence[str],
+    *,
+    open_it: bool,
+) -> tuple[Path, ExitCode]:
+    """Follow the numbers of the runs that `names` mean; the page, and whether all was read."""
+    paths = [find_run(results, name) for name in names]
+    runs = [open_run(path) for path in paths]
+    trends = follow(runs, experiments(), over, methods(), models)
+    last = trends.members[-1].run.path
+    folder = output or last.with_name(f"{last.stem[:STEM]}-trend-over-{_slug(over)}")
+    page = write_trends(trends, folder, templates_folder(), _command(names, over, models))
+    _tell(trends)
+    for member in trends.members:
+        for problem in member.problems:
+            print_note(problem, style="yellow")
+    for fitted in trends.fitted:
+        for problem in fitted.problems:
+            print_note(problem, style="yellow")
+    if open_it and not webbrowser.open(page.resolve().as_uri()):
+        print_note("no browser was found; open the file by hand", style="yellow")
+    codes = [say_damaged(member.run.path, member.damaged) for member in trends.members]
+    return page, worst_exit_code(codes)
+
+
+def _command(names: Sequence[str], over: str, models: Sequence[str]) -> str:
+    """What makes the same again; names of runs, and no folders of anybody."""
+    shown = [Path(name).name for name in names]
+    if len(shown) > NAMED:
+        shown = [*shown[: NAMED - 1], "...", shown[-1]]
+    return " ".join(
+        ["campaign trend", *shown, f"--over '{over}'", *(f"--model {name}" for name in models)]
+    )
+
+
+def _slug(over: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in over.lower())[:40] or "something"
+
+
+def _tell(trends: Trends) -> None:
+    for line in textwrap.wrap(" ".join(sentences(trends)), WIDTH):
+        print_line(line)
+    for each in trends.declared:
+        told = "; ".join((headline(each, trends), *each.notes))
+        for line in textwrap.wrap(told, WIDTH, subsequent_indent="  "):
+            print_line(line)
+    for why in islice(not_judged(trends), REASONS):
+        for line in textwrap.wrap(f"not judged, {why}", WIDTH, subsequent_indent="  "):
+            print_line(line)
+    rest = trends.of(Verdict.NOT_SHOWN)
+    if rest:
+        heads = ["no trend shown", f"seen from, per {trends.covariate.per}"]
+        heads += ["jump seen from"] if trends.covariate.ordered else []
+        rows = [
+            [
+                f"{each.series.test}: {each.series.name}",
+                detectable_words(each, TREND, trends.covariate, per=False),
+                *(
+                    [detectable_words(each, JUMP, trends.covariate)]
+                    if trends.covariate.ordered
+                    else []
+                ),
+            ]
+            for each in rest[:SHOWN]
+        ]
+        print_table(heads, rows)
+    if len(rest) > SHOWN:
+        print_line(f"and {len(rest) - SHOWN} more, on the page")

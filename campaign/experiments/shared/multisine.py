@@ -1,0 +1,119 @@
+"""Odd random-phase multisines, and their sizes below breakaway as they suit a bench.
+
+A sum of odd multiples of a lowest frequency, in random phases and all of one size: even distortion
+of what is excited falls between its lines (Pintelon and Schoukens, "System Identification: A
+Frequency Domain Approach", 2nd ed., section 5.2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from campaign.experiments.interface import Chosen
+from campaign.experiments.shared.choices import Choices, nice
+from campaign.experiments.shared.rig import Rig
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.physics.loop import at_load
+from campaign.signals import MultiSine
+
+MOST_LINES = 1000
+PER_PERIOD = 16
+"""Points per period of the highest line, at which the peak is looked for."""
+SHARES = (0.05, 0.1, 0.2)
+"""of the torque at which the first interface slips when it is applied slowly."""
+OF_STATIC = (0.02, 0.04, 0.08)
+"""of the static torque, where nobody has told how the friction gives way."""
+BELOW, ABOVE = 25.0, 5.0
+"""Lowest and highest line, below and above the natural frequency of the load on its bristles."""
+PER_LINE = 8.0
+"""Samples per period of the highest line, at least."""
+
+
+def odd_multisine(peak: float, lowest: float, highest: float, seed: tuple[int, ...]) -> MultiSine:
+    """Odd multiples of `lowest` up to `highest` (Hz), with this largest value, from 0 at time 0.
+
+    Phases follow from the seed. Beginning and end of whole periods lie at a passage through 0, so
+    that a bench at rest is not jerked. Raises ValueError for no line, or too many.
+    """
+    count = int((highest / lowest * (1.0 + 1e-9) + 1.0) // 2)
+    if not 1 <= count <= MOST_LINES:
+        raise ValueError(
+            f"odd multiples of {lowest:.4g} Hz up to {highest:.4g} Hz are {count} lines; "
+            f"1 to {MOST_LINES} are possible"
+        )
+    frequencies = lowest * (2.0 * np.arange(count) + 1.0)
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, count)
+    course, turn = _course(count, phases)
+    scale = peak / float(np.max(np.abs(course)))
+    begun = (phases + 2.0 * np.pi * turn * frequencies / lowest) % (2.0 * np.pi)
+    return MultiSine(
+        amplitudes=(scale,) * count,
+        frequencies=tuple(float(f"{f:.12g}") for f in frequencies),
+        phases=tuple(map(float, begun)),
+    )
+
+
+def _course(count: int, phases: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], float]:
+    """One period of the sum, and the share of it at which it first passes 0."""
+    points = PER_PERIOD * 2 * count
+    spectrum = np.zeros(points // 2 + 1, dtype=complex)
+    spectrum[1 : 2 * count : 2] = np.exp(1j * (phases - 0.5 * np.pi))
+    course = np.fft.irfft(spectrum, points) * points / 2.0
+    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
+    odd = 2.0 * np.arange(count) + 1.0
+
+    def value(share: float) -> float:
+        return float(np.sum(np.sin(2.0 * np.pi * odd * share + phases)))
+
+    low, high = index / points, (index + 1) / points
+    for _ in range(60):  # bisection
+        middle = 0.5 * (low + high)
+        if value(low) * value(middle) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    return course, 0.5 * (low + high)
+
+
+def first_slip(bench: Bench) -> tuple[float, float] | None:
+    """Torque (N m) at which the first interface slips, and stiffness of all (N m/rad), at the load.
+
+    None where an interface says nothing of its presliding.
+    """
+    angles, stiffness = [], 0.0
+    for options in bench.friction.values():
+        declared = friction_models()[options.model].small_signal
+        stuck = None if declared is None else declared(options).stuck
+        static = getattr(options, "static_torque", None)
+        if stuck is None or not stuck.stiffness > 0 or not static:
+            return None
+        torque, rate = at_load(options, bench)
+        angles.append(static / stuck.stiffness / rate)
+        stiffness += torque * rate * stuck.stiffness
+    return (min(angles) * stiffness, stiffness) if angles else None
+
+
+def below_breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+    """Amplitudes and frequencies of a multisine, as the bench's bristles suggest them."""
+    choices, rig = Choices(options), Rig(bench)
+    slip, inertia, static = first_slip(bench), bench.axis.inertia, rig.static_torque
+    if slip is not None:
+        sizes = tuple(nice(share * slip[0], "N m") for share in SHARES)
+        told = ", ".join(f"{100 * share:.0f}" for share in SHARES)
+        choices.take("amplitudes", sizes, f"{told} % of the torque at which an interface slips")
+    elif static is not None:
+        sizes = tuple(nice(share * static, "N m") for share in OF_STATIC)
+        told = ", ".join(f"{100 * share:.0f}" for share in OF_STATIC)
+        choices.take("amplitudes", sizes, f"{told} % of the static torque")
+    rate = choices.sample_rate(rig)
+    if slip is not None and inertia is not None:
+        natural = math.sqrt(slip[1] / inertia) / (2.0 * math.pi)
+        why = f"around the {natural:.3g} Hz of the load on its bristles"
+        choices.take("lowest", nice(natural / BELOW, "Hz"), why)
+        choices.take("highest", nice(min(ABOVE * natural, rate / PER_LINE), "Hz"), why)
+    return choices.told

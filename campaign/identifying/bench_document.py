@@ -1,0 +1,203 @@
+"""The rig's bench file with what was identified: values, intervals, origins, and where from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from campaign import __version__
+from campaign.axis_kind import speaking_of, unit_here
+from campaign.errors import CampaignError
+from campaign.estimate import Estimate, Origin
+from campaign.identifying.identification import Identification, Section
+from campaign.identifying.method import Identified, Parameter
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.protocol.bench_edit import with_known
+
+LEAST_CORRELATION = 0.1
+"""below which two values count as told apart."""
+DIGITS = 6
+FRICTION = "friction.load."
+CURVE = (
+    "coulomb_torque",
+    "static_torque",
+    "stribeck_velocity",
+    "stribeck_exponent",
+    "viscous_friction",
+)
+"""What a curve of sliding is made of: another one replaces it whole."""
+
+
+def bench_text(found: Identification, command: str) -> str:
+    """The bench's own text with the identified values in it; comments stay.
+
+    Raises CampaignError where the run does not hold the bench's file, or it cannot be edited.
+    """
+    name, text = _source(found)
+    values: dict[str, Any] = {}
+    known: dict[str, Any] = {}
+    correlations: list[list[Any]] = []
+    sliding = _of_sliding(found.sections)
+    with speaking_of(found.bench.sides):
+        for section in found.sections:
+            filled = _filled(section)
+            if section is not sliding and _tells_sliding(filled):
+                # A curve whose numbers are of two models is the curve of neither.
+                filled = {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+            for parameter in filled.values():
+                values[parameter.bench] = _written(parameter.estimate)
+                known[parameter.bench] = _known(parameter.estimate)
+            correlations += _correlations(section, filled)
+            if filled and section.identified is not None:
+                settings = _settings(section.identified, found.bench)
+                for path, (value, unit, _) in settings.items():
+                    if _is_friction(path) and sliding is not None and section is not sliding:
+                        continue
+                    values[path] = _value(value, unit)
+                    if isinstance(value, float):
+                        known[path] = {"origin": "assumed"}
+    entries: dict[str, Any] = {"identified": _identified(found, command), "values": known}
+    stale = _stale(values, found.bench)
+    kept = [
+        list(each)
+        for each in found.bench.known.correlations
+        if not {each[0], each[1]} & {*known, *stale}
+    ]
+    if correlations:
+        entries["correlations"] = kept + correlations
+    return with_known(_edited(text, values, stale), entries, name)
+
+
+def nothing_to_write(found: Identification) -> bool:
+    """Whether no parameter has a place in a bench file."""
+    return not any(_filled(section) for section in found.sections)
+
+
+def _source(found: Identification) -> tuple[str, str]:
+    header = found.chosen.run.header
+    tests = {str(each.get("name", "")): each for each in header.tests}
+    test = found.chosen.trials[0].trial.test
+    name = str(tests.get(test, {}).get("bench", ""))
+    if name not in header.sources:
+        raise CampaignError(f"{found.chosen.run.name}: does not hold the file of its bench")
+    return name, header.sources[name]
+
+
+def _filled(section: Section) -> dict[str, Parameter]:
+    """Parameters that have a place in a bench, by their names."""
+    if section.identified is None:
+        return {}
+    return {
+        each.estimate.name: each
+        for each in section.identified.parameters
+        if each.bench and each.estimate.origin is Origin.MEASURED
+    }
+
+
+def _of_sliding(sections: Sequence[Section]) -> Section | None:
+    """Whose friction of sliding a bench gets: the last with a Stribeck curve, or else with any."""
+    told = [each for each in sections if _tells_sliding(_filled(each))]
+    curves = [each for each in told if _tells_sliding(_filled(each), "static_torque")]
+    best = curves or told
+    return best[-1] if best else None
+
+
+def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
+    return any(each.bench == f"{FRICTION}{key}" for each in filled.values())
+
+
+def _is_friction(path: str) -> bool:
+    return path.startswith(FRICTION)
+
+
+def _settings(identified: Identified, bench: Bench) -> dict[str, tuple[Any, str, str]]:
+    """Its settings; bristles of the bench stay where the curve that slides over them is told."""
+    settings = dict(identified.settings)
+    model, load = f"{FRICTION}model", bench.friction.get("load")
+    if model in settings and settings[model][0] == "stribeck" and load and load.model == "lugre":
+        settings[model] = ("lugre", *settings[model][1:])
+    return settings
+
+
+def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:
+    """Keys of the bench's friction that are of another curve, or unknown to the model."""
+    load, model = bench.friction.get("load"), values.get(f"{FRICTION}model")
+    if load is None or model is None:
+        return []
+    curve = [f"{FRICTION}{way}{key}" for way in ("", "negative.") for key in CURVE]
+    known = friction_models()[model].options.model_fields
+    unknown = [f"{FRICTION}{key}" for key in type(load).model_fields if key not in known]
+    return [path for path in (*curve, *unknown) if path not in values]
+
+
+def _without(document: Any, path: str) -> None:
+    """A file without a key, and without what it says is known of that."""
+    *tables, key = path.split(".")
+    here = document
+    for name in tables:
+        here = here.get(name, {})
+    if key in here:
+        del here[key]
+    of_values = document.get("known", {}).get("values", {})
+    if path in of_values:
+        del of_values[path]
+
+
+def _written(estimate: Estimate) -> Any:
+    return _amount(estimate.value, estimate.unit)
+
+
+def _amount(value: float, unit: str) -> Any:
+    """With its unit; a number where it has none."""
+    return f"{value:.{DIGITS}g} {unit}" if unit else float(f"{value:.{DIGITS}g}")
+
+
+def _value(value: Any, unit: str) -> Any:
+    if not isinstance(value, float):
+        return value
+    return _amount(value, unit_here(unit))
+
+
+def _known(estimate: Estimate) -> dict[str, Any]:
+    low, high = estimate.combined
+    if low is None or high is None:
+        return {"origin": "measured"}
+    ends = [_amount(end, estimate.unit) for end in (low, high)]
+    return {"interval": ends, "origin": "measured"}
+
+
+def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:
+    if section.identified is None:
+        return
+    for (one, other), share in section.identified.correlations.items():
+        if one in filled and other in filled and abs(share) >= LEAST_CORRELATION:
+            yield [filled[one].bench, filled[other].bench, round(max(-1.0, min(1.0, share)), 3)]
+
+
+def _identified(found: Identification, command: str) -> dict[str, str]:
+    return {
+        "run": found.chosen.name,
+        "digest": found.chosen.run.identity,
+        "program": f"campaign {__version__}",
+        "command": command,
+    }
+
+
+def _edited(text: str, values: Mapping[str, Any], stale: Sequence[str]) -> str:
+    """Each value where its key is, or in a table that is made for it; without what is stale."""
+    import tomlkit
+
+    newline = "\r\n" if "\r\n" in text else "\n"
+    document = tomlkit.parse(text.replace("\r\n", "\n"))
+    for path in stale:
+        _without(document, path)
+    for path, value in values.items():
+        *tables, key = path.split(".")
+        here: Any = document
+        for depth, name in enumerate(tables):
+            if name not in here:
+                here[name] = tomlkit.table(is_super_table=depth + 1 < len(tables))
+            here = here[name]
+        here[key] = value
+    return document.as_string().replace("\n", newline)

@@ -1,0 +1,1 @@
+"""What trials of a run make of a drive's frequency response."""

@@ -1,0 +1,306 @@
+"""What each response comes to: order, modes, margins, and the two masses of the best of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from campaign.identification.elastic_mode import ElasticMode, elastic_mode
+from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
+from campaign.identification.frequency.distortion import total
+from campaign.identification.frequency.margins import chosen_margins, measured_margins
+from campaign.identification.frequency.measured import MeasuredResponse
+from campaign.identification.frequency.modes import Mode, chosen_modes
+from campaign.identification.frequency.orders import Chosen, chosen_order
+from campaign.identification.frequency.two_mass import TwoMass, two_mass
+from campaign.identification.frequency.two_mass_model import Side
+from campaign.identification.intervals import judged, shifted_by
+from campaign.identification.servo import ServoCharacteristics
+from campaign.identifying.frequency.sources import Source, fitted_part
+from campaign.physics.bench import Bench
+
+TOLD_APART = 10.0
+"""Schwarz' criterion by which one place of the sensor must fit better than the other."""
+AMBIGUOUS = (
+    "the response is that of a sensor at the driven inertia as well as behind the spring: say "
+    "which (place), or excite up to above the antiresonance"
+)
+
+
+BENT = 0.03
+"""Odd distortion over the output from which on friction is taken to bend a response."""
+NARROWER = (2.0, 4.0, 8.0)
+"""times the first frequency: from there on two inertias are tried where friction bends the rest."""
+WEAKER = 0.8
+"""Share of the strongest excitation below which another one is weaker."""
+SHIFTED = (
+    "motor_inertia",
+    "load_inertia",
+    "total_inertia",
+    "stiffness",
+    "damping",
+    "resonance",
+    "resonance_damping",
+    "antiresonance",
+    "antiresonance_damping",
+    "inertia_ratio",
+)
+"""Numbers of a drive that friction shifts."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Of what is fitted (Hz), and the highest order of a denominator."""
+
+    lowest: float
+    highest: float
+    order: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one source comes to.
+
+    Attributes:
+        fits, modes: by side; a side is missing where nothing could be fitted.
+        local: modes on top of a response that no function fits, by side.
+        margins: of its loop, by a fit where one fits and else between the points.
+        loop_fit: of its loop.
+        remarks: sentences: what could not be found, and why.
+    """
+
+    source: Source
+    fits: Mapping[Side, Chosen]
+    modes: Mapping[Side, tuple[Mode, ...]]
+    local: Mapping[Side, ElasticMode] = field(default_factory=dict)
+    margins: ServoCharacteristics | None = None
+    loop_fit: Chosen | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Masses:
+    """The two-mass drive, and where the sensors are taken to be.
+
+    Attributes:
+        drive: None where the responses are not those of one, and `reason` says why.
+        places: `motor` for a sensor at the driven inertia, `load` behind the spring, by side.
+        how: how the places are known, in words.
+        lowest: frequency from which on it was fitted (Hz), where it is no model of the whole band.
+        bent: where friction bends the response by an amount that nobody knows, a sentence.
+    """
+
+    drive: TwoMass | None
+    source: Source | None
+    reason: str = ""
+    places: Mapping[Side, Side] = field(default_factory=dict)
+    how: str = ""
+    bent: str = ""
+    lowest: float = 0.0
+
+
+def found_in(source: Source, band: Band) -> Found:
+    """Fits, modes and margins of one source."""
+    fits: dict[Side, Chosen] = {}
+    remarks: list[str] = []
+    if few := _too_few(source):
+        remarks.append(f"{source.name}: {few}")
+    else:
+        for side in source.responses:
+            part = fitted_part(source, side, band.lowest, band.highest)
+            try:
+                fits[side] = chosen_order(part, band.order)
+            except ValueError as error:
+                remarks.append(f"{source.name}, {side}: {error}.")
+    modes = {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
+    local: dict[Side, ElasticMode] = {}
+    for side in source.responses:
+        if side in modes:
+            continue
+        part = fitted_part(source, side, band.lowest, band.highest)
+        mode = elastic_mode(part.response)
+        if mode is not None:
+            local[side] = mode
+    margins, loop_fit = None, None
+    if source.loop is not None and not few:
+        margins, loop_fit, why = _margins(source.loop, source.every, band)
+        if why:
+            remarks.append(f"{source.name}: {why}.")
+    return Found(source, fits, modes, local, margins, loop_fit, tuple(remarks))
+
+
+def _too_few(source: Source) -> str:
+    """Why nothing is fitted to repeated multisines; empty where there are enough."""
+    for best in source.best.values():
+        few = best.excitation.realisations
+        if few < FEWEST_REALISATIONS:
+            return (
+                f"{few} realisations tell no variance to weigh a fit with; {FEWEST_REALISATIONS} "
+                "are the fewest: modes and parameters are not determined."
+            )
+    return ""
+
+
+def _margins(
+    loop: MeasuredResponse, every: int, band: Band
+) -> tuple[ServoCharacteristics | None, Chosen | None, str]:
+    part = loop.at(np.isfinite(loop.values)).at(slice(None, None, every))
+    part = part.between(band.lowest, band.highest)
+    try:
+        fit = chosen_order(part, band.order, stable=False)
+        if not fit.fit.misfit:
+            return chosen_margins(fit), fit, ""
+        why = f"no function fits the loop ({fit.fit.misfit}); margins are read between its points"
+        return measured_margins(part), fit, why
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return None, None, f"no margins: {error}"
+
+
+def best_source(found: Sequence[Found]) -> Found | None:
+    """From which parameters are told: one that fits, multisines before sines before the rest.
+
+    Of several multisines the strongest: the share of friction in it is the least.
+    """
+    fitted = [each for each in found if each.fits]
+    if not fitted:
+        return None
+    ranks = {"multisine": 0, "sines": 1, "records": 2}
+
+    def rank(each: Found) -> tuple[bool, int, int, float]:
+        misfit = all(fit.fit.misfit for fit in each.fits.values())
+        return misfit, -len(each.fits), ranks[each.source.kind], -each.source.rms
+
+    return min(fitted, key=rank)
+
+
+def masses(
+    found: Found | None,
+    bench: Bench,
+    place: str,
+    band: Band,
+    torque: float | None,
+    others: Sequence[Found] = (),
+) -> Masses:
+    """The two-mass drive of the best source.
+
+    Args:
+        place: `driven`, `behind` or `auto`, of the load's sensor.
+        torque: relative standard uncertainty of the torque constant, if it is known.
+        others: further sources: one of less excitation tells how far friction bends the response.
+    """
+    if found is None:
+        return Masses(None, None, "no response could be fitted")
+    source = found.source
+    first = min(float(each.frequency[0]) for each in source.responses.values())
+    try:
+        told = _placed(source, bench, place, band, torque)
+        for factor in () if band.lowest > 0 else NARROWER:
+            if told.drive is None or not told.drive.misfit:
+                break
+            higher = replace(band, lowest=factor * first)
+            other = _narrower(source, bench, place, higher, torque)
+            if other is not None and other.drive is not None and not other.drive.misfit:
+                told, band = replace(other, lowest=higher.lowest), higher
+        if told.drive is None or told.drive.misfit:
+            return told
+        return _bent(told, source, [each.source for each in others], band)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return Masses(None, source, str(error))
+
+
+def _narrower(
+    source: Source, bench: Bench, place: str, band: Band, torque: float | None
+) -> Masses | None:
+    """In less of the band; None where too little of it is left."""
+    try:
+        return _placed(source, bench, place, band, torque)
+    except ValueError:
+        return None
+
+
+def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float | None) -> Masses:
+    parts = {
+        side: fitted_part(source, side, band.lowest, band.highest) for side in source.responses
+    }
+    if "motor" in parts:
+        places: dict[Side, Side] = {side: side for side in parts}
+        return Masses(two_mass(parts, torque_uncertainty=torque), source, places=places)
+    part, how = parts["load"], "as place says"
+    if place == "auto" and bench.appendage is not None:
+        place, how = "driven", "the bench has an elastic part that hangs on the load"
+    tried = {}
+    if place in ("auto", "driven"):
+        tried["driven"] = two_mass({"motor": part}, torque_uncertainty=torque)
+    if place in ("auto", "behind"):
+        tried["behind"] = two_mass({"load": part}, torque_uncertainty=torque)
+    if place == "auto":
+        fits = [name for name, drive in tried.items() if not drive.misfit] or list(tried)
+        if len(fits) > 1:
+            apart = tried["driven"].criterion - tried["behind"].criterion
+            if abs(apart) < TOLD_APART:
+                return Masses(None, source, AMBIGUOUS)
+            fits = ["behind"] if apart > 0 else ["driven"]
+        place, how = fits[0], "the response fits that place better"
+    side: Side = "motor" if place == "driven" else "load"
+    return Masses(tried[place], source, places={"load": side}, how=how)
+
+
+def _bent(told: Masses, source: Source, others: Sequence[Source], band: Band) -> Masses:
+    """With what friction does to the drive's numbers, which scatter does not show.
+
+    Its share of a response falls as fast as the excitation rises, or faster: a response to less
+    tells how much is left of it.
+    """
+    odd = [total(each.distortion, "odd") for each in source.best.values() if each.distortion]
+    if told.drive is None or not any(
+        level.kind == "number" and level.value > BENT for level in odd
+    ):
+        return told
+    weaker = [each for each in others if each.best and 0 < each.rms < WEAKER * source.rms]
+    weaker = [each for each in weaker if set(each.responses) == set(source.responses)]
+    if not weaker:
+        bent = (
+            f"Odd distortion is {100 * max(level.value for level in odd):.0f} % of the output: "
+            "friction bends the response, by how much one amplitude does not tell. Repeat it at "
+            "half the amplitude; until then no inertia goes to the bench."
+        )
+        return replace(told, drive=_shifted(told.drive, None, 1.0), bent=bent)
+    other = max(weaker, key=lambda each: each.rms)
+    share = other.rms / (source.rms - other.rms)
+    return replace(told, drive=_shifted(told.drive, _weaker_drive(told, other, band), share))
+
+
+def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
+    """Of a weaker excitation, from where it fits best: friction bends more of its band."""
+    first = min(float(each.frequency[0]) for each in other.responses.values())
+    tried = []
+    for lowest in {band.lowest, *(max(factor * first, band.lowest) for factor in NARROWER)}:
+        parts = {
+            told.places[side]: fitted_part(other, side, lowest, band.highest)
+            for side in other.responses
+        }
+        with suppress(ValueError):  # too little of the band is left
+            tried.append(two_mass(parts))
+    if not tried:
+        raise ValueError("the weaker excitation has too few frequencies")
+    return min(tried, key=lambda each: (bool(each.misfit), each.excess))
+
+
+def _shifted(drive: TwoMass, other: TwoMass | None, share: float) -> TwoMass:
+    """Each number with the part that friction has in it, as far as it is known."""
+    changed: dict[str, Any] = {}
+    for name in SHIFTED:
+        one = getattr(drive, name)
+        if not one.has_interval:
+            continue
+        left = None
+        if other is not None:
+            left = share * abs(getattr(other, name).value - one.value)
+        if left is None or math.isfinite(left):
+            changed[name] = judged(shifted_by(one, "friction, at this excitation", left))
+    return replace(drive, **changed)

@@ -1,0 +1,212 @@
+"""Tables of frequency responses: what was measured, orders, modes, margins, two masses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from campaign.estimate import Estimate
+from campaign.identification.frequency.distortion import total
+from campaign.identification.frequency.orders import order_of
+from campaign.identification.frequency.two_mass import METHOD
+from campaign.identifying.frequency.found import Found, Masses
+from campaign.result import Column, Table
+
+NAME = Column("source", "Response", exact=True)
+SENSOR = Column("side", "Sensor", exact=True)
+
+
+def sources_table(found: Sequence[Found]) -> Table:
+    """What each response was measured with: a best linear approximation belongs to that."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "excitation": each.source.excitation,
+            "trials": len(each.source.trials),
+            "points": max(len(r.frequency) for r in each.source.responses.values()),
+        }
+        for each in found
+    ]
+    return Table(
+        "responses",
+        "Responses, and what they were measured with",
+        (
+            NAME,
+            Column("excitation", "Excitation", exact=True),
+            Column("trials", "Trials", exact=True),
+            Column("points", "Frequencies", exact=True),
+        ),
+        tuple(rows),
+        note="Of a nonlinear drive each response holds for its own excitation.",
+    )
+
+
+def distortion_table(found: Sequence[Found]) -> Table | None:
+    """Even and odd distortion of the output, as shares of its rms."""
+    rows: list[dict[str, Any]] = []
+    for each in found:
+        for side, best in each.source.best.items():
+            if best.distortion is None:
+                continue
+            rows.append(
+                {
+                    "source": each.source.name,
+                    "side": side,
+                    "even": total(best.distortion, "even"),
+                    "odd": total(best.distortion, "odd"),
+                }
+            )
+    if not rows:
+        return None
+    return Table(
+        "distortion",
+        "Distortion over the rms of the output",
+        (NAME, SENSOR, Column("even", "Even", "", "%"), Column("odd", "Odd", "", "%")),
+        tuple(rows),
+        note="From lines that the excitation left out, less the noise and the input's own part "
+        "there. Coulomb friction and a bristle are odd; what differs by direction is even.",
+    )
+
+
+def fits_table(found: Sequence[Found]) -> Table:
+    """The function chosen for each response."""
+    rows: list[dict[str, Any]] = []
+    for each in found:
+        parts = [(str(side), fit) for side, fit in each.fits.items()]
+        if each.loop_fit is not None:
+            parts.append(("loop", each.loop_fit))
+        for side, chosen in parts:
+            up, down = order_of(chosen.fit)
+            delay = chosen.fit.scatter[-1, -1] ** 0.5
+            late = Estimate.without_interval("delay", chosen.fit.delay, "s", chosen.fit.misfit)
+            if not chosen.fit.misfit:
+                low, high = (chosen.fit.delay + sign * 1.96 * delay for sign in (-1.0, 1.0))
+                late = Estimate("delay", chosen.fit.delay, "s", low, high, 0.95)
+            rows.append(
+                {
+                    "source": each.source.name,
+                    "side": side,
+                    "order": f"{up} / {down}",
+                    "excess": chosen.fit.excess,
+                    "delay": late,
+                    "says": chosen.fit.misfit or "fits",
+                }
+            )
+    return Table(
+        "functions",
+        "Functions fitted, with a delay",
+        (
+            NAME,
+            SENSOR,
+            Column("order", "Order", exact=True),
+            Column("excess", "Square over expected", exact=True),
+            Column("delay", "Delay", "s", "ms"),
+            Column("says", "Verdict", exact=True),
+        ),
+        tuple(rows),
+        note="Order of numerator and denominator by Schwarz' criterion. A function that leaves "
+        "more than scatter is a misfit: what follows from it has no interval.",
+    )
+
+
+def modes_table(found: Sequence[Found]) -> Table | None:
+    """Resonances and antiresonances."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "side": side,
+            "kind": "antiresonance" if mode.is_zero else "resonance",
+            "frequency": mode.frequency,
+            "damping": mode.damping,
+        }
+        for each in found
+        for side, modes in each.modes.items()
+        for mode in modes
+    ]
+    for each in found:
+        for side, local in each.local.items():
+            for kind, frequency, damping in (
+                ("resonance", local.frequency, local.damping_ratio),
+                ("antiresonance", local.antiresonance, None),
+            ):
+                rows.append(
+                    {
+                        "source": each.source.name,
+                        "side": side,
+                        "kind": f"{kind}, on top of a smooth response",
+                        "frequency": frequency,
+                        "damping": damping,
+                    }
+                )
+    if not rows:
+        return None
+    return Table(
+        "modes",
+        "Resonances and antiresonances",
+        (
+            NAME,
+            SENSOR,
+            Column("kind", "Kind", exact=True),
+            Column("frequency", "Frequency", "Hz", "Hz"),
+            Column("damping", "Damping ratio", ""),
+        ),
+        tuple(rows),
+    )
+
+
+def margins_table(found: Sequence[Found]) -> Table | None:
+    """Bandwidth and margins of each loop."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "bandwidth": each.margins.bandwidth,
+            "phase": each.margins.phase_margin,
+            "gain": each.margins.gain_margin,
+        }
+        for each in found
+        if each.margins is not None
+    ]
+    if not rows:
+        return None
+    return Table(
+        "margins",
+        "Bandwidth and margins of the rate loop",
+        (
+            NAME,
+            Column("bandwidth", "Bandwidth", "Hz", "Hz"),
+            Column("phase", "Phase margin", "rad", "deg"),
+            Column("gain", "Gain margin", "dB", "dB"),
+        ),
+        tuple(rows),
+        note="A margin beyond the last frequency is a bound.",
+    )
+
+
+def masses_table(masses: Masses) -> Table | None:
+    """The two-mass drive, in one row; None where it is no model of the response."""
+    drive = masses.drive
+    if drive is None or drive.misfit:
+        return None
+    columns = (
+        Column("motor_inertia", "Driven inertia", "kg m^2", "kg m^2"),
+        Column("load_inertia", "Inertia behind the spring", "kg m^2", "kg m^2"),
+        Column("total_inertia", "Sum", "kg m^2", "kg m^2"),
+        Column("stiffness", "Stiffness", "N m/rad", "N m/rad"),
+        Column("damping", "Damping", "N m s/rad", "N m s/rad"),
+        Column("resonance", "Resonance", "Hz", "Hz"),
+        Column("resonance_damping", "Its damping ratio"),
+        Column("antiresonance", "Antiresonance", "Hz", "Hz"),
+        Column("inertia_ratio", "Inertia ratio"),
+    )
+    spring = (
+        " A spring that holds the driven inertia is part of the model: friction before it slides."
+        if drive.grounded
+        else ""
+    )
+    return Table(
+        "two-masses",
+        "Two inertias on a spring",
+        columns,
+        ({column.name: getattr(drive, column.name) for column in columns},),
+        note=f"{METHOD}.{spring}",
+    )

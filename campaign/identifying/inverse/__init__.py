@@ -1,0 +1,1 @@
+"""Inverse dynamics of archived motions: from trials to rows, what was found, tables, figures."""

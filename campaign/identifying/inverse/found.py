@@ -1,0 +1,330 @@
+"""What the motions of a rig say of it: delay first, then terms, then how sure each number is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.identification.intervals import LEVEL, shifted_by
+from campaign.identification.inverse.choosing import Structure, choose, structure
+from campaign.identification.inverse.delay import find_delay
+from campaign.identification.inverse.instruments import WEAK, Instrumented, by_instruments
+from campaign.identification.inverse.motion import Array, Filtering, Motion
+from campaign.identification.inverse.position_period import find_period
+from campaign.identification.inverse.regression import Piece, Regression, regress
+from campaign.identification.inverse.rows import all_rows, moving, rows
+from campaign.identification.inverse.simulation import relative_rate_error
+from campaign.identification.inverse.terms import (
+    DIRECTIONAL,
+    SYMMETRIC,
+    TERMS,
+    Term,
+    columns,
+    periodic,
+)
+from campaign.identification.inverse.validation import Prediction, improvement, relative_error
+from campaign.identifying.inverse.motions import Moved
+
+HAC = "least squares; deviation with autocorrelation (Newey and West)"
+ROUNDS = 4
+"""Most times that terms are chosen at a delay, and the delay is found anew with them."""
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A structure, at a delay, and how it predicts what it was not fitted to.
+
+    Attributes:
+        delay: s.
+        predictions: of each piece of the validation; empty without any.
+        validation: relative residual there; None without any.
+        gain: by how much that is lower than of the plain directional model; None likewise.
+        simulated: relative error of the rate that is simulated from the force; NaN where nobody
+            did that, or nobody can.
+    """
+
+    structure: Structure
+    delay: float
+    predictions: tuple[Prediction, ...] = ()
+    validation: Estimate | None = None
+    gain: Estimate | None = None
+    simulated: float = math.nan
+
+
+@dataclass(frozen=True)
+class InverseDynamics:
+    """All that was found.
+
+    Attributes:
+        delay: of the force, as found; or as it was stated.
+        plain: symmetric and directional model without any delay, as anybody would fit them.
+        tried: all structures, those of `plain` first.
+        chosen: index in `tried`.
+        estimates: of the chosen structure's terms, by name, with their systematic parts.
+        instruments: of the chosen structure; None without a wanted motion, and `no_instruments`
+            says why.
+        period: over position, that was tried; None without any.
+    """
+
+    pieces: tuple[Moved, ...]
+    filtering: Filtering
+    delay: Estimate
+    tried: tuple[Tried, ...]
+    chosen: int
+    estimates: dict[str, Estimate]
+    instruments: Instrumented | None
+    no_instruments: str
+    period: float | None
+
+    @property
+    def best(self) -> Tried:
+        """The chosen one."""
+        return self.tried[self.chosen]
+
+    @property
+    def fit(self) -> Regression:
+        """Of the chosen structure."""
+        return self.best.structure.fit
+
+
+def find(
+    pieces: Sequence[Moved],
+    unseen: Sequence[Moved],
+    filtering: Filtering,
+    *,
+    delay: float | None = None,
+    terms: Sequence[Term] | None = None,
+    linear: bool = False,
+) -> InverseDynamics:
+    """Identify from `pieces`; `unseen` is predicted when everything is chosen.
+
+    Args:
+        delay: of the force (s); None: it is found, and taken out where it is surely there.
+        terms: the structure; None: it is chosen.
+        linear: whether the axis travels: no gravity over an angle then.
+
+    Raises ValueError where the motions cannot tell even the symmetric model.
+    """
+    motions = [each.motion for each in pieces]
+    everything = replace(filtering, slowest=0.0)
+    plain = [
+        structure(motions, [TERMS[name] for name in names], everything)
+        for names in (SYMMETRIC, DIRECTIONAL)
+        if _possible(motions, names)
+    ]
+    if not plain:
+        plain = [structure(motions, [TERMS[n] for n in _possible_terms(motions)], everything)]
+    start = tuple(terms) if terms is not None else plain[-1].terms
+    late = _delay(motions, start, filtering, delay)
+    shift = _taken_out(late, delay)
+    period = None
+    more, picked = [structure(motions, start, filtering, shift)], 0
+    for _ in range(ROUNDS if terms is None else 0):
+        period = _period(motions, more[picked].terms, filtering, shift)
+        candidates = _candidates(motions, period, linear=linear)
+        more, picked = choose(motions, start, candidates, filtering, shift)
+        # What the terms lacked may have looked like a delay, and the other way round.
+        late = _delay(motions, more[picked].terms, filtering, delay)
+        before, shift = shift, _taken_out(late, delay)
+        if abs(shift - before) <= (late.standard_error or 0.0):
+            shift = before
+            break
+    else:
+        more = [structure(motions, each.terms, filtering, shift) for each in more]
+    offset = len(plain)
+    found = [(each, 0.0) for each in plain] + [(each, shift) for each in more]
+    picked += offset
+    unseen_motions = [each.motion for each in unseen]
+    told = {*range(len(plain)), picked}
+    tried = _validated(found, motions, unseen_motions, filtering, told)
+    best = tried[picked]
+    estimates = _estimates(best, motions, filtering, late)
+    instruments, why = _instruments(pieces, best, filtering)
+    return InverseDynamics(
+        tuple(pieces), filtering, late, tuple(tried), picked, estimates, instruments, why, period
+    )
+
+
+def _possible(motions: Sequence[Motion], names: Sequence[str]) -> bool:
+    return set(names) <= set(_possible_terms(motions, names))
+
+
+def _possible_terms(motions: Sequence[Motion], names: Sequence[str] = SYMMETRIC) -> list[str]:
+    """Terms whose columns are not zero throughout: a motion of one direction has no other."""
+    return [n for n in names if any(np.any(TERMS[n].column(motion)) for motion in motions)]
+
+
+def _delay(
+    motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering, stated: float | None
+) -> Estimate:
+    if stated is not None:
+        return Estimate.without_interval("delay", stated, "s", "stated", origin=Origin.GIVEN)
+    return find_delay(motions, terms, filtering)
+
+
+def _taken_out(late: Estimate, stated: float | None) -> float:
+    """The delay that is reckoned with: one that was found where scatter alone does not explain it.
+
+    It predicts what comes, be it a delay or what a loop makes of noise; how far the two may be
+    apart is in the systematic part of every coefficient.
+    """
+    low, high = late.low, late.high
+    sure = low is not None and high is not None and (low > 0 or high < 0)
+    return late.value if sure or stated is not None else 0.0
+
+
+def _candidates(
+    motions: Sequence[Motion], period: float | None, *, linear: bool
+) -> list[Sequence[Term]]:
+    names: list[tuple[str, ...]] = [("spring",), ("square_root",), ("quadratic",)]
+    if not linear:
+        names.append(("gravity_sine", "gravity_cosine"))
+    if all(motion.temperature is not None for motion in motions):
+        names += [("coulomb_over_temperature",), ("viscous_over_temperature",)]
+    found: list[Sequence[Term]] = [[TERMS[name] for name in group] for group in names]
+    if period is not None:
+        waves = periodic(period)
+        found += [waves[:2], waves[2:]]
+    return found
+
+
+def _period(
+    motions: Sequence[Motion], start: Sequence[Term], filtering: Filtering, delay: float
+) -> float | None:
+    fit = structure(motions, start, filtering, delay).fit
+    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
+    place = [rows(motion, own, filtering).columns for motion in motions]
+    whole = np.concatenate(place)
+    return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals))
+
+
+def _validated(
+    found: Sequence[tuple[Structure, float]],
+    motions: Sequence[Motion],
+    unseen: Sequence[Motion],
+    filtering: Filtering,
+    moved: Collection[int],
+) -> list[Tried]:
+    """Each structure with its predictions of what it was not fitted to; some also as they move."""
+    told: list[Tried] = []
+    reference: tuple[Prediction, ...] = ()
+    for index, (which, delay) in enumerate(found):
+        predictions = tuple(predicted(motion, which, filtering, delay) for motion in unseen)
+        one = Tried(which, delay, predictions)
+        if index in moved:
+            one = replace(one, simulated=_simulated(unseen or motions, which, delay))
+        if predictions:
+            if set(which.names) == set(DIRECTIONAL) and delay == 0.0 and not reference:
+                reference = predictions
+            whole = together(predictions)
+            gain = improvement("gain", together(reference), whole) if reference else None
+            one = replace(one, validation=relative_error("validation", whole), gain=gain)
+        told.append(one)
+    return told
+
+
+def _simulated(motions: Sequence[Motion], which: Structure, delay: float) -> float:
+    try:
+        return relative_rate_error(motions, which.terms, which.fit.values, delay)
+    except ValueError:
+        return math.nan
+
+
+def predicted(motion: Motion, which: Structure, filtering: Filtering, delay: float) -> Prediction:
+    """What a structure says of another motion."""
+    piece = all_rows(motion, which.terms, filtering, delay)
+    return Prediction(piece.time, piece.force, piece.columns @ which.fit.values)
+
+
+def together(predictions: Sequence[Prediction]) -> Prediction:
+    """Several motions as one."""
+    return Prediction(
+        np.concatenate([each.time for each in predictions]),
+        np.concatenate([each.force for each in predictions]),
+        np.concatenate([each.predicted for each in predictions]),
+    )
+
+
+def _estimates(
+    best: Tried, motions: Sequence[Motion], filtering: Filtering, late: Estimate
+) -> dict[str, Estimate]:
+    """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
+    fit, terms = best.structure.fit, best.structure.terms
+    parts = {"band": _shift(motions, terms, filtering.half_band, best.delay, fit)}
+    if late.origin is not Origin.GIVEN:
+        parts["delay"] = _shift(
+            motions, terms, filtering, best.delay + _doubt(best, late, motions[0]), fit
+        )
+    found = {}
+    for index, term in enumerate(terms):
+        value, error = float(fit.values[index]), float(fit.robust[index])
+        half = fit.quantile * error
+        if fit.freedom < 1.0 or not math.isfinite(half):
+            reason = "what is left over is worth too few independent rows"
+            found[term.name] = Estimate.without_interval(term.name, value, term.unit, reason)
+            continue
+        one = Estimate(
+            term.name, value, term.unit, value - half, value + half, LEVEL, HAC,
+            standard_error=error, freedom=fit.freedom,
+        )  # fmt: skip
+        for source, shifts in parts.items():
+            one = shifted_by(one, source, None if shifts is None else float(shifts[index]))
+        found[term.name] = one
+    return found
+
+
+def _doubt(best: Tried, late: Estimate, motion: Motion) -> float:
+    """By how much the delay may be wrong (s, 1 sigma): a sample where it was not taken out."""
+    if best.delay == 0.0 or math.isnan(late.half_width):
+        return 1.0 / motion.sample_rate
+    return late.half_width / NORMAL_95
+
+
+def _shift(
+    motions: Sequence[Motion],
+    terms: Sequence[Term],
+    filtering: Filtering,
+    delay: float,
+    fit: Regression,
+) -> Array | None:
+    """How far each coefficient goes with another band or delay, shape (k,); None: nowhere."""
+    try:
+        other = regress([rows(motion, terms, filtering, delay) for motion in motions])
+    except ValueError:
+        return None
+    return np.asarray(np.abs(other.values - fit.values))
+
+
+def _instruments(
+    pieces: Sequence[Moved], best: Tried, filtering: Filtering
+) -> tuple[Instrumented | None, str]:
+    wanted = [each.wanted for each in pieces]
+    if any(each is None for each in wanted):
+        return None, "nobody recorded what motion was wanted"
+    terms = best.structure.terms
+    own: list[Piece] = []
+    other: list[Piece] = []
+    for each in pieces:
+        if each.wanted is None:
+            continue
+        # Where the two move in different directions, one says nothing of the other.
+        both = moving(each.motion, filtering) * moving(each.wanted, filtering)
+        for motion, late, into in ((each.motion, best.delay, own), (each.wanted, 0.0, other)):
+            piece = all_rows(motion, terms, filtering, late)
+            into.append(Piece(piece.columns * both[:, None], piece.force * both, piece.time))
+    if any(not np.any(columns(each, terms[:1])) for each in wanted if each is not None):
+        return None, "what was wanted stands still"
+    try:
+        found = by_instruments(own, other)
+    except ValueError as error:
+        return None, str(error)
+    if float(np.min(found.strength)) < WEAK:
+        weakest = terms[int(np.argmin(found.strength))].name
+        told = f"what was wanted hardly tells {weakest} (F {np.min(found.strength):.2g})"
+        return None, told
+    return found, ""

@@ -1,0 +1,64 @@
+"""Which trials of which run are meant: `RUN`, or one of its tests as `RUN:TEST`."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
+from campaign.errors import UsageError
+from campaign.trial import Outcome, Role
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A run, and the trials of it that are meant.
+
+    Attributes:
+        test: the one that was named, or "".
+        trials: completed measurements, in plan order.
+    """
+
+    run: RunReader
+    test: str
+    trials: tuple[ArchivedTrial, ...]
+
+    @property
+    def name(self) -> str:
+        """As it was asked for."""
+        return f"{self.run.name}:{self.test}" if self.test else self.run.name
+
+    def of_bench(self, bench: str) -> tuple[ArchivedTrial, ...]:
+        """Those of its tests on the bench of that name."""
+        return tuple(t for t in self.trials if t.trial.bench.get("name") == bench)
+
+
+def choose(results: Path, named: str) -> Chosen:
+    """What `RUN` or `RUN:TEST` means. Raises UsageError where there is no such test or trial."""
+    path, test = _split(results, named)
+    run = open_run(path)
+    tests = [str(each.get("name", "")) for each in run.header.tests]
+    if test and test not in tests:
+        close = difflib.get_close_matches(test, tests, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(tests)}"
+        raise UsageError(f"{run.name}: there is no test {test!r}; {hint}")
+    trials = tuple(
+        each
+        for each in run.trials
+        if each.ending.outcome is Outcome.COMPLETED
+        and each.trial.role is Role.MEASUREMENT
+        and (not test or each.trial.test == test)
+    )
+    if not trials:
+        of = f"of {test!r} " if test else ""
+        raise UsageError(f"{run.name}: no trial {of}was completed; there is nothing to identify")
+    return Chosen(run, test, trials)
+
+
+def _split(results: Path, named: str) -> tuple[Path, str]:
+    """A run's path and a test; the colon of a path is none of ours."""
+    before, colon, after = named.rpartition(":")
+    if not colon or not before or Path(named).exists() or any(c in after for c in "/\\"):
+        return find_run(results, named), ""
+    return find_run(results, before), after

@@ -1,0 +1,93 @@
+"""What a method of identification is: which trials suffice, and what it makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from campaign.archive import ArchivedTrial
+from campaign.estimate import Estimate
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Result
+
+
+def nobody_listens(text: str) -> None:
+    """Where nobody waits."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What is identified from.
+
+    Attributes:
+        bench: what is stated of the rig.
+        trials: that models are fitted to, completed measurements in plan order.
+        validation: that no model is fitted to, and that predictions are held against; read once,
+            when everything is chosen. Empty without any.
+        say: tells whoever waits what is being done.
+    """
+
+    bench: Bench
+    trials: tuple[ArchivedTrial, ...]
+    validation: tuple[ArchivedTrial, ...] = ()
+    say: Callable[[str], None] = nobody_listens
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the rig.
+
+    Attributes:
+        estimate: SI, of a rotary axis; what is shown follows from the bench.
+        meaning: one sentence.
+        display: unit that a reader is shown, "" for the same.
+        bench: key of the bench file that it fills in, e.g. `axis.inertia`; "" for none.
+        advice: what to measure next to make its interval narrower; "" where nobody knows.
+    """
+
+    estimate: Estimate
+    meaning: str
+    display: str = ""
+    bench: str = ""
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What one method found.
+
+    Attributes:
+        parameters: of the model that it settled on.
+        result: tables, figures, findings, notes and conclusions behind them.
+        correlations: of parameters, by their names; pairs that are not named go their own ways.
+        settings: further values that the bench file needs for these parameters to be of use, by
+            key: value, SI unit (rotary; "" for none) and what they rest on; nobody measured them.
+        again: options that fit the same model to other data, by name.
+    """
+
+    parameters: tuple[Parameter, ...]
+    result: Result
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    settings: Mapping[str, tuple[Any, str, str]] = field(default_factory=dict)
+    again: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of identification.
+
+    Attributes:
+        name: what `--model` says.
+        summary: one line for `campaign kinds`.
+        options: what it accepts; `--set NAME.option=value`.
+        suits: of trials, those that it can use; where none, why.
+        identify: what they come to. Raises ValueError with a message for the user.
+    """
+
+    name: str
+    summary: str
+    options: type[Options]
+    suits: Callable[[Sequence[ArchivedTrial]], tuple[Sequence[ArchivedTrial], str]]
+    identify: Callable[[Material, Any], Identified]

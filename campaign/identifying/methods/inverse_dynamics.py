@@ -1,0 +1,295 @@
+"""Inverse dynamics of any motion: inertia and friction by regression of the force.
+
+The force of a motion is a sum of terms (`identification.inverse.terms`); their coefficients follow
+from least squares on filtered rows, with deviations that know of autocorrelation, and are held
+against instruments from the wanted motion where that was recorded. Delay first, then structure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from pydantic import Field
+
+from campaign.channels import DRIVE_TORQUE
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.inverse.motion import Filtering
+from campaign.identification.inverse.terms import TERMS
+from campaign.identifying.inverse.figures import figures
+from campaign.identifying.inverse.found import InverseDynamics, find
+from campaign.identifying.inverse.motions import Moved, moved, usable, with_slowest
+from campaign.identifying.inverse.tables import (
+    correlated,
+    deviations_table,
+    instruments_table,
+    structures_table,
+)
+from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.tables import words
+from campaign.options import Options
+from campaign.result import Amount, Conclusion, Finding, Result, Table
+from campaign.units import AngularRate, Frequency, Time
+
+FRICTION = "friction.load"
+BENCH = {
+    "coulomb": f"{FRICTION}.coulomb_torque",
+    "viscous": f"{FRICTION}.viscous_friction",
+    "coulomb_positive": f"{FRICTION}.coulomb_torque",
+    "coulomb_negative": f"{FRICTION}.negative.coulomb_torque",
+    "viscous_positive": f"{FRICTION}.viscous_friction",
+    "viscous_negative": f"{FRICTION}.negative.viscous_friction",
+    "inertia": "axis.inertia",
+}
+"""Where coefficients go that a bench has a place for: a plain friction model of steady sliding."""
+PLAIN = frozenset(BENCH) | {"offset"}
+ADVICE = {
+    "inertia": "move with more acceleration at the same speeds: a multisine, or shorter ramps",
+    "viscous": "move at more, and further apart, steady speeds",
+    "coulomb": "reverse more often, and slide more slowly",
+    "spring": "move over more of the travel",
+    "gravity": "move over more of the travel",
+    "offset": "move as much in one direction as in the other",
+}
+"""By the beginning of a term's name: what tells its coefficient better."""
+
+
+class InverseDynamicsOptions(Options):
+    """Options of inverse dynamics."""
+
+    low_pass: Frequency | None = Field(default=None, gt=0)
+    """Corner of the zero-phase low-pass of the motion; absent: 100 Hz, or a fifth of the sample
+    rate where that is less."""
+    decimation: int | None = Field(default=None, ge=1, le=1000)
+    """Of how many samples one is kept, behind a low-pass; absent: to about 100 Hz."""
+    skip: Time = Field(default=0.0, ge=0)
+    """Left out at the beginning of each motion."""
+    slowest: AngularRate | None = Field(default=None, ge=0)
+    """Rate below which the axis counts as standing still, and rows are left out; absent: 2 % of
+    its fastest."""
+    delay: Time | None = None
+    """By how much the force acts later than recorded; absent: it is found."""
+    terms: tuple[str, ...] = ()
+    """Names of the model's terms; absent: they are chosen."""
+
+
+def _identify(material: Material, options: InverseDynamicsOptions) -> Identified:
+    terms = None
+    if options.terms:
+        unknown = [name for name in options.terms if name not in TERMS]
+        if unknown:
+            raise ValueError(f"there is no term {unknown[0]!r}; there are {', '.join(TERMS)}")
+        terms = [TERMS[name] for name in options.terms]
+    rate = material.trials[0].trial.task.sample_rate
+    plain = Filtering.for_rate(rate)
+    filtering = Filtering(
+        options.low_pass or plain.low_pass,
+        options.decimation or plain.decimation,
+        round(options.skip * rate),
+    )
+    pieces = moved(material.trials, filtering)
+    unseen: tuple[Moved, ...] = ()
+    if material.validation:
+        trials, why = usable(material.validation)
+        if why:
+            raise ValueError(f"of the validation {why}")
+        unseen = moved(trials, filtering)
+    filtering = with_slowest(filtering, pieces, options.slowest)
+    found = find(
+        pieces,
+        unseen,
+        filtering,
+        delay=options.delay,
+        terms=terms,
+        linear=material.bench.is_linear,
+    )
+    parameters = tuple(_parameters(found, material))
+    return Identified(
+        parameters,
+        Result(
+            tables=tuple(_tables(found, parameters)),
+            figures=tuple(figures(found)),
+            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+            notes=tuple(_notes(found, material)),
+            conclusions=tuple(_conclusions(found, parameters)),
+        ),
+        correlations=_correlations(found),
+        settings=_settings(found, material),
+        again={"terms": found.best.structure.names},
+    )
+
+
+def _parameters(found: InverseDynamics, material: Material) -> Iterator[Parameter]:
+    fit = found.fit
+    together = {
+        name: (other, share)
+        for one, two, share in correlated(fit, found.best.structure.terms)
+        for name, other in ((one, two), (two, one))
+    }
+    plain, dissipates = _is_plain(found), not _impossible(found, "coulomb")
+    for term in found.best.structure.terms:
+        one = _scaled(found.estimates[term.name], material)
+        bench = BENCH.get(term.name, "") if plain or term.name == "inertia" else ""
+        advice = next((text for key, text in ADVICE.items() if term.name.startswith(key)), "")
+        if term.name in together:
+            other, share = together[term.name]
+            advice = (
+                f"the motion hardly tells it from {other} (correlation {share:.2f}): {advice}"
+                if advice
+                else f"move so that it differs from {other} (correlation {share:.2f})"
+            )
+        if bench and not _possible(term.name, one):
+            bench = ""
+        if bench.startswith(FRICTION) and not dissipates:
+            bench = ""
+        yield Parameter(one, term.meaning, bench=bench, advice=advice)
+    late = found.delay
+    if late.origin is not Origin.GIVEN:
+        yield Parameter(
+            late,
+            "By how much the force acts later than it is recorded.",
+            display="ms",
+            advice="record faster, or with sharper reversals",
+        )
+
+
+def _possible(name: str, one: Estimate) -> bool:
+    """A bench has no negative friction; a number that is none goes to no bench."""
+    if math.isnan(one.value):
+        return False
+    if name.startswith("viscous"):
+        return one.value >= 0
+    low = one.combined[0]
+    return one.value > 0 and (low is None or low > 0)
+
+
+def _impossible(found: InverseDynamics, begin: str) -> list[str]:
+    """Names of estimates that are, or may be, negative, and cannot be."""
+    return [
+        name
+        for name, one in found.estimates.items()
+        if name in BENCH and name.startswith(begin) and not _possible(name, one)
+    ]
+
+
+def _is_plain(found: InverseDynamics) -> bool:
+    """Whether the chosen terms are those that a bench's friction model has."""
+    return {term.name for term in found.best.structure.terms} <= PLAIN
+
+
+def _scaled(one: Estimate, material: Material) -> Estimate:
+    """With what a wrong constant of the force would do to it."""
+    data = material.trials[0]
+    return with_scale(_with_constant(one, material), data, DRIVE_TORQUE)
+
+
+def _with_constant(one: Estimate, material: Material) -> Estimate:
+    if material.bench.motor is None or _from_elsewhere(material):
+        return one
+    return with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
+
+
+def _from_elsewhere(material: Material) -> bool:
+    """Whether a mapping says what the columns are worth, and so how sure that is."""
+    return bool(material.trials[0].trial.recording)
+
+
+def _tables(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Table]:
+    yield structures_table(found)
+    for number, each in enumerate(found.tried[:2]):
+        if each.delay == 0.0 and number != found.chosen:
+            name = "both directions alike" if "coulomb" in each.structure.names else "by direction"
+            yield deviations_table(f"plain-{number + 1}", f"Plain fit, {name}", each)
+    yield deviations_table("chosen", "The chosen model and its deviations", found.best)
+    if found.instruments is not None:
+        by_name = {each.estimate.name: each.estimate for each in parameters}
+        yield instruments_table(found.best.structure.terms, by_name, found.instruments)
+
+
+def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
+    filtering = found.filtering
+    yield (
+        f"Position low-passed at {filtering.low_pass:g} Hz without phase, differentiated twice; "
+        f"one of {filtering.decimation} samples is kept behind the same low-pass on both sides; "
+        f"{filtering.skip} samples were left out at each beginning."
+    )
+    if found.no_instruments:
+        yield f"No instruments: {found.no_instruments}."
+    late = found.delay
+    if math.isnan(late.value):
+        yield f"The delay of the force is not determined: {late.reason}."
+    for one, two, share in correlated(found.fit, found.best.structure.terms):
+        yield (
+            f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
+            "the motion hardly tells them apart, and only their sum is known well."
+        )
+    doubtful = _impossible(found, "inertia") + _impossible(found, "coulomb")
+    if doubtful:
+        yield (
+            f"{' and '.join(map(words, doubtful))}: negative, or not told from zero, "
+            "which no rig has. Either force and motion do not belong together (sign or unit of a "
+            "column, a constant load), "
+            "or the motion does not show it; it goes to no bench file."
+        )
+    if not _is_plain(found):
+        yield (
+            "Friction of the chosen model is a sum of terms that mean something together, over the "
+            "rates of this motion only; a bench file has no place for it, and gets the inertia. "
+            "`--model whole_model` fits the friction models that it has a place for."
+        )
+    if len(material.trials) > 1:
+        yield f"{len(material.trials)} trials were fitted together."
+
+
+def _conclusions(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Conclusion]:
+    by_name = {each.estimate.name: each.estimate for each in parameters}
+    if "inertia" in by_name and not math.isnan(by_name["inertia"].value):
+        parts: list[str | Amount] = ["The inertia is ", Amount(by_name["inertia"], "kg m^2")]
+        if (late := by_name.get("delay")) is not None and found.best.delay != 0.0:
+            low, high = late.combined
+            surely = low is None or high is None or low > 0 or high < 0
+            tail = " later than it is recorded"
+            tail += "" if surely else ", or not at all later: its interval holds zero"
+            parts += [", and the force acts ", Amount(late, "ms"), tail]
+        yield Conclusion((*parts, "."))
+    best = found.best
+    if best.validation is not None:
+        parts = ["The model leaves ", Amount(best.validation, "percent"), " of an unseen torque"]
+        if best.gain is not None and best.gain.value != 0.0:
+            without = " of it than without delay and further terms"
+            parts += [", lower by ", Amount(best.gain, "percent"), without]
+        yield Conclusion((*parts, "."))
+
+
+def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
+    matrix, terms = found.fit.correlation, found.best.structure.terms
+    return {
+        (terms[i].name, terms[j].name): float(matrix[i, j])
+        for i in range(len(terms))
+        for j in range(i)
+    }
+
+
+def _settings(found: InverseDynamics, material: Material) -> dict[str, tuple[object, str, str]]:
+    """What a friction model needs besides: no Stribeck part was looked for, so it has none."""
+    if not _is_plain(found) or "load" in material.bench.friction:
+        return {}
+    coulomb = found.estimates.get("coulomb", found.estimates.get("coulomb_positive"))
+    if coulomb is None or not coulomb.value > 0:
+        return {}
+    return {
+        f"{FRICTION}.model": ("stribeck", "", "the plain friction of steady sliding"),
+        f"{FRICTION}.static_torque": (coulomb.value, "N m", "no static friction was looked for"),
+        f"{FRICTION}.stribeck_velocity": (1e-3, "rad/s", "without static friction it is nothing"),
+    }
+
+
+METHOD = Method(
+    name="inverse_dynamics",
+    summary="inertia and friction of any motion, by regression of the force",
+    options=InverseDynamicsOptions,
+    suits=usable,
+    identify=_identify,
+)

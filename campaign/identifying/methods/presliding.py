@@ -1,0 +1,263 @@
+"""Presliding: stiffness and damping of the bristles, and inertia, from small multisines of torque.
+
+The simulation of the whole motion is fitted to all trials of `presliding_multisine` at once. What
+is found is the sum over all interfaces, before any of them slips: with one interface that is a
+number of the bench, with several only their sum is known, and no bench file has a place for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from campaign.archive import ArchivedTrial
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimate import Estimate
+from campaign.experiments.presliding_multisine import EXPERIMENT as SHAKEN
+from campaign.experiments.presliding_multisine import PreslidingMultisineOptions
+from campaign.experiments.results.presliding_dynamics import (
+    assumed_of,
+    damping_figure,
+    estimates_of,
+    figures_of,
+    record_of,
+    remarks,
+    viscous_of,
+)
+from campaign.identification.intervals import shifted_by
+from campaign.identification.presliding_dynamics.found import (
+    PreslidingDynamics,
+    identify_presliding_dynamics,
+)
+from campaign.identification.presliding_dynamics.prediction import unexplained
+from campaign.identification.presliding_dynamics.record import Record
+from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Amount, Column, Conclusion, Finding, Result, Table
+from campaign.units import RotationalDamping
+
+MOTION = (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE)
+MEANINGS = {
+    "stiffness_at_rest": "Slope of friction over angle before any interface slips, of all of them.",
+    "damping_at_rest": "Damping of small motions, bristles' and viscous friction's together.",
+    "bristle_damping": "Damping of the bristles: that of small motions less viscous friction.",
+    "inertia": "What resists acceleration.",
+    "damping_ratio": "Damping of small motions over the critical one.",
+    "natural_frequency": "Frequency at which the load swings on its bristles.",
+    "appendage_frequency": "Frequency of the elastic part when the load is held.",
+    "appendage_inertia": "Inertia of the elastic part.",
+    "appendage_damping_ratio": "Damping ratio of the elastic part when the load is held.",
+}
+KEYS = {
+    "inertia": "axis.inertia",
+    "appendage_frequency": "appendage.frequency",
+    "appendage_inertia": "appendage.inertia",
+    "appendage_damping_ratio": "appendage.damping_ratio",
+}
+ADVICE = {
+    "inertia": "shake with more lines above the resonance, or longer",
+    "stiffness_at_rest": "shake with more lines below the resonance, or longer",
+    "damping": "shake with more lines around the resonance, or longer",
+    "bristle_damping": "know viscous friction better, by a velocity map",
+    "appendage": "shake with more lines around its frequency, or longer",
+    "natural_frequency": "shake with more lines around it, or longer",
+}
+"""By the beginning of a name: what tells the number better."""
+
+
+class PreslidingOptions(Options):
+    """Options of presliding."""
+
+    viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
+    """sigma2 at the load, to be taken off the damping of small motions; absent: the bench's."""
+    damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
+    """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
+
+
+def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+    """Trials of `presliding_multisine` with torque and motion, or why there are none."""
+    found = [
+        each
+        for each in trials
+        if each.trial.kind == SHAKEN.name
+        and DRIVE_TORQUE in each.channel_names()
+        and each.channel_names() & set(MOTION)
+    ]
+    why = f"no trial of {SHAKEN.name} has {DRIVE_TORQUE} and {' or '.join(MOTION)}"
+    return found, "" if found else why
+
+
+def _identify(material: Material, options: PreslidingOptions) -> Identified:
+    found = identify_presliding_dynamics(
+        _records(material.trials), assumed_of(material.bench, _span(material.trials))
+    )
+    told = estimates_of(found, material.bench)
+    told |= _bristle_damping(told, material.bench, options)
+    parameters = tuple(_parameters(told, material.bench))
+    shown = tuple(each.trial.number for each in material.trials)
+    figures = list(figures_of(found, "", shown))
+    if "damping_at_rest" in told and told["damping_at_rest"].has_interval:
+        sizes = np.array([record.amplitude for record in found.fit.records])
+        figures.append(damping_figure(sizes, [], told, options.damping_ratio, "", shown))
+    return Identified(
+        parameters,
+        Result(
+            tables=tuple(_tables(found, told, _records(material.validation))),
+            figures=tuple(figures),
+            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+            notes=(*remarks(found), *_notes(material.bench)),
+            conclusions=tuple(_conclusions(told)),
+        ),
+        correlations=_correlations(found),
+    )
+
+
+def _records(trials: Sequence[ArchivedTrial]) -> list[Record]:
+    return [
+        record_of(each, 1.0 / _options(each).lowest)
+        for each in trials
+        if each.trial.kind == SHAKEN.name
+    ]
+
+
+def _options(data: ArchivedTrial) -> PreslidingMultisineOptions:
+    return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
+
+
+def _span(trials: Sequence[ArchivedTrial]) -> tuple[float, float]:
+    """Lowest and highest line of all trials (Hz)."""
+    options = [_options(each) for each in trials]
+    return min(each.lowest for each in options), max(each.highest for each in options)
+
+
+def _bristle_damping(
+    told: dict[str, Estimate], bench: Bench, options: PreslidingOptions
+) -> dict[str, Estimate]:
+    """sigma1: the damping of small motions less what is known of viscous friction."""
+    whole = told.get("damping_at_rest")
+    if whole is None:
+        return {}
+    viscous = viscous_of(bench) if options.viscous_friction is None else options.viscous_friction
+    own = replace(
+        whole,
+        name="bristle_damping",
+        value=whole.value - viscous,
+        low=None if whole.low is None else whole.low - viscous,
+        high=None if whole.high is None else whole.high - viscous,
+    )
+    if not own.has_interval:
+        return {own.name: own}
+    key = _interface(bench)
+    known = bench.known_uncertainty(f"friction.{key}.viscous_friction") if key else None
+    return {own.name: shifted_by(own, "viscous friction", known)}
+
+
+def _interface(bench: Bench) -> str:
+    """The only interface of a bench, where it acts at the load and has bristles; else ""."""
+    if len(bench.friction) != 1:
+        return ""
+    ((name, options),) = bench.friction.items()
+    at_load = bench.at_load(options) == (1.0, 1.0)
+    return name if at_load and hasattr(options, "bristle_stiffness") else ""
+
+
+def _parameters(told: dict[str, Estimate], bench: Bench) -> Iterator[Parameter]:
+    keys, own = dict(KEYS), _interface(bench)
+    if own:
+        keys["stiffness_at_rest"] = f"friction.{own}.bristle_stiffness"
+        keys["bristle_damping"] = f"friction.{own}.bristle_damping"
+    for name, meaning in MEANINGS.items():
+        if name not in told or math.isnan(told[name].value):
+            continue
+        one = told[name]
+        key = keys.get(name, "") if one.has_interval and one.value > 0 else ""
+        advice = next((text for part, text in ADVICE.items() if name.startswith(part)), "")
+        yield Parameter(one, meaning, bench=key, advice=advice)
+
+
+def _tables(
+    found: PreslidingDynamics, told: dict[str, Estimate], unseen: Sequence[Record]
+) -> Iterator[Table]:
+    yield Table(
+        "presliding",
+        "What small motions tell",
+        (Column("number", "Number"), Column("unit", "Unit"), Column("value", "Value")),
+        tuple(
+            {"number": name.replace("_", " "), "unit": each.unit, "value": each}
+            for name, each in told.items()
+        ),
+        note="Stiffness and damping at rest are the sums over all interfaces of the axis.",
+    )
+    rows = [(each, "fitted") for each in found.fit.records]
+    rows += [(each, "unseen") for each in unseen]
+    yield Table(
+        "presliding-missed",
+        "What the fitted model misses of each trial",
+        (
+            Column("trial", "Trial"),
+            Column("use", "Use"),
+            Column("amplitude", "Largest torque", "N m", "N m", exact=True),
+            Column("missed", "Missed", "", "percent", reason="noise of the sensor is in it"),
+        ),
+        tuple(
+            {
+                "trial": record.named,
+                "use": use,
+                "amplitude": record.amplitude,
+                "missed": unexplained(found.fit, record),
+            }
+            for record, use in rows
+        ),
+        note="Rms of measured less simulated motion over that of the motion. Of unseen trials "
+        "nothing was fitted but the sensor's offset and drift.",
+    )
+
+
+def _notes(bench: Bench) -> Iterator[str]:
+    if len(bench.friction) > 1:
+        yield (
+            f"The bench states {len(bench.friction)} interfaces. Before the first of them slips a "
+            "motion shows only the sum of their stiffness and of their damping; what each of them "
+            "has goes to no bench file."
+        )
+
+
+def _conclusions(told: dict[str, Estimate]) -> Iterator[Conclusion]:
+    names = ("inertia", "stiffness_at_rest", "damping_at_rest")
+    if not all(name in told and told[name].has_interval for name in names):
+        yield Conclusion(("Small motions tell no stiffness and no damping here.",))
+        return
+    inertia, stiffness, damping = (Amount(told[name]) for name in names)
+    yield Conclusion(
+        (
+            "Before it slips, an inertia of ",
+            inertia,
+            " is held by ",
+            stiffness,
+            " and ",
+            damping,
+            ".",
+        )
+    )
+
+
+def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
+    """By the names of the parameters; the damping of the bristles is the whole one's twin."""
+    names = {"bristle_stiffness": "stiffness_at_rest", "damping": "bristle_damping"}
+    matrix = found.spread.correlation
+    own = [names.get(each, each) for each in found.fit.parameters.names]
+    return {(own[i], own[j]): float(matrix[i, j]) for i in range(len(own)) for j in range(i)}
+
+
+METHOD = Method(
+    name="presliding",
+    summary="stiffness, damping and inertia from small multisines below breakaway",
+    options=PreslidingOptions,
+    suits=usable,
+    identify=_identify,
+)

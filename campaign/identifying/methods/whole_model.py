@@ -1,0 +1,239 @@
+"""Whole friction models along any motion, fitted through the engine and compared on unseen motion.
+
+The friction models of this program meet the measured rate, with their own state; inertia, delay and
+linear terms are fitted with them. What has no information goes to no bench file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from campaign.archive import ArchivedTrial
+from campaign.channels import DRIVE_TORQUE
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.inverse.motion import Filtering
+from campaign.identification.inverse.terms import Term
+from campaign.identifying.inverse.found import InverseDynamics
+from campaign.identifying.inverse.found import find as find_inverse
+from campaign.identifying.inverse.motions import Moved, moved, usable, with_slowest
+from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.tables import words
+from campaign.identifying.whole.found import Fit, find, product
+from campaign.identifying.whole.shown import figures, models_table, values_table
+from campaign.options import Options
+from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.units import Frequency, Time
+
+FRICTION = "friction.load"
+FORCES = (
+    "inertia",
+    "coulomb",
+    "viscous",
+    "static_torque",
+    "bristle",
+    "spring",
+    "offset",
+    "cogging",
+)
+"""Beginnings of names whose numbers grow with the force's constant."""
+MOST_SAMPLES = 60_000
+"""of all trials together that are fitted: a fit simulates them some hundred times."""
+STILL = 0.25
+"""of the rate below which a plain regression takes an axis for standing: curves begin there."""
+LINEAR = ("spring", "gravity", "cogging")
+"""Beginnings of terms of a plain regression that no friction model stands in for."""
+ADVICE = {
+    "static_over_coulomb": "slide more slowly, and reverse more often",
+    "stribeck_velocity": "slide at more speeds between rest and the fastest",
+    "bristle": "stay below breakaway: `presliding_multisine` measures it",
+    "coulomb": "reverse more often",
+    "viscous": "slide at more, and further apart, speeds",
+    "inertia": "move with more acceleration at the same speeds",
+    "spring": "move over more of the travel",
+}
+
+
+class WholeModelOptions(Options):
+    """Options of whole models."""
+
+    low_pass: Frequency | None = Field(default=None, gt=0)
+    """As of `inverse_dynamics`."""
+    decimation: int | None = Field(default=None, ge=1, le=1000)
+    """As of `inverse_dynamics`."""
+    skip: Time = Field(default=0.0, ge=0)
+    """As of `inverse_dynamics`."""
+    starts: int = Field(default=2, ge=1, le=50)
+    """Fits of each model, the first from plain inverse dynamics and the others at random."""
+    model: str = ""
+    """Name of the model whose numbers are told; absent: the one that does best."""
+
+
+def _identify(material: Material, options: WholeModelOptions) -> Identified:
+    rate = material.trials[0].trial.task.sample_rate
+    plain = Filtering.for_rate(rate)
+    filtering = Filtering(
+        options.low_pass or plain.low_pass,
+        options.decimation or plain.decimation,
+        round(options.skip * rate),
+    )
+    used = _few(material.trials)
+    pieces = moved(used, filtering)
+    unseen: tuple[Moved, ...] = ()
+    if material.validation:
+        trials, why = usable(material.validation)
+        if why:
+            raise ValueError(f"of the validation {why}")
+        unseen = moved(trials, filtering)
+    moves = with_slowest(filtering, pieces, None)
+    filtering = replace(filtering, slowest=STILL * moves.slowest)
+    regression = find_inverse(pieces, unseen, moves, linear=material.bench.is_linear)
+    extra = _linear_terms(regression)
+    found = find(pieces, unseen, filtering, extra, options.starts, material.say)
+    names = [each.model.name for each in found.fits]
+    if options.model and options.model not in names:
+        raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
+    if options.model:
+        found = replace(found, best=names.index(options.model))
+    best = found.fits[found.best]
+    parameters = tuple(_parameters(best, material))
+    return Identified(
+        parameters,
+        Result(
+            tables=(models_table(found), *(values_table(each) for each in found.fits)),
+            figures=tuple(figures(found, regression, unseen)),
+            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+            notes=(*_left_out(material.trials, used), *_notes(best)),
+            conclusions=tuple(_conclusions(best)),
+        ),
+        correlations=best.fit.correlation,
+        settings=_settings(best),
+        again={"model": best.model.name},
+    )
+
+
+def _few(trials: Sequence[ArchivedTrial]) -> Sequence[ArchivedTrial]:
+    """As many trials, evenly over all of them, as do not make a fit take minutes."""
+    lengths = [round(t.trial.task.duration * t.trial.task.sample_rate) for t in trials]
+    for count in range(len(trials), 1, -1):
+        chosen = np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int))
+        if sum(lengths[i] for i in chosen) <= MOST_SAMPLES:
+            return [trials[i] for i in chosen]
+    return trials[:1]
+
+
+def _left_out(trials: Sequence[ArchivedTrial], used: Sequence[ArchivedTrial]) -> Iterator[str]:
+    if len(used) < len(trials):
+        numbers = ", ".join(str(each.trial.number) for each in used)
+        yield (
+            f"Of {len(trials)} trials {len(used)} were fitted ({numbers}): all of them have more "
+            f"than the {MOST_SAMPLES} samples that a fit takes."
+        )
+
+
+def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
+    terms = found.best.structure.terms
+    return tuple(term for term in terms if term.name.startswith(LINEAR))
+
+
+def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
+    told = dict(best.fit.estimates)
+    keys = {each.unknown.name: each for each in best.model.numbers if not each.over}
+    meanings = {each.unknown.name: each.meaning for each in best.model.numbers}
+    meanings |= {term.name: term.meaning for term in best.extra}
+    meanings["inertia"] = "What resists acceleration."
+    meanings["delay"] = "By how much the force acts later than it is recorded."
+    for name, estimate in told.items():
+        bench = "axis.inertia" if name == "inertia" else ""
+        if name in keys:
+            bench = f"{FRICTION}.{keys[name].key}"
+        advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
+        display = "ms" if name == "delay" else ""
+        one = _scaled(estimate, material)
+        yield Parameter(one, meanings.get(name, ""), display, bench, advice)
+    ratio = told["static_over_coulomb"]
+    for each in best.model.numbers:
+        if not each.over:
+            continue
+        base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+        share = best.fit.correlation.get((ratio.name, base), 0.0)
+        share = share or best.fit.correlation.get((base, ratio.name), 0.0)
+        way = base.removeprefix("coulomb")
+        made = product(f"static_torque{way}", ratio, told[base], share)
+        meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
+        advice = ADVICE["static_over_coulomb"]
+        yield Parameter(_scaled(made, material), meaning, "", f"{FRICTION}.{each.key}", advice)
+
+
+def _scaled(one: Estimate, material: Material) -> Estimate:
+    """With what a wrong constant of the force would do to it."""
+    if not one.name.startswith(FORCES) or one.origin is Origin.NOT_DETERMINED:
+        return one
+    data = material.trials[0]
+    if material.bench.motor is not None and not data.trial.recording:
+        one = with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
+    return with_scale(one, data, DRIVE_TORQUE)
+
+
+def _settings(best: Fit) -> dict[str, tuple[object, str, str]]:
+    """The model's name, and numbers that the motion leaves open: a bench needs them, too."""
+    told: dict[str, tuple[object, str, str]] = {
+        f"{FRICTION}.model": (best.model.model, "", "fitted")
+    }
+    values = best.values
+    flat = {each.unknown.name: each for each in best.model.numbers if not each.over}
+    for name, estimate in best.fit.estimates.items():
+        if name in flat and estimate.origin is not Origin.MEASURED:
+            each = flat[name]
+            told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, estimate.reason)
+    if best.fit.estimates["static_over_coulomb"].origin is not Origin.MEASURED:
+        for each in best.model.numbers:
+            if each.over:
+                base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+                value = values["static_over_coulomb"] * values[base]
+                told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
+    return told
+
+
+def _notes(best: Fit) -> Iterator[str]:
+    for name, each in best.fit.estimates.items():
+        if each.origin is not Origin.MEASURED:
+            yield f"{name.replace('_', ' ')} is not known: {each.reason}."
+    for (one, two), share in best.fit.correlation.items():
+        if abs(share) >= 0.9:
+            yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."
+    if best.values["static_over_coulomb"] < 1.0:
+        yield "Friction rises as sliding sets in: static friction lies below Coulomb friction."
+    yield (
+        "Each model met the rate that was measured, in steps of the recording; a loop that was "
+        "closed on that rate is in the data, and not in the model."
+    )
+
+
+def _conclusions(best: Fit) -> Iterator[Conclusion]:
+    told = best.fit.estimates
+    names = [name for name in ("coulomb", "coulomb_positive", "coulomb_negative") if name in told]
+    parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
+    for index, name in enumerate(names):
+        way = name.removeprefix("coulomb").strip("_")
+        parts += [", and "] if index else []
+        parts += [Amount(told[name], "N m"), f" in the {way} direction" if way else ""]
+    yield Conclusion((*parts, "."))
+    if best.validation is not None:
+        yield Conclusion(
+            ("This model leaves ", Amount(best.validation, "percent"), " of an unseen torque.")
+        )
+
+
+METHOD = Method(
+    name="whole_model",
+    summary="friction models along any motion, fitted through the engine and compared",
+    options=WholeModelOptions,
+    suits=usable,
+    identify=_identify,
+)

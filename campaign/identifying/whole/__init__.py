@@ -1,0 +1,1 @@
+"""Friction models of this program along archived motions, fitted through the engine."""

@@ -1,0 +1,336 @@
+"""Friction models fitted to motions, and compared on what none of them was fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate, Origin
+from campaign.identification.intervals import LEVEL, USELESS, shifted_by
+from campaign.identification.inverse.choosing import criterion, structure
+from campaign.identification.inverse.motion import (
+    Array,
+    Filtering,
+    Motion,
+    decimated,
+    kept_times,
+    later,
+)
+from campaign.identification.inverse.rows import moving
+from campaign.identification.inverse.terms import DIRECTIONAL, TERMS, Term, columns
+from campaign.identification.inverse.validation import Prediction, improvement, relative_error
+from campaign.identification.unknowns import Unknown
+from campaign.identification.whole_model import (
+    METHOD,
+    ModelFit,
+    Values,
+    fit_model,
+    held_out,
+    refitted,
+)
+from campaign.identifying.inverse.found import together
+from campaign.identifying.inverse.motions import Moved
+from campaign.identifying.whole.along import Along
+from campaign.identifying.whole.models import Model, Sizes, models
+
+DELAYS = 5.0
+"""Samples to either side between which the force's delay is looked for."""
+BLOCKS, EVERY = 12, 3
+"""Blocks of each recording, and which of them are left out once: every third."""
+BAND = 0.4
+"""of the rows' rate that their low-pass leaves."""
+RESOLVED = 3.0
+"""Time constants of the low-pass that something must take to be seen as more than a jump."""
+WIDE = 5.0
+"""How many times more or less than plain inverse dynamics the inertia may be."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One model, fitted.
+
+    Attributes:
+        extra: further terms that are linear: an offset, a spring.
+        held_out: relative residual of blocks that a fit did not see.
+        predictions: of the validation; empty without any.
+        validation: relative residual there, and `gain`: by how much it is lower than the first
+            model's; None without any.
+    """
+
+    model: Model
+    extra: tuple[Term, ...]
+    fit: ModelFit
+    relative: float
+    held_out: float
+    criterion: float
+    predictions: tuple[Prediction, ...] = ()
+    validation: Estimate | None = None
+    gain: Estimate | None = None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """SI, by name."""
+        names = [unknown.name for unknown in self.fit.found.unknowns]
+        return dict(zip(names, self.fit.values, strict=True))
+
+
+@dataclass(frozen=True)
+class Whole:
+    """All models, and which one does best on blocks that it was not fitted to."""
+
+    fits: tuple[Fit, ...]
+    best: int
+    filtering: Filtering
+    pieces: tuple[Moved, ...]
+
+
+def find(
+    pieces: Sequence[Moved],
+    unseen: Sequence[Moved],
+    filtering: Filtering,
+    extra: Sequence[Term] = (),
+    starts: int = 3,
+    say: Callable[[str], None] = lambda text: None,
+) -> Whole:
+    """Fit every model. Raises ValueError where the motion does not slide in both directions."""
+    motions = [each.motion for each in pieces]
+    sizes, inertia = _sizes(motions, filtering)
+    fits: list[Fit] = []
+    for model in models(sizes):
+        alike = "alike" in model.name
+        terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
+        one = _fitted(model, terms, motions, filtering, inertia, starts, say)
+        if unseen:
+            one = _validated(one, fits[0] if fits else None, unseen, filtering)
+        fits.append(one)
+    best = min(range(len(fits)), key=lambda i: fits[i].held_out)
+    return Whole(tuple(fits), best, filtering, tuple(pieces))
+
+
+def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
+    """From plain inverse dynamics."""
+    if not all(any(np.any(TERMS[n].column(m)) for m in motions) for n in DIRECTIONAL):
+        raise ValueError("the axis does not slide in both directions")
+    plain = structure(motions, [TERMS[name] for name in DIRECTIONAL], filtering)
+    inertia, up, down, dry, back = plain.fit.values
+    coulomb = (max(float(dry), 1e-9), max(float(back), 1e-9))
+    if not inertia > 0 or not float(dry) + float(back) > 0:
+        raise ValueError("plain inverse dynamics finds no inertia, or no friction, to begin with")
+    rate = max(float(np.abs(motion.rate).max()) for motion in motions)
+    travel = max(float(np.ptp(motion.position)) for motion in motions)
+    return Sizes(coulomb, (float(up), float(down)), rate, travel), float(inertia)
+
+
+def _fitted(
+    model: Model,
+    extra: tuple[Term, ...],
+    motions: Sequence[Motion],
+    filtering: Filtering,
+    inertia: float,
+    starts: int,
+    say: Callable[[str], None],
+) -> Fit:
+    along = [Along(motion) for motion in motions]
+    rate = motions[0].sample_rate
+    force = max(float(np.abs(motion.force).max()) for motion in motions)
+    unknowns = (
+        Unknown("inertia", inertia / WIDE, inertia * WIDE, inertia, logarithmic=True),
+        *model.unknowns,
+        Unknown("delay", -DELAYS / rate, DELAYS / rate, 0.0),
+        *(_linear(term, motions, force) for term in extra),
+    )
+    units = {each.unknown.name: each.unit for each in model.numbers}
+    units |= {"inertia": "kg m^2", "delay": "s"} | {term.name: term.unit for term in extra}
+    names = [unknown.name for unknown in unknowns]
+
+    def left_in(band: Filtering, values: Values) -> list[Array]:
+        named = dict(zip(names, values, strict=True))
+        return [
+            _rows(_left(one, motion, model, extra, named), band) * moving(motion, band)
+            for one, motion in zip(along, motions, strict=True)
+        ]
+
+    residuals = partial(left_in, filtering)
+    fit = fit_model(
+        unknowns,
+        units,
+        residuals,
+        starts=starts,
+        display=lambda p: say(f"{model.name}, {p.phase}, {p.evaluations} evaluations"),
+    )
+    # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
+    other = refitted(unknowns, partial(left_in, filtering.half_band), fit.found.shares)
+    fit = _with_band(fit, dict(zip(names, other, strict=True)))
+    fit = _resolved(fit, model, motions, filtering)
+    forces = [_rows(motion.force, filtering) * moving(motion, filtering) for motion in motions]
+    norm = float(np.sqrt(sum(float(each @ each) for each in forces)))
+    masks = [_left_out(len(each)) for each in forces]
+    unseen = held_out(unknowns, residuals, fit.found.shares, masks)
+    seen = np.concatenate([f[m] for f, m in zip(forces, masks, strict=True)])
+    left = np.concatenate(fit.residuals)
+    relative = float(np.linalg.norm(left)) / norm
+    judged = math.nan
+    if fit.regression is not None:
+        own = replace(fit.regression, relative=relative, values=np.array(fit.values))
+        judged = criterion(own, fit.regression.effective)
+    return Fit(
+        model,
+        extra,
+        fit,
+        relative,
+        float(np.linalg.norm(np.concatenate(unseen)) / np.linalg.norm(seen)),
+        judged,
+    )
+
+
+def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
+    """With what half the band says otherwise as a systematic part; too much of it leaves open."""
+    found = {}
+    for name, one in fit.estimates.items():
+        told = shifted_by(one, "band", abs(other[name] - one.value)) if one.has_interval else one
+        if told.half_width > USELESS * abs(told.value):
+            reason = f"half the band finds {other[name]:.3g} {one.unit}".rstrip()
+            told = Estimate.without_interval(
+                name, one.value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
+            )
+        found[name] = told
+    delay = found["delay"]
+    found["delay"] = Estimate.without_interval(
+        "delay", delay.value, "s", "it takes what a loop makes of noise as well", method=METHOD
+    )
+    stiffness = found.get("bristle_stiffness")
+    if stiffness is not None and stiffness.origin is not Origin.MEASURED:
+        damping = found["bristle_damping"]
+        found["bristle_damping"] = Estimate.without_interval(
+            damping.name, damping.value, damping.unit, "without a stiffness it means nothing",
+            method=METHOD, origin=Origin.NOT_DETERMINED,
+        )  # fmt: skip
+    return replace(fit, estimates=found)
+
+
+def _resolved(
+    fit: ModelFit, model: Model, motions: Sequence[Motion], filtering: Filtering
+) -> ModelFit:
+    """Without what happens at reversals faster than the rows can show.
+
+    A jump of friction that is filtered looks like bristles, and like a Stribeck curve.
+    """
+    names = [unknown.name for unknown in fit.found.unknowns]
+    values = dict(zip(names, fit.values, strict=True))
+    band = BAND * motions[0].sample_rate / filtering.decimation
+    shortest = RESOLVED / (2.0 * math.pi * min(band, filtering.low_pass))
+    turning = _turning(motions)
+    found = dict(fit.estimates)
+
+    def refuse(names: Sequence[str], takes: float, what: str) -> None:
+        if takes >= shortest:
+            return
+        reason = f"{what} takes {takes * 1e3:.2g} ms, and rows show {shortest * 1e3:.2g} ms"
+        for name in names:
+            if name in found:
+                one = found[name]
+                found[name] = Estimate.without_interval(
+                    name, one.value, one.unit, reason, method=METHOD,
+                    origin=Origin.NOT_DETERMINED,
+                )  # fmt: skip
+
+    slow = values["stribeck_velocity"]
+    refuse(("stribeck_velocity", "static_over_coulomb"), slow / turning, "passing it in a reversal")
+    if "bristle_stiffness" in values:
+        bent = float(model.options(values)["coulomb_torque"]) / values["bristle_stiffness"]
+        takes = math.sqrt(2.0 * bent / turning)
+        refuse(("bristle_stiffness", "bristle_damping"), takes, "bending the bristles")
+    return replace(fit, estimates=found)
+
+
+def _turning(motions: Sequence[Motion]) -> float:
+    """Acceleration (rad/s^2) of reversals: the median where the rate changes its sign."""
+    found = []
+    for motion in motions:
+        crossing = np.flatnonzero(motion.rate[1:] * motion.rate[:-1] < 0.0)
+        found.append(np.abs(motion.acceleration[crossing]))
+    whole = np.concatenate(found)
+    return max(float(np.median(whole)) if len(whole) else 0.0, 1e-12)
+
+
+def _linear(term: Term, motions: Sequence[Motion], force: float) -> Unknown:
+    largest = max(float(np.abs(term.column(motion)).max()) for motion in motions)
+    return Unknown(term.name, -force / largest, force / largest, 0.0)
+
+
+def modelled(
+    along: Along, motion: Motion, model: Model, extra: Sequence[Term], values: dict[str, float]
+) -> Array:
+    """Force that a model asks for, shape (n,), before decimation."""
+    force = values["inertia"] * motion.acceleration + along.friction(model.options(values))
+    if extra:
+        force = force + columns(motion, extra) @ np.array([values[t.name] for t in extra])
+    return np.asarray(force)
+
+
+def _left(
+    along: Along, motion: Motion, model: Model, extra: Sequence[Term], values: dict[str, float]
+) -> Array:
+    shifted = later(motion.force, values["delay"], motion.sample_rate)
+    return shifted - modelled(along, motion, model, extra, values)
+
+
+def _rows(samples: Array, filtering: Filtering) -> Array:
+    whole = samples[filtering.skip :, None]
+    return np.asarray(decimated(whole, filtering.decimation)[:, 0])
+
+
+def _left_out(count: int) -> NDArray[np.bool_]:
+    """Every third block."""
+    block = np.minimum(np.arange(count) * BLOCKS // max(count, 1), BLOCKS - 1)
+    return np.asarray(block % EVERY == 1)
+
+
+def _validated(
+    one: Fit, reference: Fit | None, unseen: Sequence[Moved], filtering: Filtering
+) -> Fit:
+    predictions = tuple(predicted(one, each.motion, filtering) for each in unseen)
+    whole = together(predictions)
+    gain = improvement("gain", together(reference.predictions), whole) if reference else None
+    share = relative_error("validation", whole)
+    return replace(one, predictions=predictions, validation=share, gain=gain)
+
+
+def predicted(one: Fit, motion: Motion, filtering: Filtering) -> Prediction:
+    """What a fitted model says of another motion."""
+    values = one.values
+    force = later(motion.force, values["delay"], motion.sample_rate)
+    said = modelled(Along(motion), motion, one.model, one.extra, values)
+    return Prediction(
+        kept_times(motion, filtering), _rows(force, filtering), _rows(said, filtering)
+    )
+
+
+def product(name: str, ratio: Estimate, base: Estimate, correlation: float) -> Estimate:
+    """A ratio times what it is a ratio to, by the delta method; not determined where one is not."""
+    value = ratio.value * base.value
+    if ratio.origin is not Origin.MEASURED or base.origin is not Origin.MEASURED:
+        which = ratio if ratio.origin is not Origin.MEASURED else base
+        reason = f"{which.name.replace('_', ' ')}: {which.reason}"
+        return Estimate.without_interval(
+            name, value, base.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
+        )
+    one = (ratio.standard_error or 0.0) / abs(ratio.value)
+    two = (base.standard_error or 0.0) / abs(base.value)
+    error = abs(value) * math.sqrt(max(one**2 + two**2 + 2.0 * correlation * one * two, 0.0))
+    # The wider of both intervals says how many deviations an interval has.
+    wide = max(
+        (each.high - each.value) / each.standard_error
+        for each in (ratio, base)
+        if each.high is not None and each.standard_error
+    )
+    half = wide * error
+    return Estimate(
+        name, value, base.unit, value - half, value + half, LEVEL, METHOD,
+        standard_error=error, freedom=base.freedom,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""A rig's numbers over its runs: do they drift, have they jumped, do they follow anything?"""

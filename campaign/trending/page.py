@@ -1,0 +1,247 @@
+"""Trends as a folder: one self-contained page, its tables and figures, and JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from campaign import __version__
+from campaign.access.analysis import one_line
+from campaign.access.estimates import row_of
+from campaign.comparing.difference import in_unit
+from campaign.errors import UsageError
+from campaign.identification.trends.family import POWER, RATE
+from campaign.plain_text import on_a_page
+from campaign.report.content.tables import table_csv
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.figures import draw
+from campaign.report.output import MARKER, replaced_folder
+from campaign.report.page.folder import Folder, ShownFigure
+from campaign.report.page.packaged import fill_packaged
+from campaign.report.palette import variables
+from campaign.result import Figure
+from campaign.trending.figures import declared_figure, small_multiples
+from campaign.trending.tables import (
+    beside_the_jump,
+    circumstances_table,
+    effect,
+    followed_table,
+    headline,
+    jump_of,
+    not_judged,
+    page_table,
+    points_table,
+    runs_table,
+    sentences,
+)
+from campaign.trending.trends import WITHIN, Followed, Trends, Verdict
+
+PAGE, DATA = "trend.html", "trend.json"
+HEADLINES = 20
+"""Most declared numbers that are told on top, and drawn."""
+
+T = TypeVar("T")
+
+
+@dataclass
+class _Making:
+    folder: Folder = field(default_factory=Folder)
+    problems: list[str] = field(default_factory=list)
+
+    def attempt(self, what: str, make: Callable[[], T]) -> Iterator[T]:
+        try:
+            yield make()
+        except Exception as error:  # noqa: BLE001 (one bad figure must not cost the page)
+            self.problems.append(f"{what} cannot be shown: {one_line(error)}")
+
+
+def write_trends(trends: Trends, output: Path, packaged_templates: Path, command: str) -> Path:
+    """Write the page, its data, tables and figures into the folder `output`; the page's path.
+
+    The same archives give the same bytes. Raises UsageError when `output` is something else than
+    trends.
+    """
+    if (output / MARKER).is_file() and not (output / PAGE).is_file():
+        raise UsageError(f"{output} shows no trends; name another folder with --output")
+    html, files = render(trends, packaged_templates, command)
+    with replaced_folder(output) as new:
+        for name, text in {PAGE: html, DATA: as_json(trends, command), **files}.items():
+            path = new / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
+    return output / PAGE
+
+
+def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str, dict[str, str]]:
+    """The page's text, and the other files by name; nothing is written."""
+    making = _Making()
+    folder = making.folder
+    making.problems += [problem for member in trends.members for problem in member.problems]
+    making.problems += [problem for fitted in trends.fitted for problem in fitted.problems]
+    declared = trends.declared[:HEADLINES]
+    shown = [_declared(each, trends, making, n) for n, each in enumerate(declared, start=1)]
+    multiples = small_multiples(trends.of(Verdict.NOT_SHOWN), trends.covariate)
+    small = [] if multiples is None else list(_drawn(multiples, making))
+    every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
+    judged = [each for each in trends.followed if each.change is not None]
+    on_page = page_table(judged, trends.covariate)
+    circumstances = circumstances_table(trends)
+    context = {
+        "trends": trends,
+        "title": title_of(trends),
+        "shown": shown,
+        "more": max(0, len(trends.declared) - HEADLINES),
+        "small": small,
+        "sentences": tuple(sentences(trends)),
+        "judged": folder.shown_table(on_page, (), "judged") if judged else None,
+        "all": folder.table(table_csv(every), "followed"),
+        "points": folder.table(table_csv(points_table(trends)), "points"),
+        "not_judged": tuple(not_judged(trends)),
+        "runs": folder.shown_table(runs_table(trends), (), "runs"),
+        "circumstances": folder.shown_table(circumstances, (), "circumstances")
+        if circumstances.rows
+        else None,
+        "damaged": [member for member in trends.members if member.damaged],
+        "cancelled": sorted({source for each in trends.followed for source in each.cancelled}),
+        "problems": making.problems,
+        "rate": f"{100 * RATE:g} %",
+        "power": f"{100 * POWER:g} %",
+        "command": command,
+        "version": __version__,
+        "colours": variables(),
+    }
+    return fill_packaged("trend.html", context, packaged_templates), folder.files
+
+
+def title_of(trends: Trends) -> str:
+    """What the page is of."""
+    benches = {test.bench.name for m in trends.members for test in m.tests if test.bench}
+    rig = " and ".join(sorted(benches)) or "runs"
+    return f"{rig}: {len(trends.members)} runs over {trends.covariate.name}"
+
+
+@dataclass(frozen=True)
+class ShownNumber:
+    """A declared number on the page."""
+
+    headline: str
+    caution: str
+    beside: tuple[str, ...]
+    figures: tuple[ShownFigure, ...]
+
+
+def _declared(each: Followed, trends: Trends, making: _Making, place: int) -> ShownNumber:
+    told = headline(each, trends)
+    figure = declared_figure(each, trends, told, place)
+    notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
+    beside = (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps))
+    caution = WITHIN if WITHIN in each.notes else ""
+    return ShownNumber(told, caution, tuple(filter(None, beside)), tuple(_drawn(figure, making)))
+
+
+def _drawn(figure: Figure, making: _Making) -> Iterator[ShownFigure]:
+    def make() -> ShownFigure:
+        return making.folder.figure(figure, Drawn.of(draw(figure), figure), (), figure.key)
+
+    yield from making.attempt(figure.key, partial(make))
+
+
+def as_json(trends: Trends, command: str) -> str:
+    """Every number with its points and what was judged of it, for machines."""
+    covariate = trends.covariate
+    tree = {
+        "schema": 1,
+        "program": f"campaign {__version__}",
+        "command": command,
+        "over": {"name": covariate.name, "unit": covariate.unit, "per": covariate.per},
+        "family": {"tests": trends.tested, "rate": RATE, "level": trends.level, "power": POWER},
+        "runs": [
+            {
+                "number": member.number,
+                "name": member.name,
+                "digest": member.run.identity,
+                "created": member.run.header.created,
+                "x": covariate.at(member, ""),
+                "damaged": len(member.damaged),
+            }
+            for member in trends.members
+        ],
+        "numbers": [_tree(each, trends) for each in trends.followed],
+        "notes": list(trends.notes),
+        "problems": [p for fitted in trends.fitted for p in fitted.problems]
+        + [p for member in trends.members for p in member.problems],
+    }
+    return json.dumps(_finite(tree), indent=1, ensure_ascii=False) + "\n"
+
+
+def _tree(each: Followed, trends: Trends) -> dict[str, Any]:
+    series = each.series
+    tree: dict[str, Any] = {
+        "test": series.test,
+        "quantity": series.quantity,
+        "conditions": dict(series.conditions),
+        "unit": series.display,
+        "verdict": str(each.verdict),
+        "reason": each.reason,
+        "notes": list(each.notes),
+        "left_out": list(series.left_out),
+        "cancelled": list(each.cancelled),
+        "points": [
+            {"run": p.member.number, "x": float(x), **row_of(in_unit(p.estimate, series.display))}
+            for p, x in zip(series.points, each.x, strict=True)
+        ],
+    }
+    effects = effect(each, trends.covariate)
+    if effects is None or each.change is None:
+        return tree
+    adjusted = dict(each.adjusted or {})
+    return tree | {
+        "mean": row_of(each.mean),
+        "trend": row_of(effects[0]),
+        "trend_share": row_of(effects[1]),
+        "p": each.p,
+        "adjusted": adjusted,
+        "shape": each.change.shape,
+        "detectable": {
+            name: in_display * (trends.covariate.step if name == "trend" else 1.0)
+            for name, in_display in _detectable(each).items()
+        },
+        "jumps": [
+            {
+                "before_run": series.points[jump.place].member.number,
+                "between": [
+                    series.points[jump.between[0] - 1].member.number,
+                    series.points[jump.between[1]].member.number,
+                ],
+                "size": row_of(jump_of(each, jump)[0]),
+                "share": row_of(jump_of(each, jump)[1]),
+                "p": jump.p,
+            }
+            for jump in each.jumps
+        ],
+    }
+
+
+def _detectable(each: Followed) -> dict[str, float]:
+    from campaign.units import convert
+
+    own = float(convert(1.0, each.series.unit, each.series.display))
+    return {name: own * size for name, size in (each.detectable or {}).items()}
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no NaN: it is null there."""
+    if isinstance(value, dict):
+        return {str(key): _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,150 @@
+"""What of an identification goes into the file of a bench, and that the file is a bench then."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from campaign.estimate import Estimate
+from campaign.identifying import methods
+from campaign.identifying.bench_document import bench_text
+from campaign.identifying.identification import Identification, Section, _with_place
+from campaign.identifying.material import Chosen, choose
+from campaign.identifying.method import Identified, Parameter
+from campaign.physics.bench import Bench
+from campaign.protocol.problems import find_faults
+from campaign.result import Result
+
+HEAD = 'name = "rig"\n[axis]\nname = "tilt"\ninertia = "2 kg m^2"\n'
+LUGRE = """
+[friction.load]
+model = "lugre"
+static_torque = "20 N m"
+coulomb_torque = "16 N m"
+stribeck_velocity = "0.03 rad/s"
+stribeck_exponent = 0.9
+bristle_stiffness = "15000 N m/rad"
+bristle_damping = "900 N m s/rad"
+
+[friction.load.negative]
+static_torque = "22 N m"
+stribeck_exponent = 0.8
+"""
+SMOOTH = """
+[friction.load]
+model = "stribeck"
+static_torque = "20 N m"
+coulomb_torque = "16 N m"
+stribeck_velocity = "0.03 rad/s"
+sign_smoothing = "0.001 rad/s"
+"""
+
+
+def measured(key: str, value: float, unit: str) -> Parameter:
+    one = Estimate(key, value, unit, 0.9 * value, 1.1 * value, 0.95, "test", standard_error=0.05)
+    return Parameter(one, "", bench=f"friction.load.{key}")
+
+
+CURVE = (
+    measured("coulomb_torque", 10.0, "N m"),
+    measured("static_torque", 12.0, "N m"),
+    measured("stribeck_velocity", 0.02, "rad/s"),
+)
+STRIBECK = {"friction.load.model": ("stribeck", "", "fitted")}
+
+
+def bench_of(text: str) -> Bench:
+    made = find_faults(Bench, tomllib.loads(text))
+    assert isinstance(made, Bench), made
+    return made
+
+
+@pytest.fixture
+def write(results: Path):  # type: ignore[no-untyped-def]
+    """The bench of a text with what sections of that name found."""
+    run = next(results.glob("*-rig-mapping.nxs")).stem
+    chosen = choose(results, f"{run}:monday")
+
+    def written(text: str, **sections: Identified) -> Bench:
+        name = str(chosen.run.header.tests[0]["bench"])
+        header = SimpleNamespace(tests=chosen.run.header.tests, sources={name: text})
+        run = SimpleNamespace(header=header, name=chosen.run.name, identity=chosen.run.identity)
+        bench = bench_of(text)
+        made = tuple(
+            Section(methods()[which], None, identified=_with_place(each, bench))
+            for which, each in sections.items()
+        )
+        found = Identification(
+            Chosen(cast("Any", run), "monday", chosen.trials), None, None, bench, made
+        )
+        return bench_of(bench_text(found, "campaign identify"))
+
+    return written
+
+
+def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # type: ignore[no-untyped-def]
+    bench = write(HEAD + LUGRE, friction_map=Identified(CURVE, Result(), settings=STRIBECK))
+    load = bench.friction["load"]
+    assert load.model == "lugre"
+    assert load.bristle_stiffness == 15000.0
+    assert (load.coulomb_torque, load.static_torque) == (10.0, 12.0)
+    assert load.stribeck_exponent == 2.0  # what was fitted, not what stood there
+    assert load.negative.static_torque is None
+
+
+def test_what_another_model_does_not_have_goes(write) -> None:  # type: ignore[no-untyped-def]
+    settings = {
+        "friction.load.model": ("lugre", "", "fitted"),
+        "friction.load.bristle_stiffness": (1e4, "N m/rad", "assumed"),
+    }
+    bench = write(HEAD + SMOOTH, whole_model=Identified(CURVE, Result(), settings=settings))
+    assert bench.friction["load"].model == "lugre"
+
+
+def test_a_number_without_a_unit_is_a_number(write) -> None:  # type: ignore[no-untyped-def]
+    curve = (*CURVE, measured("stribeck_exponent", 0.7, ""))
+    bench = write(HEAD + LUGRE, friction_map=Identified(curve, Result(), settings=STRIBECK))
+    assert bench.friction["load"].stribeck_exponent == 0.7
+    assert bench.known.values["friction.load.stribeck_exponent"].interval == (0.63, 0.77)
+
+
+def test_curves_of_two_methods_are_not_mixed(write) -> None:  # type: ignore[no-untyped-def]
+    first = {**STRIBECK, "friction.load.negative.stribeck_velocity": (1e-3, "rad/s", "open")}
+    bench = write(
+        HEAD,
+        friction_map=Identified(CURVE, Result(), settings=first),
+        inverse_dynamics=Identified((measured("coulomb_torque", 9.0, "N m"),), Result()),
+        whole_model=Identified(CURVE, Result(), settings=STRIBECK),
+    )
+    assert bench.friction["load"].coulomb_torque == 10.0
+    assert bench.friction["load"].negative.stribeck_velocity is None
+
+
+def test_friction_of_all_interfaces_goes_to_none(write) -> None:  # type: ignore[no-untyped-def]
+    text = HEAD + LUGRE + SMOOTH.replace("friction.load", "friction.mesh")
+    inertia = replace(measured("inertia", 3.0, "kg m^2"), bench="axis.inertia")
+    found = Identified((*CURVE, inertia), Result(), settings=STRIBECK)
+    bench = write(text, whole_model=found)
+    assert bench.friction["load"].coulomb_torque == 16.0
+    assert bench.axis.inertia == 3.0
+    assert "mesh" in _with_place(found, bench).result.notes[-1]
+
+
+def test_correlations_of_other_values_stay(write) -> None:  # type: ignore[no-untyped-def]
+    known = """
+[known]
+correlations = [["axis.inertia", "friction.load.bristle_damping", 0.5]]
+[known.values]
+"axis.inertia" = {origin = "fitted"}
+"friction.load.bristle_damping" = {origin = "fitted"}
+"""
+    pair = {("coulomb_torque", "static_torque"): 0.4}
+    found = Identified(CURVE, Result(), settings=STRIBECK, correlations=pair)
+    told = write(HEAD + LUGRE + known, friction_map=found).known.correlations
+    assert len(told) == 2
+    assert told[0] == ("axis.inertia", "friction.load.bristle_damping", 0.5)

@@ -1,0 +1,81 @@
+"""Motions that tell nothing: what is refused of them, and what goes to no bench."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE
+from campaign.identification.inverse.motion import Filtering
+from campaign.identifying.inverse.motions import moved
+from campaign.identifying.method import Identified, Material
+from campaign.identifying.methods.inverse_dynamics import METHOD
+from campaign.physics.bench import Bench
+from campaign.trial import Channel, Recording
+
+RATE = 1000.0
+TIME = np.arange(20_000) / RATE
+NOISE = np.random.Generator(np.random.PCG64(5)).standard_normal((2, len(TIME)))
+SWING = 0.3 * np.sin(2.0 * np.pi * TIME) + 0.2 * np.sin(2.0 * np.pi * 0.37 * TIME)
+
+
+def recorded(angle: np.ndarray, torque: np.ndarray) -> Any:
+    """A trial that has nothing but these."""
+    made = (
+        Channel(RELATIVE_ANGLE, "rad", "angle", "deg", angle),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
+    )
+    channels = {each.name: each for each in made}
+    recording = Recording(TIME, channels)
+    task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
+    return SimpleNamespace(
+        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}),
+        recording=lambda: recording,
+        channel_names=lambda: frozenset(channels),
+    )
+
+
+def identified(angle: np.ndarray, torque: np.ndarray) -> Identified:
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
+    trials = (recorded(angle, torque),)
+    return METHOD.identify(Material(bench, cast("Any", trials), ()), METHOD.options())
+
+
+@pytest.mark.parametrize(
+    ("angle", "torque", "message"),
+    [
+        (np.zeros_like(TIME), NOISE[0], "stands still"),
+        (1e-5 * np.round(NOISE[1]), 1.0 + 0.02 * NOISE[0], "stands still"),
+        (SWING, np.zeros_like(TIME), "zero throughout"),
+    ],
+)
+def test_what_does_not_move_or_is_not_driven_is_refused(
+    angle: np.ndarray, torque: np.ndarray, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        identified(angle, torque)
+
+
+def test_small_and_slow_motion_over_coarse_counts_is_none_of_these() -> None:
+    counts = np.round(5.0 * np.sin(0.3 * TIME))
+    assert moved((recorded(counts, NOISE[0]),), Filtering.for_rate(RATE))
+
+
+def test_a_constant_load_is_no_friction() -> None:
+    found = identified(SWING, 2.0 + 0.02 * NOISE[0])
+    assert [each.bench for each in found.parameters if each.bench] == []
+    assert any("not told from zero" in note for note in found.result.notes)
+
+
+def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
+    rate = np.gradient(SWING, TIME)
+    force = 2.0 * np.gradient(rate, TIME) + 3.0 * np.sign(rate) + 0.5 * rate + 0.02 * NOISE[0]
+    places = [each.bench for each in identified(SWING, force).parameters]
+    assert "axis.inertia" in places
+    found = identified(SWING, -force)
+    assert [each.bench for each in found.parameters if each.bench] == []
+    [note] = [each for each in found.result.notes if "sign or unit" in each]
+    assert note.startswith("inertia and coulomb positive and coulomb negative")

@@ -1,0 +1,90 @@
+"""Friction models along motions: what the engine makes of them, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from campaign.estimate import Origin
+from campaign.identification.inverse.motion import Filtering, Motion, motion_of_position
+from campaign.identification.unknowns import Unknown
+from campaign.identification.whole_model import fit_model
+from campaign.identifying.inverse.motions import Moved, with_slowest
+from campaign.identifying.whole.along import Along
+from campaign.identifying.whole.found import find
+from campaign.physics.friction.stribeck import StribeckOptions, steady_state
+from tests.identification.coverage import holds, rejected
+from tests.identification.rigs import random_rigs
+
+CURVE = {
+    "model": "stribeck",
+    "coulomb_torque": 2.0,
+    "static_torque": 1.2,
+    "stribeck_velocity": 0.1,
+    "viscous_friction": 0.5,
+    "negative": {"coulomb_torque": 2.5, "viscous_friction": 0.8},
+}
+
+
+def swinging() -> Motion:
+    time = np.arange(5000) / 1000.0
+    omega = 2 * np.pi * 0.7
+    return Motion(time, -np.cos(omega * time) / omega, np.sin(omega * time), time, time)
+
+
+def test_friction_along_a_motion_is_that_of_its_curve() -> None:
+    motion = swinging()
+    options = StribeckOptions.model_validate(CURVE, context={"si": True})
+    found = Along(motion).friction(CURVE)
+    moves = np.abs(motion.rate) > 0.02
+    assert found[moves] == pytest.approx(steady_state(options, motion.rate)[moves], rel=2e-3)
+
+
+def test_a_line_is_fitted_with_the_intervals_of_its_closed_form() -> None:
+    draw = np.random.default_rng(1)
+    x = np.linspace(0.0, 1.0, 400)
+    y = 2.0 + 3.0 * x + 0.1 * draw.standard_normal(400)
+    unknowns = [Unknown("level", -10.0, 10.0, 0.0), Unknown("slope", 0.1, 100.0, 1.0, True)]
+    fit = fit_model(unknowns, {}, lambda v: [y - v[0] - v[1] * x], starts=1)
+    columns = np.column_stack([np.ones(400), x])
+    exact = np.linalg.lstsq(columns, y, rcond=None)[0]
+    assert fit.values == pytest.approx(exact, rel=1e-4)
+    left = y - columns @ exact
+    error = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * (left @ left) / 398)
+    assert fit.estimates["level"].standard_error == pytest.approx(error[0], rel=0.25)
+    assert fit.estimates["slope"].standard_error == pytest.approx(error[1], rel=0.25)
+
+
+def test_what_nothing_tells_and_what_goes_to_its_bound_has_no_interval() -> None:
+    x = np.linspace(0.0, 1.0, 200)
+    y = 2.0 + 0.01 * np.random.default_rng(1).standard_normal(200)
+    unknowns = [
+        Unknown("level", 0.0, 10.0, 1.0),
+        Unknown("nothing", 0.0, 1.0, 0.5),
+        Unknown("kept", 1.0, 2.0, 1.5),
+    ]
+    fit = fit_model(unknowns, {}, lambda v: [y - v[0] - 0.0 * v[1] - 0.5 * v[2] * x], starts=1)
+    assert fit.estimates["nothing"].origin is Origin.NOT_DETERMINED
+    assert fit.estimates["kept"].origin is Origin.AT_BOUND
+    assert not fit.estimates["kept"].has_interval
+
+
+@pytest.mark.slow
+def test_intervals_hold_and_a_jump_of_friction_has_no_bristles() -> None:
+    """Rigs without bristles: stiffness is refused, whatever a filtered jump looks like."""
+    held: dict[str, list[bool]] = {}
+    for rig in random_rigs(5, seed=31, stribeck=True, seconds=15.0):
+        filtering = Filtering.for_rate(1000.0)
+        motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
+        piece = Moved(1, motion, None)
+        slow = 0.25 * with_slowest(filtering, [piece], None).slowest
+        found = find([piece], [], with_slowest(filtering, [piece], slow), starts=1)
+        for name in ("coulomb_positive", "coulomb_negative", "viscous_positive"):
+            estimate = found.fits[1].fit.estimates[name]
+            if estimate.has_interval:
+                held.setdefault(name, []).append(holds(estimate, rig.truth[name]))
+        bristles = found.fits[2].fit.estimates
+        assert bristles["bristle_stiffness"].origin is not Origin.MEASURED
+        assert bristles["bristle_damping"].origin is not Origin.MEASURED
+    assert sum(map(len, held.values())) >= 10
+    assert rejected(held, "less") == {}
