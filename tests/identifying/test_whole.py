@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.estimate import Origin
+from campaign.estimate import Estimate, Origin, Systematic
 from campaign.identification.inverse.motion import Filtering, Motion, motion_of_position
 from campaign.identification.unknowns import Unknown
 from campaign.identification.whole_model import fit_model
 from campaign.identifying.inverse.motions import Moved, with_slowest
 from campaign.identifying.whole.along import Along
-from campaign.identifying.whole.found import find
+from campaign.identifying.whole.found import find, product
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from tests.identification.coverage import holds, rejected
 from tests.identification.rigs import random_rigs
@@ -67,6 +67,27 @@ def test_what_nothing_tells_and_what_goes_to_its_bound_has_no_interval() -> None
     assert fit.estimates["nothing"].origin is Origin.NOT_DETERMINED
     assert fit.estimates["kept"].origin is Origin.AT_BOUND
     assert not fit.estimates["kept"].has_interval
+
+
+def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
+    """Static friction from its ratio to Coulomb friction: scatter by the delta method, parts add."""
+    ratio = Estimate(
+        "ratio", 0.5, "", 0.48, 0.52, 0.95, standard_error=0.01, freedom=50.0,
+        systematic=(Systematic("band", 0.03),),
+    )  # fmt: skip
+    base = Estimate(
+        "coulomb", 20.0, "N m", 19.2, 20.8, 0.95, standard_error=0.4, freedom=50.0,
+        systematic=(Systematic("band", 1.0),),
+    )  # fmt: skip
+    made = product("static", ratio, base, 0.0)
+    assert made.value == 10.0
+    assert made.standard_error == pytest.approx(10.0 * np.hypot(0.01 / 0.5, 0.4 / 20.0))
+    [part] = made.systematic
+    assert part.source == "band"
+    assert part.standard_uncertainty == pytest.approx(20.0 * 0.03 + 0.5 * 1.0)
+    assert product("static", ratio, base, 1.0).standard_error == pytest.approx(10.0 * 0.04)
+    lost = Estimate.without_interval("ratio", 0.5, "", "nobody knows", origin=Origin.NOT_DETERMINED)
+    assert product("static", lost, base, 0.0).origin is Origin.NOT_DETERMINED
 
 
 @pytest.mark.slow

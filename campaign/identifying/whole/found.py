@@ -330,7 +330,16 @@ def product(name: str, ratio: Estimate, base: Estimate, correlation: float) -> E
         if each.high is not None and each.standard_error
     )
     half = wide * error
-    return Estimate(
+    made = Estimate(
         name, value, base.unit, value - half, value + half, LEVEL, METHOD,
         standard_error=error, freedom=base.freedom,
     )  # fmt: skip
+    # Of one cause in both nobody knows whether it moves them together: sizes add.
+    sizes: dict[str, float] = {}
+    for each, other in ((ratio, base), (base, ratio)):
+        for part in each.systematic:
+            moved = abs(other.value) * (part.standard_uncertainty or 0.0)
+            sizes[part.source] = sizes.get(part.source, 0.0) + moved
+    for source, size in sizes.items():
+        made = shifted_by(made, source, size)
+    return made
