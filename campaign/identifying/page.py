@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,6 +11,7 @@ from typing import Any, TypeVar
 from campaign import __version__
 from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
+from campaign.access.plain_json import json_text
 from campaign.access.sentences import sentence
 from campaign.axis_kind import speaking_of
 from campaign.errors import UsageError
@@ -192,7 +191,7 @@ def as_json(found: Identification, command: str) -> str:
         "methods": [_method_tree(each) for each in found.sections],
         "next": next_measurement(found),
     }
-    return json.dumps(_finite(tree), indent=1, ensure_ascii=False) + "\n"
+    return json_text(tree)
 
 
 def _method_tree(section: Section) -> dict[str, Any]:
@@ -229,16 +228,3 @@ def _method_tree(section: Section) -> dict[str, Any]:
             for each in section.changes
         ],
     }  # fmt: skip
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no NaN: it is null there."""
-    if isinstance(value, dict):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

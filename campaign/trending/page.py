@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,6 +11,7 @@ from typing import Any, TypeVar
 from campaign import __version__
 from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
+from campaign.access.plain_json import json_text
 from campaign.comparing.difference import in_unit
 from campaign.errors import UsageError
 from campaign.identification.trends.family import POWER, RATE
@@ -176,7 +175,7 @@ def as_json(trends: Trends, command: str) -> str:
         "problems": [p for fitted in trends.fitted for p in fitted.problems]
         + [p for member in trends.members for p in member.problems],
     }
-    return json.dumps(_finite(tree), indent=1, ensure_ascii=False) + "\n"
+    return json_text(tree)
 
 
 def _tree(each: Followed, trends: Trends) -> dict[str, Any]:
@@ -232,16 +231,3 @@ def _detectable(each: Followed) -> dict[str, float]:
 
     own = float(convert(1.0, each.series.unit, each.series.display))
     return {name: own * size for name, size in (each.detectable or {}).items()}
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no NaN: it is null there."""
-    if isinstance(value, dict):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

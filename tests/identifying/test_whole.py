@@ -70,7 +70,7 @@ def test_what_nothing_tells_and_what_goes_to_its_bound_has_no_interval() -> None
 
 
 def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
-    """Static friction from its ratio to Coulomb friction: scatter by the delta method, parts add."""
+    """Static friction as a ratio times Coulomb friction: scatter by the delta method, parts add."""
     ratio = Estimate(
         "ratio", 0.5, "", 0.48, 0.52, 0.95, standard_error=0.01, freedom=50.0,
         systematic=(Systematic("band", 0.03),),
