@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.identification.inverse.motion import Filtering, Motion, motion_of_position
 from campaign.identification.unknowns import Unknown
-from campaign.identification.whole_model import fit_model
+from campaign.identification.whole_model import ModelFit, fit_model
 from campaign.identifying.inverse.motions import Moved, with_slowest
 from campaign.identifying.whole.along import Along
-from campaign.identifying.whole.found import find, product
+from campaign.identifying.whole.found import find, product, resolved
+from campaign.identifying.whole.models import Sizes, models
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from tests.identification.coverage import holds, rejected
 from tests.identification.rigs import random_rigs
@@ -67,6 +71,31 @@ def test_what_nothing_tells_and_what_goes_to_its_bound_has_no_interval() -> None
     assert fit.estimates["nothing"].origin is Origin.NOT_DETERMINED
     assert fit.estimates["kept"].origin is Origin.AT_BOUND
     assert not fit.estimates["kept"].has_interval
+
+
+@pytest.mark.parametrize(
+    ("slow", "stiff", "refused"),
+    [
+        (0.2, 100.0, set()),
+        (0.01, 100.0, {"stribeck_velocity", "static_over_coulomb"}),
+        (0.2, 1e6, {"bristle_stiffness", "bristle_damping"}),
+    ],
+)
+def test_what_is_passed_faster_than_rows_show_is_refused(
+    slow: float, stiff: float, refused: set[str]
+) -> None:
+    """A reversal at 4.4 rad/s² takes 2.3 ms through 0.01 rad/s, and rows show 12 ms."""
+    motion = swinging()
+    omega = 2 * np.pi * 0.7
+    motion = replace(motion, acceleration=omega * np.cos(omega * motion.time))
+    model = models(Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5))[2]
+    told = {each.unknown.name: each.unknown.start for each in model.numbers}
+    told |= {"stribeck_velocity": slow, "bristle_stiffness": stiff}
+    found = SimpleNamespace(unknowns=[Unknown(name, -1.0, 1e9, v) for name, v in told.items()])
+    sure = {name: Estimate(name, v, "", v - 0.1, v + 0.1, 0.95) for name, v in told.items()}
+    fit = ModelFit(found, sure, tuple(told.values()), (), None, np.ones(len(told), dtype=bool))
+    kept = resolved(fit, model, [motion], Filtering(100.0, 10)).estimates
+    assert {name for name, each in kept.items() if not each.has_interval} == refused
 
 
 def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:

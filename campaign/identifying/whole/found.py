@@ -166,7 +166,7 @@ def _fitted(
     # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
     other = refitted(unknowns, partial(left_in, filtering.half_band), fit.found.shares)
     fit = _with_band(fit, dict(zip(names, other, strict=True)))
-    fit = _resolved(fit, model, motions, filtering)
+    fit = resolved(fit, model, motions, filtering)
     forces = [_rows(motion.force, filtering) * moving(motion, filtering) for motion in motions]
     norm = float(np.sqrt(sum(float(each @ each) for each in forces)))
     masks = [_left_out(len(each)) for each in forces]
@@ -213,7 +213,7 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     return replace(fit, estimates=found)
 
 
-def _resolved(
+def resolved(
     fit: ModelFit, model: Model, motions: Sequence[Motion], filtering: Filtering
 ) -> ModelFit:
     """Without what happens at reversals faster than the rows can show.
