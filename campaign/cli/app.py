@@ -1,8 +1,8 @@
 """The program's own options, and what can be typed to plan and to execute.
 
-What is asked of archives is in `archive_commands`, what is done once in `setup_commands`, and what
-is done at a bench in `bench_commands`: each adds its commands to those of the one before, so that
-`campaign --help` lists them in this order.
+What is asked of archives is in `archive_commands`, of a rig by its runs in `rig_commands`, what is
+done once in `setup_commands`, and what is done at a bench in `bench_commands`: each adds its
+commands to those of the one before, so that `campaign --help` lists them in this order.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from campaign.cli.archive_commands import app
 from campaign.cli.completion import complete_kind
 from campaign.cli.parameters import output_option
+from campaign.cli.rig_commands import app
 
 __all__ = ["app"]
 
