@@ -1,4 +1,7 @@
-"""`campaign report`: the page, its tables and its figures, from an archive alone."""
+"""`campaign report`: the page, its tables and its figures, from an archive alone.
+
+What makes a page is imported within the functions: other processes analyse in the meantime.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +10,23 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from shlex import quote
+from typing import TYPE_CHECKING
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.archive.writing.results_file import PreparedResults
-from campaign.cli.damage import say_damaged
-from campaign.cli.keep_results import written_results
 from campaign.cli.output import print_note
 from campaign.errors import ArchiveError, ExitCode, UsageError
-from campaign.execution.naming import reference
-from campaign.experiments import experiments
 from campaign.interrupts import unwinding
-from campaign.report.build import build_report
-from campaign.report.content.document import Document
-from campaign.report.content.trial_choice import chosen_trials
-from campaign.report.formats import chosen_formats
-from campaign.report.one_figure import write_figure
-from campaign.report.processes import begin_early, choose_processes, seldom_collecting
-from campaign.resources import templates_folder
+from campaign.report.processes import (
+    Workers,
+    begin_early,
+    choose_processes,
+    seldom_collecting,
+    workers,
+)
+
+if TYPE_CHECKING:
+    from campaign.archive.writing.results_file import PreparedResults
+    from campaign.report.content.document import Document
 
 LISTED = 4
 """Most files of a folder that are named one by one."""
@@ -47,6 +50,30 @@ def report_run(
     path = find_run(results, name)
     begin_early(path)
     run = open_run(path)
+    with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
+        return _page(run, output, templates, at_work, formats, trials, zoom=zoom, open_it=open_it)
+
+
+def _page(
+    run: RunReader,
+    output: Path | None,
+    templates: Path | None,
+    at_work: Workers,
+    formats: Sequence[str],
+    trials: str,
+    *,
+    zoom: bool,
+    open_it: bool,
+) -> tuple[Path, ExitCode]:
+    """The page of what processes have begun to analyse, and what is told of it."""
+    from campaign.cli.damage import say_damaged
+    from campaign.cli.keep_results import written_results
+    from campaign.experiments import experiments
+    from campaign.report.build import build_report
+    from campaign.report.formats import chosen_formats
+    from campaign.resources import templates_folder
+
+    path, measure_anew = run.path, at_work.measure_anew
     written: list[PreparedResults] = []
 
     def write_results(document: Document) -> None:
@@ -61,7 +88,7 @@ def report_run(
             packaged_templates=templates_folder(),
             templates=templates,
             measure_anew=measure_anew,
-            processes=choose_processes(run),
+            at_work=at_work,
             formats=chosen_formats(formats),
             trials=_wanted_trials(run, trials),
             zoom=zoom,
@@ -96,6 +123,8 @@ def _command(path: Path, *, measure_anew: bool) -> str:
     A page goes to others, whom no folder of this machine concerns: of an absolute path only the
     name is told, and that its folder must be.
     """
+    from campaign.execution.naming import reference
+
     elsewhere = path.is_absolute()
     words = ["campaign report", quote(path.stem) if elsewhere else reference(path)]
     words += [
@@ -107,6 +136,8 @@ def _command(path: Path, *, measure_anew: bool) -> str:
 
 def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
     """Those that `--trials` means; where it means none, that is said."""
+    from campaign.report.content.trial_choice import chosen_trials
+
     chosen = chosen_trials(run, wanted)
     if wanted and not chosen:
         print_note(f"--trials {wanted}: there is none, so no page of a trial is made for it")
@@ -145,6 +176,10 @@ def draw_figure(
         raise UsageError(
             f"--only-figure writes a figure and no page; leave {', '.join(useless)} out"
         )
+    from campaign.cli.damage import say_damaged
+    from campaign.experiments import experiments
+    from campaign.report.one_figure import write_figure
+
     path = find_run(results, name)
     file, damaged = write_figure(
         open_run(path),

@@ -33,7 +33,7 @@ from campaign.report.page.templates import Templates
 from campaign.report.page.trial_links import trial_links
 from campaign.report.page.trial_page import trial_pages
 from campaign.report.palette import variables
-from campaign.report.processes import workers
+from campaign.report.processes import Workers
 
 FAILED = 200
 """Most failed trials that are listed; the archive has them all."""
@@ -76,7 +76,7 @@ def build_report(
     packaged_templates: Path,
     templates: Path | None = None,
     measure_anew: bool = False,
-    processes: int = 1,
+    at_work: Workers | None = None,
     formats: Sequence[Format] = (),
     trials: Sequence[int] = (),
     zoom: bool = False,
@@ -87,8 +87,8 @@ def build_report(
 
     The same archive gives the same bytes. A template in `templates` wins over the packaged one of
     the same name. `measure_anew`: as for `analyse_run`. `formats`: what is written besides.
-    `trials`: those that get a page of their own, as `chosen_trials` has them. Of `processes` more
-    than one analyse and draw with the experiments that are installed, whatever `experiments` are.
+    `trials`: those that get a page of their own, as `chosen_trials` has them. Processes that are
+    `at_work` analyse and draw with the experiments that are installed, whatever `experiments` are.
     `zoom`: the page's lines can be zoomed into by who has scripts; nothing else is different.
     `command`: what the page says to type for the report; made from the run's name when empty.
     Formats and trials' pages that an earlier report of the run left in `output` are made anew.
@@ -109,7 +109,7 @@ def build_report(
             templates,
             measure_anew,
             trials=trials,
-            processes=processes,
+            at_work=at_work,
             zoom=zoom,
             command=command,
             when_found=when_found,
@@ -163,7 +163,7 @@ def render(
     measure_anew: bool = False,
     *,
     trials: Sequence[int] = (),
-    processes: int = 1,
+    at_work: Workers | None = None,
     zoom: bool = False,
     command: str = "",
     when_found: Callable[[Document], None] = _nothing,
@@ -173,17 +173,16 @@ def render(
     `trials`: those that will have a page of their own. `command`: what to type for the report.
     """
     filled = Templates(packaged_templates, templates)
-    with workers(run, processes) as at_work:
-        found = at_work.found(measure_anew=measure_anew)
-        document = document_of(run, experiments, measure_anew=measure_anew, found=found)
+    at_work = at_work or Workers(run, measure_anew=measure_anew)
+    document = document_of(run, experiments, measure_anew=measure_anew, found=at_work.found)
 
-        def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
-            # Sheets are kept as PDF where they are drawn.
-            begun = drawn_here(drawings) if keeps_pdf() else at_work.draw(drawings)
-            when_found(document)
-            return begun
+    def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+        # Sheets are kept as PDF where they are drawn.
+        begun = drawn_here(drawings) if keeps_pdf() else at_work.draw(drawings)
+        when_found(document)
+        return begun
 
-        layout = lay_out(document, begin_to_draw, command)
+    layout = lay_out(document, begin_to_draw, command)
     damage = listed(document.damaged, DAMAGED)
     notice = told_on_page(run, document.damaged, layout.folder) if document.damaged else None
     added = interactive(layout.figures) if zoom else None

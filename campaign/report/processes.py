@@ -2,6 +2,8 @@
 
 What comes back is what one process would have made, to the byte. A process that dies, or that
 cannot be begun, costs time: what it should have done is then done here.
+
+Little is imported here: processes are at work while whoever begins them still imports the rest.
 """
 
 from __future__ import annotations
@@ -12,21 +14,23 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from campaign.access.analysis import Found, find, name_of
 from campaign.archive import RunReader
 from campaign.archive.reading.heaps import known_heaps, told_of_heaps
-from campaign.experiments import experiments
-from campaign.report.drawing.drawn import Drawn
-from campaign.report.page.drawings import Drawable, Key
 from campaign.trial import Tree
+
+if TYPE_CHECKING:
+    from campaign.access.analysis import Found
+    from campaign.report.drawing.drawn import Drawn
+    from campaign.report.page.drawings import Drawable, Key
 
 WORTHWHILE = 200
 """Trials from which on more processes than one take less time than they cost to begin."""
@@ -75,30 +79,34 @@ def seldom_collecting() -> Iterator[None]:
 
 @dataclass
 class Workers:
-    """Processes that have a run open; none of them, and all is done where it is needed."""
+    """Processes that have a run open; none of them, and all is done where it is needed.
+
+    `measure_anew`: as for `analyse_run`.
+    """
 
     run: RunReader
     pool: ProcessPoolExecutor | None = None
+    measure_anew: bool = False
 
-    def found(self, *, measure_anew: bool) -> Mapping[str, Found]:
+    @cached_property
+    def found(self) -> Mapping[str, Found]:
         """What the analysis of each test finds, by test; it is waited for where it is asked for.
 
-        Only with the experiments of this installation: an object that somebody made cannot be told
-        to another process.
+        Analysing begins when this is first asked for. Only with the experiments of this
+        installation: an object that somebody made cannot be told to another process.
         """
+        tests = {str(test.get("name", "")): test for test in self.run.header.tests}
         # The most trials first, so that none is left with a long one at the end.
-        tests = sorted(self.run.header.tests, key=lambda test: -len(self._trials_of(test)))
-        begun = self._begun({name_of(test): (_find, test, measure_anew) for test in tests})
-        return _Awaited(begun)
+        names = sorted(tests, key=lambda name: -len(self.run.trials_of(name)))
+        return _Awaited(
+            self._begun({name: (_find, tests[name], self.measure_anew) for name in names})
+        )
 
     def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
         """Begin to draw; what is returned waits for a drawing, and has none that cannot be made."""
         longest_first = sorted(drawings.items(), key=lambda item: -item[1].work)
         begun = self._begun({key: (_draw, drawing) for key, drawing in longest_first})
         return lambda key: _result(begun[key]) if key in begun else None
-
-    def _trials_of(self, test: Tree) -> Sequence[object]:
-        return self.run.trials_of(name_of(test))
 
     def _begun(self, work: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Future[Any]]:
         """Each function with its arguments; nothing once a process has died."""
@@ -111,7 +119,7 @@ class Workers:
 
 
 @dataclass(frozen=True, eq=False)
-class _Awaited(Mapping[str, Found]):
+class _Awaited(Mapping[str, "Found"]):
     """What processes find; what one died of is missing."""
 
     begun: Mapping[str, Future[Any]]
@@ -138,13 +146,18 @@ def _result(future: Future[Any]) -> Any:
 
 
 @contextmanager
-def workers(run: RunReader, processes: int) -> Iterator[Workers]:
-    """So many processes, for as long as the block lasts; fewer than two are none."""
+def workers(run: RunReader, processes: int, *, measure_anew: bool = False) -> Iterator[Workers]:
+    """So many processes, for as long as the block lasts; fewer than two are none.
+
+    They begin to analyse at once.
+    """
     if processes < 2:
-        yield Workers(run)
+        yield Workers(run, measure_anew=measure_anew)
         return
     with _pool(run, processes) as pool:
-        yield Workers(run, pool)
+        at_work = Workers(run, pool, measure_anew)
+        _ = at_work.found
+        yield at_work
 
 
 @contextmanager
@@ -199,6 +212,9 @@ def _end_with_parent() -> None:
 
 
 def _find(test: Tree, measure_anew: bool) -> Found:
+    from campaign.access.analysis import find
+    from campaign.experiments import experiments
+
     if _run is None:
         raise RuntimeError("the process was not told which run it works on")
     return find(_run, test, experiments(), measure_anew=measure_anew)

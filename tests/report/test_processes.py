@@ -56,16 +56,18 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def page_of(archive: Path, count: int) -> tuple[str, dict[str, str]]:
-    html, folder, _ = render(
-        open_run(archive), archive.parent, experiments(), templates_folder(), processes=count
-    )
+    run = open_run(archive)
+    with workers(run, count) as at_work:
+        html, folder, _ = render(
+            run, archive.parent, experiments(), templates_folder(), at_work=at_work
+        )
     return html, folder.files
 
 
 def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
     run = open_run(archive)
     with workers(run, 2) as two:
-        found = two.found(measure_anew=False)
+        found = two.found
         document = document_of(run, experiments(), found=found)
         drawings = drawings_of(document)
         awaited = two.draw(drawings)
@@ -80,14 +82,15 @@ def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
 def test_what_was_found_is_told_once_and_the_page_is_the_same(archive: Path, count: int) -> None:
     told: list[Document] = []
     run = open_run(archive)
-    html, folder, report = render(
-        run,
-        archive.parent,
-        experiments(),
-        templates_folder(),
-        processes=count,
-        when_found=told.append,
-    )
+    with workers(run, count) as at_work:
+        html, folder, report = render(
+            run,
+            archive.parent,
+            experiments(),
+            templates_folder(),
+            at_work=at_work,
+            when_found=told.append,
+        )
     (document,) = told
     assert document is report.layout.document
     assert (html, folder.files) == page_of(archive, 1)
@@ -105,7 +108,7 @@ def test_what_is_found_is_waited_for_when_it_is_asked_for(
 
     monkeypatch.setattr(processes.ProcessPoolExecutor, "submit", begin)
     with workers(open_run(archive), 2) as two:
-        found = two.found(measure_anew=False)
+        found = two.found
         assert len(begun) == 2
         for each in begun:
             each.set_result(Found(Result(), (), "", ()))
@@ -175,8 +178,24 @@ def test_a_process_that_dies_costs_no_more_than_time(
     whole = page_of(archive, 1)
     monkeypatch.setattr(processes.ProcessPoolExecutor, "submit", dead)
     with workers(open_run(archive), 2) as two:
-        assert two.found(measure_anew=False) == {}
+        assert two.found == {}
     assert page_of(archive, 2) == whole
+
+
+IMPORTED_LATE = """
+import sys
+
+import campaign.cli.report
+
+print(*sorted({"matplotlib", "jinja2", "campaign.report.build"} & sys.modules.keys()))
+"""
+
+
+def test_processes_are_begun_before_what_makes_a_page_is_imported() -> None:
+    """They analyse while it is; half a second of every report, where there are two processors."""
+    command = [sys.executable, "-c", IMPORTED_LATE]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment())
+    assert done.stdout.split() == []
 
 
 STRANDED = """

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 from pydantic import TypeAdapter
+from pydantic_core import from_json
 
 from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.run_folder import first_line
@@ -87,6 +87,6 @@ def _fingerprint(trial_text: str) -> str:
     `Trial.fingerprint` would be another one as soon as a later program gives a trial a further
     field, with a default that old archives do not have.
     """
-    tree = json.loads(trial_text)
+    tree = from_json(trial_text)
     what = {key: tree[key] for key in ("bench", "task", "seed")}
     return hashlib.sha256(canonical_json(what).encode()).hexdigest()
