@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.difference import BOUNDS, Difference, difference_of
 from campaign.comparing.doubts import DERIVED, FOLLOWS, doubt
 from campaign.comparing.draws import SIMULATION
 from campaign.comparing.pairing import PairedTest
 from campaign.comparing.words import display_unit
 from campaign.estimate import Estimate, Origin
+from campaign.identification.difference import BOUNDS, Difference, difference_of
 from campaign.result import Value
 
 RATE = 0.05

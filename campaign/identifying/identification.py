@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from campaign.axis_kind import speaking_of
-from campaign.comparing.difference import Difference, difference_of
+from campaign.identification.difference import Difference, difference_of
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of

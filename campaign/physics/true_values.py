@@ -124,10 +124,40 @@ def _stiffness_at_rest(bench: Bench) -> float | None:
     return math.fsum(stiffness for _, stiffness in bristles) if bristles else None
 
 
+def _damping_at_rest(bench: Bench) -> float | None:
+    """Damping of small motions where every interface sticks: the sum of sigma1 and sigma2."""
+    found = []
+    for options in bench.friction.values():
+        own = getattr(options, "bristle_damping", None)
+        if own is None:
+            return None
+        torque, rate = at_load(options, bench)
+        found.append(torque * rate * (own + getattr(options, "viscous_friction", 0.0)))
+    return math.fsum(found) if found else None
+
+
 _OF_ALL: dict[str, Callable[[Bench], float | None]] = {
     "bristle_stiffness": _stiffness,
     "stiffness_at_rest": _stiffness_at_rest,
+    "damping_at_rest": _damping_at_rest,
+    "inertia": lambda bench: bench.axis.inertia,
 }
+
+
+def true_of(bench: Bench, quantity: str) -> str:
+    """Which part of a bench with several interfaces a true value is of; "" where it has one."""
+    if len(bench.friction) < 2:
+        return ""
+    if quantity == "bristle_stiffness":
+        found = dict(zip(bench.friction, _bristles(bench), strict=False))
+        return f"friction.{max(found, key=lambda name: found[name])} alone" if found else ""
+    interfaces = f"{len(bench.friction)} interfaces"
+    if quantity in ("stiffness_at_rest", "damping_at_rest"):
+        return f"the sum of {interfaces}, before any slips"
+    if quantity in ("stribeck_velocity", "stribeck_exponent"):
+        return f"each of {interfaces}"  # or there is none
+    return f"the sum of {interfaces}" if quantity in _SLIDING else "the axis"
+
 
 QUANTITIES = frozenset({*_OF_ALL, *_SLIDING})
 """Those of which a bench may have a true value."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.comparing.difference import in_unit
+from campaign.identification.difference import in_unit
 from campaign.identification.intervals import LEVEL
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.trending.covariates import Covariate

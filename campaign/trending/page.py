@@ -12,8 +12,8 @@ from campaign import __version__
 from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
-from campaign.comparing.difference import in_unit
 from campaign.errors import UsageError
+from campaign.identification.difference import in_unit
 from campaign.identification.trends.family import POWER, RATE
 from campaign.plain_text import on_a_page
 from campaign.report.content.tables import table_csv

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.contrast import is_student
-from campaign.comparing.difference import BOUNDS, in_unit
 from campaign.comparing.doubts import DERIVED, FOLLOWS, WRONG_MODEL, contradicted
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.words import condition_words, display_unit, name_here
 from campaign.estimate import Estimate, Origin
+from campaign.identification.contrast import is_student
+from campaign.identification.difference import BOUNDS, in_unit
 from campaign.identification.intervals import LEVEL, student
 from campaign.identification.trends.own_errors import moderated
 from campaign.result import Finding, Value

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from campaign.comparing.difference import in_unit
 from campaign.estimate import Estimate
+from campaign.identification.difference import in_unit
 from campaign.identification.trends.changes import LEAST_FOR_A_JUMP, Jump
 from campaign.identification.trends.family import RATE
 from campaign.result import Cell, Column, Table

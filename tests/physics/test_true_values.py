@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.physics.steady_friction import steady_friction
-from campaign.physics.true_values import DIRECTIONS, stribeck_parameters, true_value
+from campaign.physics.true_values import DIRECTIONS, stribeck_parameters, true_of, true_value
 from campaign.physics.variation import of_its_day
 from campaign.protocol.bench_file import load_bench
 from tests.physics.benches import LOAD, MOTOR, RATIO, bench
@@ -72,3 +72,20 @@ def test_what_is_no_parameter_has_no_true_value() -> None:
     assert true_value(PLATFORM, "bandwidth", {}) is None
     assert true_value(PLATFORM.with_friction({}), "coulomb_torque", {}) is None
     assert true_value(PLATFORM.with_friction({}), "bristle_stiffness", {}) is None
+
+
+def test_small_motions_meet_the_sum_of_damping_and_the_inertia() -> None:
+    """800 + 4 at the load, and (0.5 + 0.001) at the motor, which counts N times."""
+    whole = 804.0 + RATIO * 0.501
+    assert true_value(bench(), "damping_at_rest", {}) == pytest.approx(whole)
+    assert true_value(bench(), "inertia", {}) == 35.0
+
+
+def test_it_is_told_which_part_of_the_bench_is_true() -> None:
+    assert true_of(bench(), "bristle_stiffness") == "friction.load alone"  # 32 N m of 37.6
+    assert true_of(bench(), "damping_at_rest") == "the sum of 2 interfaces, before any slips"
+    assert true_of(bench(), "inertia") == "the axis"
+    assert true_of(bench(), "coulomb_torque") == "the sum of 2 interfaces"
+    assert true_of(bench(), "stribeck_velocity") == "each of 2 interfaces"
+    alone = bench(lambda tree: tree["friction"].pop("motor"))
+    assert true_of(alone, "damping_at_rest") == ""

@@ -139,3 +139,12 @@ def test_two_fits_of_the_same_points_count_once(
     assert document.truths["breakaway"].note == f"{said}{left_out}"
     (answer,) = document.opening.answers
     assert answer.truth == "0 of 2 intervals hold the true values of the simulated bench"
+
+
+def test_of_several_interfaces_it_is_told_what_is_true_of_which(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    found = Estimate("damping_at_rest", 900.0, "N m s/rad", 800.0, 1000.0, 0.95)
+    (table,) = _document(made_up, tmp_path, (Finding.of(found, {}),)).truths.values()
+    assert table.rows[0]["of"] == "the sum of 2 interfaces, before any slips"
+    assert "True of" in [column.label for column in table.columns]

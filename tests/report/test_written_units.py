@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from campaign.report.content.tables import show
-from campaign.report.content.truth import _conditions
+from campaign.report.content.truth import conditions_text
 from campaign.report.content.written_units import TestUnits, short_number, units_of
 from campaign.result import Column, Result, Table
 from tests.report.planned import SHIPPED, conditions, planned
@@ -176,7 +176,7 @@ def test_a_table_says_what_was_set_in_the_same_units(protocol: Path) -> None:
         "Unit",
     )
     assert [cell.text for cell in shown.rows[0]] == ["600", "0.033", "5.730", "–", "N·m·s/rad"]
-    assert _conditions({"frequency": 0.6, path: 33.0, "direction": "up"}, units) == (
+    assert conditions_text({"frequency": 0.6, path: 33.0, "direction": "up"}, units) == (
         "frequency 600 mHz, gear preload torque 0.033 kN·m, direction up"
     )
 

@@ -24,6 +24,7 @@ from campaign.published.values import Published
 from campaign.recording import Outcome
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.opening import Opening, opening_of
+from campaign.report.content.predicted import predicted_tables
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables
 from campaign.result import Table
@@ -39,6 +40,7 @@ class Document:
         tests: in the protocol's order.
         published: the values that the run's protocol compares with, by table.
         truths: by test, what is true beside what it found, where that is known.
+        predictions: by test, what its bench file states of what it found, where that is tested.
         damaged: what of the run is damaged, as far as the report looked at it.
         measured_by: whose code found what each recording says by itself.
     """
@@ -48,6 +50,7 @@ class Document:
     published: Published
     scoreboard: Scoreboard
     truths: Mapping[str, Table]
+    predictions: Mapping[str, Table]
     incidents: Incidents
     opening: Opening
     damaged: tuple[Damage, ...]
@@ -120,14 +123,16 @@ def document_of(
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = truth_tables(run, tests)
+    predictions = predicted_tables(run, tests)
     return Document(
         run,
         tests,
         published,
         scoreboard,
         truths,
+        predictions,
         happened,
-        opening_of(run, tests, scoreboard, truths, damaged),
+        opening_of(run, tests, scoreboard, truths, predictions, damaged),
         damaged,
         ANEW if measure_anew else _measured_by(run.trials),
     )

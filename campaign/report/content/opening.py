@@ -11,6 +11,7 @@ from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.published.headline import NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
+from campaign.report.content.predicted import told_of_changes
 from campaign.report.content.truth import biases, held
 from campaign.report.content.wrong import wrong_with
 from campaign.result import Factor, Figure, Result, Table
@@ -38,6 +39,7 @@ class Answer:
         first_remarks: those on the first sentence.
         truth: how many intervals hold what is true of the bench that was simulated, and what is
             off alike in all of them; "" unknown.
+        prediction: which numbers are not what its bench file states any more; "" untested.
         problem: why there is nothing to say, or not all of it.
         kind: of experiment, as people read it: `velocity map`.
     """
@@ -48,6 +50,7 @@ class Answer:
     figure: str = ""
     remarks: tuple[str, ...] = ()
     truth: str = ""
+    prediction: str = ""
     problem: str = ""
     kind: str = ""
     first_remarks: tuple[str, ...] = ()
@@ -106,12 +109,13 @@ def opening_of(
     tests: Sequence[AnalysedTest],
     scoreboard: Scoreboard,
     truths: Mapping[str, Table],
+    predictions: Mapping[str, Table],
     damaged: Sequence[Damage] = (),
 ) -> Opening:
     """The opening of a run's report; `damaged` is all damage that the report met."""
     main = _main(tests)
     return Opening(
-        tuple(_answer(test, truths.get(test.name)) for test in tests),
+        tuple(_answer(test, truths.get(test.name), predictions.get(test.name)) for test in tests),
         _telling([test for test in tests if test.name in main]) or _telling(tests),
         tuple(wrong_with(run, tests, damaged)),
         _asked(run, tests),
@@ -175,7 +179,7 @@ def _in_short(chosen: Sequence[Answer]) -> Group:
     return Group("", tuple(answers), tuple(told))
 
 
-def _answer(test: AnalysedTest, truth: Table | None) -> Answer:
+def _answer(test: AnalysedTest, truth: Table | None, prediction: Table | None) -> Answer:
     result = test.result
     said = tuple(sentence(each) for each in result.conclusions)
     figure = _figure(result)
@@ -186,6 +190,7 @@ def _answer(test: AnalysedTest, truth: Table | None) -> Answer:
         "" if figure is None else figure.key,
         tuple(remarks(result.conclusions)),
         "" if truth is None else _held(truth),
+        "" if prediction is None else told_of_changes(prediction.rows),
         test.problem or ("" if said else _nothing(test)),
         test.kind.replace("_", " "),
         tuple(remarks(result.conclusions[:1])),

@@ -21,7 +21,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.identification.intervals import student
 from campaign.physics.bench import Bench
-from campaign.physics.true_values import QUANTITIES, true_value
+from campaign.physics.true_values import QUANTITIES, true_of, true_value
 from campaign.physics.truth import simulated
 from campaign.physics.variation import as_it_is, of_its_day
 from campaign.report.content.written_units import TestUnits, units_of
@@ -99,7 +99,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
         for finding in test.result.findings
         if finding.quantity in QUANTITIES and not finding.recomputed
     ]
-    again = [_says_again(finding, known) for finding in known]
+    again = [says_again(finding, known) for finding in known]
     found = [_row(finding, trials, benches, units) for finding in known]
     pairs = [(row, why) for row, why in zip(found, again, strict=True) if row is not None]
     rows = [{**row, COUNTED: not why} for row, why in pairs]
@@ -119,6 +119,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
             Column("conditions", "Conditions"),
             Column("unit", "Unit"),
             Column("true", "True", exact=True),
+            *([Column("of", "True of")] if any(row["of"] for row in rows) else []),
             Column("found", "Found"),
             Column("inside", "In the interval"),
         ),
@@ -201,7 +202,7 @@ def _is_mean(finding: Finding) -> bool:
     return conditions.get("statistic") == "mean" or conditions.get("direction") in MEANS
 
 
-def _says_again(finding: Finding, others: Sequence[Finding]) -> str:
+def says_again(finding: Finding, others: Sequence[Finding]) -> str:
     """As what a finding says again what others of its quantity say; "" where it says its own."""
     beside = [each for each in others if each.quantity == finding.quantity]
     if _is_mean(finding) and not all(map(_is_mean, beside)):
@@ -220,35 +221,39 @@ def _row(
     finding: Finding, trials: Sequence[Trial], benches: _Benches, units: TestUnits
 ) -> Mapping[str, Cell] | None:
     """Quantity, true value and estimate; None where the bench has no such number, or several."""
-    true = set(_true_values(finding, trials, benches))
+    own = list(_benches_of(finding, trials, benches))
+    true = {
+        None if bench is None else true_value(bench, finding.quantity, finding.conditions)
+        for bench in own
+    }
     if len(true) != 1 or None in true:
         return None
     value = true.pop()
     estimate = finding.known
     return {
         "quantity": quantity_words(finding.quantity),
-        "conditions": _conditions(finding.conditions, units),
+        "conditions": conditions_text(finding.conditions, units),
         "unit": finding.unit,
         "true": value,
+        "of": "; ".join(dict.fromkeys(true_of(b, finding.quantity) for b in own if b is not None)),
         "found": estimate,
         "inside": _inside(estimate, value),
     }
 
 
-def _true_values(
+def _benches_of(
     finding: Finding, trials: Sequence[Trial], benches: _Benches
-) -> Iterator[float | None]:
-    """Of each bench that a trial of the finding was executed on, on its day.
+) -> Iterator[Bench | None]:
+    """Each bench that a trial of the finding was executed on, on its day.
 
     Of a finding about one trial it is that trial's own value: friction scatters between trials.
     """
-    own = [trial for trial in trials if _is_of(trial, finding)]
+    own = [trial for trial in trials if is_of(trial, finding)]
     found = [benches.own(own[0])] if len(own) == 1 else [benches.of(trial) for trial in own]
-    for bench in {id(bench): bench for bench in found}.values():
-        yield None if bench is None else true_value(bench, finding.quantity, finding.conditions)
+    yield from {id(bench): bench for bench in found}.values()
 
 
-def _is_of(trial: Trial, finding: Finding) -> bool:
+def is_of(trial: Trial, finding: Finding) -> bool:
     """Whether nothing of the trial's place contradicts the finding's conditions."""
     return all(
         finding.conditions[path] == value
@@ -257,7 +262,8 @@ def _is_of(trial: Trial, finding: Finding) -> bool:
     )
 
 
-def _conditions(conditions: Mapping[str, Value], units: TestUnits) -> str:
+def conditions_text(conditions: Mapping[str, Value], units: TestUnits) -> str:
+    """Where a number holds, in the units of its test."""
     shown = (
         f"{path_words(name)} {units.value(name, value)}"
         for name, value in conditions.items()

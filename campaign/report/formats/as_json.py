@@ -145,6 +145,7 @@ def _test(section: Section) -> data.Test:
         figures=tuple(map(_figure, section.figures)),
         tables=tuple(map(_table, section.tables)),
         truth=None if section.truth is None else _table(section.truth),
+        prediction=None if section.prediction is None else _table(section.prediction),
     )
 
 

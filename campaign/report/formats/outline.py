@@ -115,6 +115,8 @@ def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
         yield f"No result: {answer.problem}."
     if with_truth and answer.truth:
         yield f"{answer.truth}."
+    if answer.prediction:
+        yield f"{answer.prediction}."
     yield from answer.remarks
 
 
@@ -129,6 +131,8 @@ def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
     yield from map(_compared, section.comparisons)
     if section.truth is not None:
         yield _grid(section.truth)
+    if section.prediction is not None:
+        yield _grid(section.prediction)
     for figure in section.figures:
         if figure is telling:
             told = f"Figure {figure.number}, {figure.title}, stands on top of the report."

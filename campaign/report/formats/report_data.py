@@ -223,6 +223,7 @@ class Test(_Part):
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
     truth: Table | None
+    prediction: Table | None
     """What it found beside what is true, where that is known."""
 
 

@@ -100,6 +100,7 @@ class Section:
 
     Attributes:
         truth: what it found beside what is true, where that is known.
+        prediction: what it found beside what its bench file states, where that is tested.
         summary: its conditions in a line.
     """
 
@@ -112,13 +113,14 @@ class Section:
     problems: tuple[str, ...]
     left_out: tuple[str, ...] = ()
     truth: ShownTable | None = None
+    prediction: ShownTable | None = None
     summary: str = ""
 
     @property
     def items(self) -> tuple[ShownFigure | ShownTable | Comparison, ...]:
         """Its figures and tables in the order of the page."""
-        truth = (self.truth,) if self.truth else ()
-        return (*self.comparisons, *truth, *self.figures, *self.tables)
+        held = [each for each in (self.truth, self.prediction) if each]
+        return (*self.comparisons, *held, *self.figures, *self.tables)
 
 
 @dataclass

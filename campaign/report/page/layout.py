@@ -190,8 +190,8 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
         mine = [n for n in published if n in test.reproduces and n not in spoken]
         spoken.update(mine)
         tables_ = [published[n] for n in mine]
-        truth = document.truths.get(test.name)
-        sections.append(_section(place, makers[test.name], document.scoreboard, tables_, truth))
+        expected = (document.truths.get(test.name), document.predictions.get(test.name))
+        sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
     return tuple(sections)
 
 
@@ -249,10 +249,10 @@ def _section(
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    truth: Table | None,
+    expected: tuple[Table | None, Table | None],
 ) -> Section:
     with speaking_of(maker.test.sides):
-        return _section_of_axis(place, maker, scoreboard, published, truth)
+        return _section_of_axis(place, maker, scoreboard, published, expected)
 
 
 def _section_of_axis(
@@ -260,13 +260,13 @@ def _section_of_axis(
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    truth: Table | None,
+    expected: tuple[Table | None, Table | None],
 ) -> Section:
     test, folder = maker.test, maker.folder
     left_out = tuple(_left_out(test))
     problems = [test.problem] if test.problem else []
     comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
-    found = None if truth is None else maker.table(truth)
+    truth, prediction = (None if each is None else maker.table(each) for each in expected)
     figures = [
         shown
         for figure in test.result.figures
@@ -286,7 +286,8 @@ def _section_of_axis(
         comparisons=tuple(comparisons),
         problems=(*left_out, *problems),
         left_out=left_out,
-        truth=found,
+        truth=truth,
+        prediction=prediction,
         summary=summary_of(test),
     )
 

@@ -9,8 +9,8 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
-from campaign.comparing.contrast import Contrast, contrast, left_over, ratio_ends
 from campaign.estimate import Estimate, Origin
+from campaign.identification.contrast import Contrast, contrast, left_over, ratio_ends
 from campaign.identification.intervals import LEVEL
 from campaign.units import factor
 

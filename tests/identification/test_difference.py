@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from campaign.comparing.contrast import contrast, is_student, left_over, ratio_ends
-from campaign.comparing.difference import difference_of
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.identification.contrast import contrast, is_student, left_over, ratio_ends
+from campaign.identification.difference import difference_of
 from campaign.identification.intervals import of_positive_repeats, of_repeats, with_error
 
 KT = "torque constant"

@@ -1,0 +1,91 @@
+"""What a bench file states of a number that a test finds, and how well it says that it knows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+from campaign.estimate import Estimate
+from campaign.physics.bench import Bench
+from campaign.physics.known import NORMAL_95, number_at
+from campaign.physics.true_values import true_value
+
+LEVEL = 0.95
+SMALL = 1e-3
+"""Share of a value by which it is moved, to see whether a number depends on it."""
+
+
+def stated_value(
+    bench: Bench, quantity: str, conditions: Mapping[str, Any], unit: str
+) -> Estimate | None:
+    """The number (SI) that the bench's own values come to, with the interval that they give it.
+
+    To first order in the stated standard uncertainties, with the stated correlations (GUM 5.1.2,
+    5.2.2). None where the bench has no such number, or where one of the values of friction that it
+    comes from has no stated uncertainty: the interval would leave that out.
+
+    Args:
+        quantity, conditions: as of a finding (`true_value`).
+        unit: of the finding.
+    """
+    value = true_value(bench, quantity, conditions)
+    if value is None:
+        return None
+    effects: dict[str, float] = {}
+    for path in dict.fromkeys((*_of_friction(bench), *bench.known.values)):
+        found = number_at(bench, path)
+        if found is None:
+            continue
+        sigma = bench.known_uncertainty(path)
+        moved = _moved(bench, path.split("."), found[0] + (sigma or SMALL * (found[0] or 1.0)))
+        other = true_value(moved, quantity, conditions)
+        if other == value:
+            continue
+        if other is None or sigma is None:
+            return None
+        effects[path] = other - value
+    if not effects:
+        return None
+    sigma = math.sqrt(_variance(effects, bench))
+    return Estimate(
+        quantity,
+        value,
+        unit,
+        value - NORMAL_95 * sigma,
+        value + NORMAL_95 * sigma,
+        LEVEL,
+        "stated in the bench file",
+        standard_error=sigma,
+    )
+
+
+def _variance(effects: Mapping[str, float], bench: Bench) -> float:
+    total = math.fsum(effect**2 for effect in effects.values())
+    for one, other, share in bench.known.correlations:
+        if one in effects and other in effects:
+            total += 2.0 * share * effects[one] * effects[other]
+    return max(total, 0.0)
+
+
+def _of_friction(bench: Bench) -> Iterator[str]:
+    """Paths of all that could be a number of its friction."""
+    for name, options in bench.friction.items():
+        for field in type(options).model_fields:
+            if isinstance(getattr(options, field), BaseModel):
+                within = type(getattr(options, field)).model_fields
+                yield from (f"friction.{name}.{field}.{key}" for key in within)
+            else:
+                yield f"friction.{name}.{field}"
+
+
+def _moved(tree: Any, keys: list[str], value: float) -> Any:
+    """The same bench with another number at a path."""
+    if not keys:
+        return value
+    key, *rest = keys
+    if isinstance(tree, Mapping):
+        return {**tree, key: _moved(tree[key], rest, value)}
+    return tree.model_copy(update={key: _moved(getattr(tree, key), rest, value)})
