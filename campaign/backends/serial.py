@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -187,7 +188,9 @@ class SerialBackend:
     ) -> Ending:
         task = trial.task
         try:
-            rate, channels = session.configure(self._parameters(session, trial))
+            parameters = self._parameters(session, trial)
+            _refuse_long(session, parameters)
+            rate, channels = session.configure(parameters)
             if rate != task.sample_rate:
                 raise RefusedError(
                     f"the controller records at {rate:g} Hz instead of task.sample_rate = "
@@ -355,6 +358,19 @@ def _info(channel: Channel, mode: str, sides: Sides) -> ChannelInfo:
 
 def _state(safe: bool) -> SafeState:
     return SafeState.CONFIRMED if safe else SafeState.NOT_CONFIRMED
+
+
+def _refuse_long(session: Session, parameters: Mapping[str, Value]) -> None:
+    """Raise RefusedError, with both lengths, for an array that the controller does not take."""
+    if session.capabilities is None:
+        return
+    most = session.capabilities.longest_array
+    for name, value in parameters.items():
+        if isinstance(value, tuple) and len(value) > most:
+            raise RefusedError(
+                f"{name} has {len(value)} values, and the controller takes {most} at most: ask for "
+                "a shorter command, or for one of lower frequencies"
+            )
 
 
 def _fault(fault: Fault, reason: str, safe_state: SafeState) -> Ending:

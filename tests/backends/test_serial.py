@@ -15,7 +15,7 @@ from campaign.backends.sim import SimOptions
 from campaign.errors import UsageError
 from campaign.protocol.bench_file import load_bench
 from campaign.recording import Ending, Fault, MemoryRecorder, Outcome, Recording, SafeState
-from campaign.signals import Polyline, Sine
+from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Task, Trial
 from campaign.wire.channel_features import channel_features, named_channels
 from tests.link.controllers import controller
@@ -103,6 +103,33 @@ def test_without_faults_it_equals_the_simulation_to_the_bit(pty: bool) -> None:
             assert recording.channels.keys() == true.channels.keys()
             assert ending.telemetry["lost_records"] == 0
         assert backend.make_safe() is SafeState.CONFIRMED
+
+
+def test_a_multisine_goes_as_it_is_however_many_lines_it_has() -> None:
+    count = 1000  # as many as there may be: several messages of each array
+    lines = MultiSine(
+        amplitudes=(1e-3,) * count,
+        frequencies=tuple(0.05 * (2 * k + 1) for k in range(count)),
+        phases=tuple(0.7 * k * k % 6.0 for k in range(count)),
+    )
+    shaken = trial(task(mode="torque", command=lines))
+    with controller("--speed", "max") as port, backend_at(port) as backend:
+        ending, recording = execute(backend, shaken)
+        assert ending.outcome is Outcome.COMPLETED
+        _, true = simulated(shaken)
+        assert compare(recording, true) == 0
+        assert np.ptp(recording["drive_torque"]) > 0
+
+
+def test_a_command_longer_than_the_controller_takes_is_refused_with_its_longest() -> None:
+    count = 65_537
+    times = tuple(k / count for k in range(count))
+    long = trial(task(command=Polyline(times=times, values=(0.0,) * count)))
+    with controller("--speed", "max") as port, backend_at(port) as backend:
+        ending, _ = execute(backend, long)
+        assert ending.outcome is not Outcome.COMPLETED
+        assert "65536" in ending.reason
+        assert "task.command.times" in ending.reason
 
 
 def hold_to_it(faults: tuple[str, ...], trials: int) -> list[Ending]:

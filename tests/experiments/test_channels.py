@@ -61,9 +61,14 @@ SHAKEN = {
     "highest": "40 Hz",
     "periods": 3,
 }
+WAVES = {"lowest": "1 Hz", "highest": "20 Hz", "amplitude": "8 deg/s"}
+SERIES = {"signal": "fourier", "period": "4 s", "search": 10}
 CASES = (
     Case("breakaway", bench, {**RAMP, "positions": ["-5 deg", "0 deg", "5 deg"]}),
     Case("component_friction", bench, {**RAMP, "measurements": 2}),
+    Case("excitation", bench, {**WAVES, "period": "2 s", "realisations": 3}),
+    Case("excitation", bench, {**WAVES, "signal": "chirp", "duration": "10 s"}, also=" chirp"),
+    Case("excitation", bench, SERIES, also=" fourier"),
     Case("force_rate", bench, {"torque_rates": ["300 N m/s", "1000 N m/s"]}),
     Case("frequency_response", bench, SINES, ({}, {"compensation": "lugre"})),
     Case("frequency_response", bench, {**SINES, "loop": "open"}, also=" open"),
@@ -115,6 +120,7 @@ class Loss:
 STUCK = Loss(columns=(("stabilization-error", "stuck"),))
 RELATIVE = Loss(figures=("relative-rate",))
 LOSSES = {
+    ("excitation", "relative_angle"): Loss(columns=(("reached", "top_angle"),)),
     ("move", "relative_angle"): Loss(columns=(("moves", "reached"), ("moves", "deviation"))),
     ("observer_gain", "friction_torque"): Loss(
         curves=("error",), columns=(("observer-gain", "error_theory"),)

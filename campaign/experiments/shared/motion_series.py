@@ -17,7 +17,7 @@ import numpy as np
 
 from campaign.axis_kind import words_here
 from campaign.signals import Array, Polyline
-from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME
+from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME, Quantity
 
 MOST_ROWS = 100_000
 """of a series; a trial carries all of them."""
@@ -50,13 +50,26 @@ def read_series(
     Separated by commas, or by semicolons where the header has any; empty lines and lines that
     begin with # are left out. Raises ValueError with `name` and line for whatever is wrong.
     """
+    value = KINDS[kind_of(value_unit)]
+    return read_table(text, name, (time_column, value_column), time_unit, value_unit, value)
+
+
+def read_table(
+    text: str,
+    name: str,
+    wanted: tuple[str, str],
+    time_unit: str,
+    value_unit: str,
+    value: Quantity,
+) -> tuple[Array, Array]:
+    """The same of values of any quantity; `wanted`: headers of the time and of the values."""
     time_factor = TIME.parse(f"1 {time_unit}")
-    value_factor = KINDS[kind_of(value_unit)].parse(f"1 {value_unit}")
+    value_factor = value.parse(f"1 {value_unit}")
     rows = _rows(text, name)
     line, header = next(rows, (1, []))
     columns = [cell.strip() for cell in header]
     places = []
-    for column in (time_column, value_column):
+    for column in wanted:
         if columns.count(column) != 1:
             how = "no column" if column not in columns else "more than one column"
             there = ", ".join(columns) or "none"
@@ -69,11 +82,11 @@ def read_series(
             raise ValueError(f"{name}:{line}: {len(row)} values under {len(columns)} columns")
         if len(times) == MOST_ROWS:
             raise ValueError(f"{name}:{line}: more than {MOST_ROWS} rows; resample the series")
-        time, value = (_number(row[place], name, line) for place in places)
+        time, number = (_number(row[place], name, line) for place in places)
         if times and time <= times[-1]:
             raise ValueError(f"{name}:{line}: the time {time:g} does not come after {times[-1]:g}")
         times.append(time)
-        values.append(value)
+        values.append(number)
     if len(times) < 2:
         raise ValueError(f"{name}: a series needs at least two rows under its header")
     return (np.array(times) - times[0]) * time_factor, np.array(values) * value_factor

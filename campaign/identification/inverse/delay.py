@@ -21,6 +21,8 @@ from campaign.identification.inverse.terms import Terms
 LONGEST = 0.02
 """s; delays are looked for up to this, or up to `SAMPLES` samples where these are longer."""
 SAMPLES = 5.0
+OWN = 0.05
+"""Share of what a delay changes that has to be like no other term."""
 METHOD = "least residual over a shift of the force, Bartlett HAC"
 
 
@@ -81,6 +83,11 @@ def _with_interval(
         both = np.column_stack([whole.columns, change])
         wider.append(Piece(both * moves[:, None], whole.force * moves, whole.time))
     design, force = stacked(wider)
+    if (own := _own_share(design)) < OWN:
+        reason = (
+            f"a later force looks like other terms in this motion: all but {100 * own:.1g} % of it"
+        )
+        return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     fit = fitted(wider, np.asarray(np.linalg.pinv(design)), design, force)
     half = fit.quantile * float(fit.robust[-1])
     if not half < reach:
@@ -90,6 +97,16 @@ def _with_interval(
         "delay", delay, "s", delay - half, delay + half, LEVEL, METHOD,
         standard_error=float(fit.robust[-1]), freedom=fit.freedom,
     )  # fmt: skip
+
+
+def _own_share(design: Array) -> float:
+    """Of the last column, of shape (n, k), what the others do not explain: its norm over its own.
+
+    A single sine in one direction has no time: inertia and viscous friction turn it as a delay.
+    """
+    others, last = design[:, :-1], design[:, -1]
+    rest = last - others @ np.linalg.lstsq(others, last, rcond=None)[0]
+    return float(np.linalg.norm(rest) / max(float(np.linalg.norm(last)), 1e-300))
 
 
 def _force(motion: Motion, delay: float, filtering: Filtering) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -17,6 +18,9 @@ from campaign.identification.inverse.motion import (
 )
 from campaign.identification.inverse.regression import Piece
 from campaign.identification.inverse.terms import Terms, columns
+
+END_ROWS, END_PERIODS = 5, 3.0
+"""Rows, or periods of the low-pass, that its beginning and its end spoil; a tenth at most."""
 
 
 def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
@@ -40,12 +44,21 @@ def all_rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 
 
 
 def moving(motion: Motion, filtering: Filtering) -> Array:
-    """1 for rows in which the axis moves, and 0 for others, shape (n,)."""
+    """1 for rows in which the axis moves, and 0 for others, shape (n,).
+
+    Those at both ends are among the others: differentiated noise is large there.
+    """
     rate = decimated(motion.rate[filtering.skip :, None], filtering.decimation)[:, 0]
     slow = np.abs(rate) < filtering.slowest
     beside = slow.copy()
     beside[1:] |= slow[:-1]
     beside[:-1] |= slow[1:]
+    if filtering.slowest > 0.0:
+        per_second = motion.sample_rate / filtering.decimation
+        edge = max(END_ROWS, math.ceil(END_PERIODS * per_second / filtering.low_pass))
+        edge = min(edge, len(beside) // 10)
+        beside[:edge] = True
+        beside[len(beside) - edge :] = True
     return np.asarray(~beside, dtype=float)
 
 

@@ -49,10 +49,14 @@ def _negative(motion: Motion) -> Array:
     return np.asarray(motion.rate < 0, dtype=float)
 
 
+WARM = 20.0
+"""degC at which friction is the plain terms'; those over temperature say how it differs from it."""
+
+
 def _warmer(motion: Motion) -> Array:
     if motion.temperature is None:
         raise ValueError("nobody recorded a temperature")
-    return motion.temperature
+    return motion.temperature - WARM
 
 
 ALL = (
@@ -79,10 +83,12 @@ ALL = (
          lambda m: np.sign(m.rate) * np.sqrt(np.abs(m.rate)), family="bend"),
     Term("quadratic", "v |v|", "N m s^2/rad^2", "Drag.", lambda m: m.rate * np.abs(m.rate),
          family="bend"),
-    Term("coulomb_over_temperature", "T sign v", "N m/K", "How dry friction changes with heat.",
+    Term("coulomb_over_temperature", "ΔT sign v", "N m/K",
+         "How dry friction changes with heat, from that at 20 °C on.",
          lambda m: _warmer(m) * np.sign(m.rate)),
-    Term("viscous_over_temperature", "T v", "N m s/(rad K)",
-         "How viscous friction changes with heat.", lambda m: _warmer(m) * m.rate),
+    Term("viscous_over_temperature", "ΔT v", "N m s/(rad K)",
+         "How viscous friction changes with heat, from that at 20 °C on.",
+         lambda m: _warmer(m) * m.rate),
 )  # fmt: skip
 """Terms by their names; those of a position's period are made by `periodic`."""
 TERMS: Mapping[str, Term] = {term.name: term for term in ALL}
