@@ -108,6 +108,7 @@ _UNITS = {
     "N m s/(rad K)": "N s/(m K)",
     "A s/rad": "A s/m",
     "A/rad": "A/m",
+    "s/rad": "s/m",
     "V s/rad": "V s/m",
     "rad/s/(N m)": "m/s/N",
     "deg": "mm",

@@ -64,8 +64,12 @@ def identify_run(
             say=say,
         )
     if all(each.identified is None for each in found.sections):
-        reasons = "; ".join(f"{each.method.name}: {each.problem}" for each in found.sections)
-        raise UsageError(f"{chosen.name}: nothing can be identified from it ({reasons})")
+        told = [f"{each.method.name}: {each.problem}" for each in found.sections]
+        lines = [
+            textwrap.fill(each, WIDTH, initial_indent="  ", subsequent_indent="    ")
+            for each in told
+        ]
+        raise UsageError("\n".join([f"{chosen.name}: nothing can be identified from it", *lines]))
     command = _command(run, models, validate, compare, settings)
     text = None
     if bench is not None and not nothing_to_write(found):

@@ -174,7 +174,11 @@ def _samples(data: TrialData) -> tuple[Array, Array, Array]:
     return recording.time, way * recording[GYRO_RATE], way * recording[DRIVE_TORQUE]
 
 
-def _presliding(data: TrialData, breakaway: float) -> Presliding:
+def curve_of(data: TrialData, breakaway: float) -> Presliding:
+    """The curve of bristles of a ramp whose load slides at `breakaway` (N m).
+
+    Raises ValueError where the ramp shows too little of it.
+    """
     options = _options(data.trial)
     start = _windows(data.trial, options)["ramp"].start
     return fit_presliding(*_samples(data), start, breakaway, options.fit_share)
@@ -191,7 +195,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
         "peak_acceleration", found.acceleration, "rad/s^2", "it serves the inertia's part alone"
     )
     try:
-        curve = _presliding(data, found.torque.value)
+        curve = curve_of(data, found.torque.value)
     except ValueError:
         return torque, acceleration
     return torque, acceleration, *_of_curve(curve, options, bench)
@@ -298,7 +302,7 @@ def _figures(
     shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
     if shown is not None:
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
-        curve, place = _presliding(data, torque), ramps.places[shown]
+        curve, place = curve_of(data, torque), ramps.places[shown]
         yield ramp_figure(_samples(data), curve, torque, suffix, place, trials_of([data]))
     if len(ramps.found) > 2 and all("position" in place for place in ramps.places):
         yield position_figure(ramps, means, suffix)

@@ -28,6 +28,11 @@ from campaign.estimate import Estimate
 from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.conclusions.stabilization import stabilization_conclusions
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.results.identified_compensations import (
+    beside_conclusions,
+    beside_rows,
+    beside_table,
+)
 from campaign.experiments.results.stabilization_figures import stabilization_figures
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
@@ -209,13 +214,21 @@ def _analyse(data: TestData) -> Result:
         for item in data.trials
         if item.ending.outcome != "completed" and item.trial.role == "measurement"
     ]
+    extra = [path for path in paths if path not in columns]
+    tables = [_table(rows, extra, _seen_through(high_pass))]
+    beside = beside_rows(rows)
+    if beside:
+        tables.append(beside_table(beside, extra))
     return Result(
-        (_table(rows, [path for path in paths if path not in columns], _seen_through(high_pass)),),
+        tuple(tables),
         tuple(figures),
         tuple(findings),
         failures_note(data),
-        stabilization_conclusions(
-            findings, Settings.of(data, StabilizationOptions), ended, high_pass
+        (
+            *stabilization_conclusions(
+                findings, Settings.of(data, StabilizationOptions), ended, high_pass
+            ),
+            *beside_conclusions(beside),
         ),
         telling=next((f.key for f in figures if "error" in f.key), ""),
     )

@@ -61,6 +61,7 @@ def steady_stretches(
     shortest: float = SHORTEST_TIME,
     *,
     driven: bool = True,
+    slowest: float | None = None,
 ) -> tuple[SteadyStretch, ...]:
     """The stretches of steady motion, in order; none of standstill.
 
@@ -72,6 +73,8 @@ def steady_stretches(
         shortest: of a stretch before it is cut (s).
         driven: whether the torque has to go with the rate, as it does unless something else, such
             as gravity, moves the axis as well.
+        slowest: rate (in the unit of `rate`) up to which it stands still; None: 3 % of its fastest.
+            What noise may be counts as standstill besides.
     """
     size = max(1, round(BLOCK * sample_rate))
     while True:
@@ -84,7 +87,8 @@ def steady_stretches(
         if noise <= QUIET * largest or 2 * size > LONGEST_BLOCK * sample_rate:
             break
         size *= 2
-    slowest = max(SLOWEST * largest, NOISE * noise / TELLS)
+    still = SLOWEST * largest if slowest is None else slowest
+    slowest = max(still, NOISE * noise / TELLS)
     fewest = max(SHORTEST, int(np.ceil(shortest * sample_rate / size)))
     grown = [(a, b) for a, b in _grown(means, noise, slowest) if b - a >= fewest]
     level = None

@@ -111,6 +111,23 @@ def fit_model(
     return ModelFit(found, estimates, values, left, regression, free)
 
 
+def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
+    """How far the other free unknowns go (SI) when one is `shift` (SI) beside its best value.
+
+    Linearised at the optimum; empty where that unknown is not free.
+    """
+    unknowns, jacobian = fit.found.unknowns, fit.found.jacobian
+    index = [unknown.name for unknown in unknowns].index(name)
+    if jacobian is None or not fit.free[index]:
+        return {}
+    slopes = np.array([u.slope(float(s)) for u, s in zip(unknowns, fit.found.shares, strict=True)])
+    others = [i for i in np.flatnonzero(fit.free) if i != index]
+    there = jacobian[:, index] * shift / slopes[index]
+    shares = -np.linalg.lstsq(jacobian[:, others], there, rcond=None)[0]
+    moved = shares * slopes[others]
+    return {unknowns[i].name: float(each) for i, each in zip(others, moved, strict=True)}
+
+
 def refitted(unknowns: Sequence[Unknown], residuals: Residuals, begin: Array) -> Values:
     """Values (SI) of a further fit to other residuals, from the shares `begin`."""
     settings = Settings(starts=1, stated=False, tolerance=1e-6)

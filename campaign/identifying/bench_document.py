@@ -9,15 +9,16 @@ from campaign import __version__
 from campaign.axis_kind import speaking_of, unit_here
 from campaign.errors import CampaignError
 from campaign.estimate import Estimate, Origin
+from campaign.identifying.compensations import identified_compensations, without_identified
 from campaign.identifying.identification import Identification, Section
 from campaign.identifying.method import Identified, Parameter
+from campaign.identifying.written import amount, known_of
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.protocol.bench_edit import with_known
 
 LEAST_CORRELATION = 0.1
 """below which two values count as told apart."""
-DIGITS = 6
 FRICTION = "friction.load."
 CURVE = (
     "coulomb_torque",
@@ -35,6 +36,7 @@ def bench_text(found: Identification, command: str) -> str:
     Raises CampaignError where the run does not hold the bench's file, or it cannot be edited.
     """
     name, text = _source(found)
+    text = without_identified(text)
     values: dict[str, Any] = {}
     known: dict[str, Any] = {}
     correlations: list[list[Any]] = []
@@ -47,7 +49,7 @@ def bench_text(found: Identification, command: str) -> str:
                 filled = {n: each for n, each in filled.items() if not _is_friction(each.bench)}
             for parameter in filled.values():
                 values[parameter.bench] = _written(parameter.estimate)
-                known[parameter.bench] = _known(parameter.estimate)
+                known[parameter.bench] = known_of(parameter.estimate)
             correlations += _correlations(section, filled)
             if filled and section.identified is not None:
                 settings = _settings(section.identified, found.bench)
@@ -57,6 +59,9 @@ def bench_text(found: Identification, command: str) -> str:
                     values[path] = _value(value, unit)
                     if isinstance(value, float):
                         known[path] = {"origin": "assumed"}
+    compensations = identified_compensations(found, text)
+    values |= compensations.values
+    known |= compensations.known
     entries: dict[str, Any] = {"identified": _identified(found, command), "values": known}
     stale = _stale(values, found.bench)
     kept = [
@@ -71,7 +76,8 @@ def bench_text(found: Identification, command: str) -> str:
 
 def nothing_to_write(found: Identification) -> bool:
     """Whether no parameter has a place in a bench file."""
-    return not any(_filled(section) for section in found.sections)
+    filled = any(_filled(section) for section in found.sections)
+    return not filled and not identified_compensations(found, _source(found)[1]).values
 
 
 def _source(found: Identification) -> tuple[str, str]:
@@ -145,26 +151,13 @@ def _without(document: Any, path: str) -> None:
 
 
 def _written(estimate: Estimate) -> Any:
-    return _amount(estimate.value, estimate.unit)
-
-
-def _amount(value: float, unit: str) -> Any:
-    """With its unit; a number where it has none."""
-    return f"{value:.{DIGITS}g} {unit}" if unit else float(f"{value:.{DIGITS}g}")
+    return amount(estimate.value, estimate.unit)
 
 
 def _value(value: Any, unit: str) -> Any:
     if not isinstance(value, float):
         return value
-    return _amount(value, unit_here(unit))
-
-
-def _known(estimate: Estimate) -> dict[str, Any]:
-    low, high = estimate.combined
-    if low is None or high is None:
-        return {"origin": "measured"}
-    ends = [_amount(end, estimate.unit) for end in (low, high)]
-    return {"interval": ends, "origin": "measured"}
+    return amount(value, unit_here(unit))
 
 
 def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:

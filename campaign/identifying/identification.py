@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from campaign.axis_kind import speaking_of
-from campaign.identification.difference import Difference, difference_of
+from campaign.axis_kind import speaking_of, unit_here, words_here
 from campaign.errors import Problem, ProtocolError, UsageError
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import bench_of
 from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
-from campaign.identifying.material import Chosen
+from campaign.identification.difference import Difference, difference_of
+from campaign.identifying.material import Chosen, same_recordings
 from campaign.identifying.method import Identified, Material, Method, Parameter, nobody_listens
 from campaign.physics.bench import Bench
 from campaign.plugins import Kinds
@@ -21,6 +21,8 @@ from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
 
 FRICTION = "friction."
+WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
+"""Tables that a bench has with all of these keys, or not at all."""
 SOURCE = "constant"
 """Systematic parts whose source begins so are one and the same for recordings of one rig."""
 
@@ -124,14 +126,17 @@ def identify(
 
 def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
     """Raises UsageError where recordings would be held against themselves."""
-    if chosen.run.identity != other.run.identity:
-        return
-    own = {each.trial.number for each in chosen.trials}
-    both = sorted(own & {each.trial.number for each in other.trials})
+    both, what = [], "trials that the model is fitted to"
+    if chosen.run.identity == other.run.identity:
+        own = {each.trial.number for each in chosen.trials}
+        both = sorted(own & {each.trial.number for each in other.trials})
+    if not both:
+        both = same_recordings(chosen, other)
+        what = f"the same samples as {chosen.name} in trials"
     if both:
         told = ", ".join(str(number) for number in both[:5]) + (" ..." if len(both) > 5 else "")
         raise UsageError(
-            f"{option}: {other.name} has trials that the model is fitted to ({told}), so that it "
+            f"{option}: {other.name} has {what} ({told}), so that it "
             "says nothing; name another run, or another test of this one, as in RUN:TEST"
         )
 
@@ -203,7 +208,14 @@ def _section(
 
 def _of_its_axis(found: Identified) -> Identified:
     parameters = tuple(
-        replace(each, estimate=estimate_here(each.estimate)) for each in found.parameters
+        replace(
+            each,
+            estimate=estimate_here(each.estimate),
+            meaning=words_here(each.meaning),
+            display=unit_here(each.display),
+            advice=words_here(each.advice),
+        )
+        for each in found.parameters
     )
     return replace(found, parameters=parameters, result=of_its_axis(found.result))
 
@@ -218,13 +230,43 @@ def fitted_again(
 
 
 def _with_place(found: Identified, bench: Bench) -> Identified:
-    """Friction of all interfaces together is that of none: it goes to no bench with several."""
+    """As found, without a place in the bench file for what makes no bench there."""
+    return _with_whole_tables(_with_own_friction(found, bench), bench)
+
+
+def _with_whole_tables(found: Identified, bench: Bench) -> Identified:
+    """Without keys of a table that the bench has not, and that would lack others."""
+    told = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
+    for table, keys in WHOLE.items():
+        needed = {f"{table}.{key}" for key in keys}
+        missing = sorted(needed - told)
+        if not needed & told or not missing or getattr(bench, table) is not None:
+            continue
+        what = f"Without {', '.join(missing)} there is no [{table}] to write"
+        note = f"{what}: the file gets none of it."
+        parameters = (
+            replace(each, bench="") if each.bench in needed else each for each in found.parameters
+        )
+        found = replace(
+            found,
+            parameters=tuple(parameters),
+            result=replace(found.result, notes=(*found.result.notes, note)),
+        )
+    return found
+
+
+def _with_own_friction(found: Identified, bench: Bench) -> Identified:
+    """Friction of all interfaces together is that of none: it goes to no bench with several.
+
+    What compensates it has a model of all together, and takes it.
+    """
+    found = replace(found, parameters=tuple(map(_lumped, found.parameters)))
     others = [name for name in bench.friction if name != "load"]
     if not others or not any(each.bench.startswith(FRICTION) for each in found.parameters):
         return found
     note = (
         f"Friction is that of all interfaces together, and the bench has some besides the load's "
-        f"({', '.join(others)}): it does not go to the bench file."
+        f"({', '.join(others)}): of the bench file it goes to compensations only."
     )
     return replace(
         found,
@@ -235,6 +277,11 @@ def _with_place(found: Identified, bench: Bench) -> Identified:
         settings={k: v for k, v in found.settings.items() if not k.startswith(FRICTION)},
         result=replace(found.result, notes=(*found.result.notes, note)),
     )
+
+
+def _lumped(parameter: Parameter) -> Parameter:
+    key = parameter.bench.removeprefix(f"{FRICTION}load.")
+    return parameter if key == parameter.bench else replace(parameter, lumped=key)
 
 
 def _compared(

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
 from campaign.errors import UsageError
@@ -54,6 +58,40 @@ def choose(results: Path, named: str) -> Chosen:
         of = f"of {test!r} " if test else ""
         raise UsageError(f"{run.name}: no trial {of}was completed; there is nothing to identify")
     return Chosen(run, test, trials)
+
+
+def same_recordings(chosen: Chosen, other: Chosen) -> list[int]:
+    """Numbers of trials of `other` whose samples are those of a trial of `chosen`.
+
+    A recording that is imported twice is in two runs, and is one recording: channels that both
+    have hold the same samples, bit by bit.
+    """
+    alike = {_length(each) for each in chosen.trials} & {_length(each) for each in other.trials}
+    own = [_digests(each) for each in chosen.trials if _length(each) in alike]
+    again = {each.trial.number: _digests(each) for each in other.trials if _length(each) in alike}
+    return sorted(
+        number for number, mine in again.items() if any(_same(mine, theirs) for theirs in own)
+    )
+
+
+def _same(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
+    both = one.keys() & other.keys()
+    return bool(both) and all(one[name] == other[name] for name in both)
+
+
+def _length(trial: ArchivedTrial) -> tuple[float, float]:
+    return trial.trial.task.duration, trial.trial.task.sample_rate
+
+
+def _digests(trial: ArchivedTrial) -> Mapping[str, str]:
+    """SHA-256 of each channel's samples, by its name; of channels that change."""
+    recording = trial.recording()
+    found = {}
+    for name in recording.channels:
+        samples = np.ascontiguousarray(recording[name], dtype=np.float64)
+        if len(samples) and np.any(samples != samples[0]):
+            found[name] = hashlib.sha256(samples.tobytes()).hexdigest()
+    return found
 
 
 def _split(results: Path, named: str) -> tuple[Path, str]:

@@ -44,6 +44,8 @@ class Parameter:
         meaning: one sentence.
         display: unit that a reader is shown, "" for the same.
         bench: key of the bench file that it fills in, e.g. `axis.inertia`; "" for none.
+        lumped: key of a friction model that stands for all interfaces together, as that of a
+            compensation does, e.g. `negative.coulomb_torque`; "" for none.
         advice: what to measure next to make its interval narrower; "" where nobody knows.
     """
 
@@ -52,6 +54,7 @@ class Parameter:
     display: str = ""
     bench: str = ""
     advice: str = ""
+    lumped: str = ""
 
 
 @dataclass(frozen=True)

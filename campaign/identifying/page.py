@@ -31,6 +31,9 @@ from campaign.result import Figure
 CURES = {
     "band": "half the band finds otherwise, so that either the model lacks something (look at what "
     "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",
+    "what the model misses": "the model lacks something; look at what is left over",
+    "friction, at this excitation": "excite with more torque, of which friction is less, "
+    "and with a second amplitude near it",
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
 """What makes a systematic part smaller, by its source."""
@@ -135,7 +138,7 @@ def _advice(parameter: Parameter) -> str:
     parts.sort(key=lambda part: -(part.standard_uncertainty or 0.0))
     if parts and 2.0 * estimate.systematic_uncertainty > scatter:
         source = parts[0].source
-        cure = CURES.get(source, f"find out the {source} better")
+        cure = CURES.get(source, f"know the {source} better")
         return (
             f"{begin} Most of it is systematic ({source}), and no longer recording makes that "
             f"smaller: {cure}."

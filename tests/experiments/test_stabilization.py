@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from campaign.estimate import Estimate
+from campaign.experiments.results.identified_compensations import (
+    beside_conclusions,
+    beside_rows,
+)
 from campaign.experiments.stabilization import EXPERIMENT, StabilizationOptions
+from campaign.identification.intervals import with_error
+from campaign.result import Factor
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
 from tests.physics.benches import bench
 
@@ -75,3 +83,49 @@ def test_failed_trials_and_empty_tests() -> None:
     assert not [f for f in result.findings if f.quantity == "error_reduction"]
     assert analyse("stabilization", [failed(done[0])]).findings == ()
     assert analyse("stabilization", ()).findings == ()
+
+
+def twins(tree: dict) -> None:
+    """Of the static model one that knows friction 20 % too small."""
+    own = copy.deepcopy(tree["compensation"]["static"])
+    own["friction"]["load"]["coulomb_torque"] = "20.8 N m"
+    tree["compensation"]["static-identified"] = own
+
+
+def test_an_identified_compensation_stands_beside_the_one_it_replaces() -> None:
+    methods = [{"compensation": name} for name in ("none", "static", "static-identified")]
+    done = execute(trials("stabilization", bench(twins), {"cycles": 1}, methods))
+    result = analyse("stabilization", done)
+    (row,) = table(result, "identified-beside-stated").rows
+    stated, identified = (
+        finding(result, "stabilization_error", compensation=name).value
+        for name in ("static", "static-identified")
+    )
+    assert (row["compensation"], row["frequency"]) == ("static", 0.24)
+    assert float(str(row["ratio"])) == pytest.approx(identified / stated)
+    assert identified > 1.5 * stated
+    assert not [t for t in analyse("stabilization", done[:2]).tables if "beside" in t.key]
+
+
+def test_ratios_of_several_trials_have_intervals_and_are_of_one_place() -> None:
+    def error(value: float) -> Estimate:
+        return with_error("stabilization_error", value, "rad", 0.01 * value, 4, "test")
+
+    rows = [
+        {"compensation": name, "frequency": frequency, "error": error(value), "repeats": 5}
+        for name, frequency, value in (
+            ("lugre", 0.2, 2.0),
+            ("lugre-identified", 0.2, 1.0),
+            ("lugre", 2.0, 1.0),
+            ("lugre-identified", 2.0, 1.0),
+            ("static-identified", 2.0, 1.0),  # of what was not tried
+        )
+    ]
+    first, second = beside_rows(rows)
+    assert first["ratio"].value == 0.5
+    assert first["ratio"].low < 0.5 < first["ratio"].high < 0.53
+    assert second["ratio"].low < 1.0 < second["ratio"].high
+    (told,) = beside_conclusions([first, second])
+    # Not only where it does best: where it does nothing is said as well.
+    assert "over 2 places: at best" in str(told.parts[0])
+    assert [part.estimate.value for part in told.parts if isinstance(part, Factor)] == [0.5, 1.0]

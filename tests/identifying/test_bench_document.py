@@ -135,6 +135,31 @@ def test_friction_of_all_interfaces_goes_to_none(write) -> None:  # type: ignore
     assert "mesh" in _with_place(found, bench).result.notes[-1]
 
 
+def of_appendage(*keys: str) -> Identified:
+    units = {"inertia": "kg m^2", "frequency": "Hz", "damping_ratio": ""}
+    parts = (replace(measured(k, 0.3, units[k]), bench=f"appendage.{k}") for k in keys)
+    inertia = replace(measured("total", 3.0, "kg m^2"), bench="axis.inertia")
+    return Identified((inertia, *parts), Result())
+
+
+def test_half_an_elastic_part_is_not_written(write) -> None:  # type: ignore[no-untyped-def]
+    """A resonance alone tells no inertia, and the file would be no bench any more."""
+    found = of_appendage("frequency", "damping_ratio")
+    bench = write(HEAD, frequency_response=found)
+    assert bench.appendage is None
+    assert bench.axis.inertia == 3.0
+    note = "Without appendage.inertia there is no [appendage] to write: the file gets none of it."
+    assert _with_place(found, bench).result.notes[-1] == note
+
+
+def test_a_whole_elastic_part_is_written(write) -> None:  # type: ignore[no-untyped-def]
+    found = of_appendage("inertia", "frequency", "damping_ratio")
+    assert write(HEAD, frequency_response=found).appendage.frequency == 0.3
+    had = "[appendage]\ninertia = '1 kg m^2'\nfrequency = '9 Hz'\ndamping_ratio = 0.1\n"
+    bench = write(HEAD + had, frequency_response=of_appendage("frequency"))
+    assert (bench.appendage.frequency, bench.appendage.inertia) == (0.3, 1.0)
+
+
 def test_correlations_of_other_values_stay(write) -> None:  # type: ignore[no-untyped-def]
     known = """
 [known]
@@ -148,3 +173,18 @@ correlations = [["axis.inertia", "friction.load.bristle_damping", 0.5]]
     told = write(HEAD + LUGRE + known, friction_map=found).known.correlations
     assert len(told) == 2
     assert told[0] == ("axis.inertia", "friction.load.bristle_damping", 0.5)
+
+
+def test_what_is_identified_stands_in_the_file_beside_the_compensation_it_is_for(write) -> None:  # type: ignore[no-untyped-def]
+    """And how well it is known; identifying once more replaces it."""
+    observer = '[compensation.observer]\ngain = "5 N s/m"\ninertia = "2 kg"\n'
+    old = observer.replace("observer]", 'observer-identified]\nmethod = "observer"')
+    inertia = replace(measured("inertia", 3.0, "kg"), bench="axis.inertia")
+    head = HEAD.replace("kg m^2", "kg").replace('"tilt"', '"x"\nkind = "linear"')
+    for text in (head + observer, head + observer + old):
+        bench = write(text, whole_model=Identified((inertia,), Result()))
+        assert bench.compensation["observer"].inertia == 2.0
+        assert bench.compensation["observer-identified"].inertia == 3.0
+        assert bench.compensation["observer-identified"].gain == 5.0
+        told = bench.known.values["compensation.observer-identified.inertia"]
+        assert told.interval == pytest.approx((2.7, 3.3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from campaign.estimate import Origin
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
 from campaign.identifying.frequency.signals import base_frequency
+from campaign.identifying.frequency.sources import _lines
 from campaign.identifying.material import choose
 from campaign.identifying.method import Identified, Material
 from campaign.physics.bench import Bench
@@ -165,7 +167,7 @@ def test_multisines_of_a_torque(tmp_path: Path) -> None:
         level = tables["distortion"].rows[0][parity]
         assert level.kind == "at most" or level.value < 0.005
     keys = [figure.key for figure in found.result.figures]
-    assert keys == ["bode-1-load", "distortion-1-load", "coherence"]
+    assert keys == ["bode-1-load", "distortion-1-load", "coherence", "residuals-1-load"]
     assert all(figure.caption and figure.alt for figure in found.result.figures)
 
 
@@ -195,6 +197,8 @@ def test_friction_is_a_systematic_part_where_two_amplitudes_tell_it(tmp_path: Pa
     total = told(one)["total_inertia"]
     assert total.estimate.systematic[0].standard_uncertainty is None
     assert total.bench == ""
+    # Nor what friction shifts besides, by an amount that is not known.
+    assert not any(each.bench for each in one.parameters)
     assert any("Repeat it at half the amplitude" in note for note in one.result.notes)
     all_of_them = [*weak, *strong]
     made = trials(tmp_path, all_of_them, "torque", 8.0)
@@ -222,9 +226,35 @@ def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
 
 def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(4), "torque", 8.0), driven())
-    assert not found.parameters
+    # A mode stands out whatever excites it; inertias and stiffness need a fit.
+    assert {each.estimate.name for each in found.parameters} <= {
+        "resonance",
+        "resonance_damping",
+        "antiresonance",
+    }
+    assert not any(each.bench for each in found.parameters)
     assert any("7 are the fewest" in note for note in found.result.notes)
     assert "distortion" in {table.key for table in found.result.tables}
+
+
+def test_lines_that_no_command_names_stand_out_by_a_gap() -> None:
+    """What a current loop leaves beside the lines is a tenth of them, and was not asked for."""
+    time = np.arange(2048) / 256.0
+    asked = np.arange(13, 250, 4)
+    phases = np.random.default_rng(3).uniform(0, 2 * np.pi, len(asked))
+    wave = np.cos(2 * np.pi * np.outer(time, asked) / 4.0 + phases).sum(axis=1)
+    beside = 0.1 * np.cos(2 * np.pi * np.outer(time, np.arange(14, 60, 4)) / 4.0).sum(axis=1)
+    nobody = SimpleNamespace(trial=SimpleNamespace(task=SimpleNamespace(command=None)))
+    found = _lines(nobody, 4.0, (wave + beside)[None], 2)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(found, asked)
+
+
+def test_one_realisation_tells_the_level_of_distortion_and_the_mode(tmp_path: Path) -> None:
+    found = identified(tmp_path, trials(tmp_path, multisines(1), "torque", 16.0), driven())
+    parameters = told(found)
+    assert holds(parameters["resonance"].estimate, DRIVE.resonance)
+    assert not {"total_inertia", "stiffness"} & set(parameters)
+    assert any("A mode stands out" in str(each.parts[0]) for each in found.result.conclusions)
 
 
 def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:

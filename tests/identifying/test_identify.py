@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from campaign.cli.identify import identify_run
+from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
@@ -176,6 +177,26 @@ def test_a_run_is_not_held_against_itself(
         )
 
 
+@pytest.mark.parametrize("option", ["validation", "compared"])
+def test_a_recording_that_was_imported_twice_is_not_held_against_itself(
+    results: Path, run: str, tmp_path: Path, option: str
+) -> None:
+    mapping = (results.parent / "rig-mapping.toml").read_text(encoding="utf-8")
+    again = results.parent / "again.toml"
+    again.write_text(mapping.replace("made up", "imported again"), encoding="utf-8")
+    code = import_recordings(
+        [str(again)], tmp_path, only=("monday",), changes=(), workers=1, report=False, sign=None
+    )
+    assert code is ExitCode.DONE
+    other = choose(tmp_path, next(tmp_path.glob("*.nxs")).stem)
+    one = choose(results, f"{run}:monday")
+    assert one.run.identity != other.run.identity
+    with pytest.raises(UsageError, match=r"the same samples as .*monday in trials"):
+        identify(one, methods(), models=PLAIN, **{option: other})  # type: ignore[arg-type]
+    fresh = choose(results, f"{run}:tuesday")
+    assert identify(fresh, methods(), models=PLAIN, **{option: other}).parameters  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("kind", ["page", "bench", "folder"])
 def test_what_is_not_ours_is_told_before_anything_is_done(
     results: Path, run: str, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
@@ -208,10 +229,11 @@ def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -
     table = parameters_table(found.sections)
     [row] = [each for each in table.rows if each["parameter"] == "delay"]
     [delay] = [each.estimate for each in found.parameters if each.estimate.name == "delay"]
-    [part] = delay.systematic
-    assert part.standard_uncertainty is not None
+    assert [part.source for part in delay.systematic] == ["band", "instruments"]
+    sizes = [part.standard_uncertainty for part in delay.systematic]
     assert row["unit"] == "ms"
-    assert row["systematic"] == f"band {1e3 * part.standard_uncertainty:.2g}"
+    band, held = (f"{1e3 * (size or 0.0):.2g}" for size in sizes)
+    assert row["systematic"] == f"band {band}, instruments {held}"
 
 
 def test_the_first_table_of_the_page_is_the_first(results: Path, run: str, tmp_path: Path) -> None:

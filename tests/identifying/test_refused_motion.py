@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE
+from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.identification.inverse.motion import Filtering
 from campaign.identifying.inverse.motions import moved
 from campaign.identifying.method import Identified, Material
@@ -22,12 +22,15 @@ NOISE = np.random.Generator(np.random.PCG64(5)).standard_normal((2, len(TIME)))
 SWING = 0.3 * np.sin(2.0 * np.pi * TIME) + 0.2 * np.sin(2.0 * np.pi * 0.37 * TIME)
 
 
-def recorded(angle: np.ndarray, torque: np.ndarray) -> Any:
-    """A trial that has nothing but these."""
-    made = (
+def driven(angle: np.ndarray, torque: np.ndarray) -> Any:
+    return recorded(
         Channel(RELATIVE_ANGLE, "rad", "angle", "deg", angle),
         Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
     )
+
+
+def recorded(*made: Channel) -> Any:
+    """A trial that has nothing but these."""
     channels = {each.name: each for each in made}
     recording = Recording(TIME, channels)
     task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
@@ -40,7 +43,7 @@ def recorded(angle: np.ndarray, torque: np.ndarray) -> Any:
 
 def identified(angle: np.ndarray, torque: np.ndarray) -> Identified:
     bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    trials = (recorded(angle, torque),)
+    trials = (driven(angle, torque),)
     return METHOD.identify(Material(bench, cast("Any", trials), ()), METHOD.options())
 
 
@@ -59,9 +62,22 @@ def test_what_does_not_move_or_is_not_driven_is_refused(
         identified(angle, torque)
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.3])
+def test_a_rate_that_does_not_change_tells_nothing(rate: float) -> None:
+    """Its noise adds up to a motion that goes further and further, and is none."""
+    measured = rate + 0.01 * NOISE[1]
+    torque = Channel(DRIVE_TORQUE, "N m", "torque", "N m", 1.0 + 0.02 * NOISE[0])
+    trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", measured), torque)
+    with pytest.raises(ValueError, match="constant but for its sensor's noise"):
+        moved((trial,), Filtering.for_rate(RATE))
+    swings = np.gradient(SWING, TIME) + measured
+    trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", swings), torque)
+    assert moved((trial,), Filtering.for_rate(RATE))
+
+
 def test_small_and_slow_motion_over_coarse_counts_is_none_of_these() -> None:
     counts = np.round(5.0 * np.sin(0.3 * TIME))
-    assert moved((recorded(counts, NOISE[0]),), Filtering.for_rate(RATE))
+    assert moved((driven(counts, NOISE[0]),), Filtering.for_rate(RATE))
 
 
 def test_a_constant_load_is_no_friction() -> None:

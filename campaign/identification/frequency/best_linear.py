@@ -36,6 +36,8 @@ class Excitation:
         lowest, highest: of the excited lines (Hz).
         lines: how many are excited.
         crest: largest value of the input over its rms, the mean over realisations.
+        odd: whether no line of even number is excited.
+        unit: of the input, for people.
     """
 
     rms: float
@@ -45,12 +47,16 @@ class Excitation:
     highest: float
     lines: int
     crest: float
+    odd: bool = True
+    unit: str = ""
 
     def __str__(self) -> str:
+        rms = f"{self.rms:.4g} {self.unit}".rstrip()
+        kind = "odd random-phase" if self.odd else "odd and even"
         return (
-            f"odd random-phase multisine, {self.lines} lines from {self.lowest:.4g} to "
-            f"{self.highest:.4g} Hz, rms {self.rms:.4g}, crest factor {self.crest:.3g}, "
-            f"{self.realisations} realisations of {self.periods} periods"
+            f"{kind} multisine, {self.lines} lines from "
+            f"{self.lowest:.4g} to {self.highest:.4g} Hz, rms {rms}, crest factor "
+            f"{self.crest:.3g}, {self.realisations} realisations of {self.periods} periods"
         )
 
 
@@ -188,6 +194,7 @@ def _excitation(input_: Array, found: LineSpectra, excited: Lines) -> Excitation
         float(ends[1]),
         len(excited),
         float(np.mean(crest)),
+        bool(np.all(excited % 2 == 1)),
     )
 
 

@@ -129,9 +129,13 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     ratio = (np.sum(level.power, axis=1) - np.sum(level.noise)) / (
         max(level.share, 1e-300) * distortion.output
     )
-    if count < 2:
-        return _none(name, "a single realisation does not show how distortion scatters")
     mean = float(np.mean(ratio))
+    if count < 2:
+        # Lines of one set of phases are no independent draws: what they scatter holds too little.
+        if mean <= 0:
+            return _none(name, "not more than the noise shows, in a single realisation")
+        reason = "a single realisation does not show how distortion scatters with the phases"
+        return Estimate.without_interval(name, math.sqrt(mean), "", reason, method=method)
     scatter = float(np.std(ratio, ddof=1)) / math.sqrt(count)
     # The noise that is taken off is the same in all realisations.
     unsure = math.sqrt(float(np.sum(level.noise**2)) * 2.0 * level.shared / level.noise_freedom)

@@ -1,7 +1,8 @@
 """Crossovers, margins and bandwidth of a loop, from a fitted function or from its points.
 
-Of a fit they have intervals by the delta method. What lies beyond the last frequency is a bound: no
-fit is followed there.
+Of a fit they have intervals by the delta method, or from functions drawn from its scatter where
+those say otherwise (`drawn_margins`): a crossing near the end of the band may lie beyond it. What
+does is a bound: no fit is followed there.
 """
 
 from __future__ import annotations
@@ -14,14 +15,21 @@ from typing import Any
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.identification.frequency.drawn_margins import METHOD as DRAWN
+from campaign.identification.frequency.drawn_margins import (
+    Drawn,
+    drawn_margins,
+    fall,
+    least,
+    with_draws,
+    zeros,
+)
 from campaign.identification.frequency.measured import MeasuredResponse, closed_from_open
 from campaign.identification.frequency.modes import of_fit
 from campaign.identification.frequency.orders import Chosen, with_order
 from campaign.identification.frequency.rational import RationalFit
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.servo import (
-    MINUS_3_DB,
-    ONE_SIDED,
     Crossing,
     ServoCharacteristics,
     characteristics,
@@ -54,6 +62,19 @@ class _Loop:
             value = value / (1.0 - value)
         return np.asarray(np.log(np.where(np.abs(value) > 0, value, 1e-300)))
 
+    def drawn(self, frequency: Array, normal: Array) -> ComplexArray:
+        """Log L of functions that the scatter allows, shape (m, n), by normal numbers (m, p).
+
+        Log of the fitted function is drawn along its derivatives: of parameters that only together
+        mean something no draw is asked apart.
+        """
+        size, axes = np.linalg.eigh(self.fit.scatter)
+        apart = normal * np.sqrt(np.maximum(size, 0.0)) @ axes.T
+        log = np.log(self.fit.value(frequency)) + apart @ self.fit.log_jacobian(frequency).T
+        if self.closed:
+            log = log - np.log(1.0 - np.exp(log))
+        return np.asarray(log)
+
     def jacobian(self, frequency: float) -> ComplexArray:
         """Derivative of log L by the parameters, shape (p,)."""
         at = np.array([frequency])
@@ -69,11 +90,15 @@ class _Loop:
         return complex(change.real, turn) / (2.0 * STEP)
 
 
-def fitted_margins(fit: RationalFit, closed: bool = False) -> ServoCharacteristics:
+def fitted_margins(
+    fit: RationalFit, closed: bool = False, draws: bool = True
+) -> ServoCharacteristics:
     """Bandwidth, crossovers and margins of the loop.
 
     Args:
         fit: of the open loop L with unit feedback; `closed`: of T = L / (1 + L).
+        draws: whether intervals are held against functions drawn from the scatter; without, bounds
+            are where the band ends, whatever scatter says.
 
     A gain margin is read wherever L is real and negative above the first gain crossover; without
     one it is bounded by the gain at the last frequency. Without a gain crossover it is said on
@@ -84,45 +109,61 @@ def fitted_margins(fit: RationalFit, closed: bool = False) -> ServoCharacteristi
     log = loop.logarithm(frequency)
     gain = [
         _crossing(loop, "0 dB", at, _gain, _phase, ("gain_crossover", "phase_margin", "rad"))
-        for at in _zeros(frequency, log.real)
+        for at in zeros(frequency, log.real)
     ]
     widths = [
-        _crossing(loop, "-3 dB", at, _fall, None, ("bandwidth", "", ""))
-        for at in _zeros(frequency, _fall(log), falling=True)
+        _crossing(loop, "-3 dB", at, fall, None, ("bandwidth", "", ""))
+        for at in zeros(frequency, fall(log), falling=True)
     ]
     half = []
     if gain:
         names = ("phase_crossover", "gain_margin", "dB")
         half = [
             _crossing(loop, "-180 deg", at, _phase, _margin, names)
-            for at in _zeros(frequency, np.imag(-np.exp(log)))
+            for at in zeros(frequency, np.imag(-np.exp(log)))
             if at > gain[0].frequency.value and math.cos(loop.logarithm(np.array([at]))[0].imag) < 0
         ]
     phases = [each.margin for each in gain if each.margin is not None]
-    least = min(phases, key=lambda each: abs(each.value), default=None)
+    smallest = min(phases, key=lambda each: abs(each.value), default=None)
     margins = [each.margin for each in half if each.margin is not None]
-    bound = None if half else _gain_bound(loop, bool(gain))
+    drawn = None
+    if draws and not fit.misfit:
+        drawn = drawn_margins(loop, len(fit.scatter), fit.lowest, fit.highest)
+    bound = None if half or not gain else _gain_bound(loop, drawn)
     gain_margin = min(margins, key=lambda each: each.value, default=None) or bound
-    bandwidth = widths[0].frequency if widths else _outside("bandwidth", fit, _fall(log))
-    return ServoCharacteristics(
+    bandwidth = widths[0].frequency if widths else _outside(fit, fall(log), drawn)
+    found = ServoCharacteristics(
         bandwidth,
         gain_margin or _none("gain_margin", "dB", "the gain does not fall below 1 in the band"),
-        least or _none("phase_margin", "rad", _where(log.real)),
+        smallest or _none("phase_margin", "rad", _where(log.real)),
         bound,
         (*widths, *gain, *half),
+    )
+    return found if drawn is None else _as_drawn(found, drawn)
+
+
+def _as_drawn(found: ServoCharacteristics, drawn: Drawn) -> ServoCharacteristics:
+    """With intervals of draws where the delta method does not hold."""
+    turned = np.where(drawn.turned, drawn.gain_margin, np.inf)  # else it is beyond the band
+    return replace(
+        found,
+        bandwidth=with_draws(found.bandwidth, drawn.bandwidth),
+        phase_margin=with_draws(found.phase_margin, drawn.phase_margin),
+        gain_margin=with_draws(found.gain_margin, turned),
     )
 
 
 def chosen_margins(chosen: Chosen, closed: bool = False) -> ServoCharacteristics:
     """Those of the order chosen, with what others say that are not ruled out."""
     best = fitted_margins(chosen.fit, closed)
-    others = [fitted_margins(each, closed) for each in chosen.near]
+    others = [fitted_margins(each, closed, draws=False) for each in chosen.near]
 
     def told(estimate: Estimate, name: str) -> Estimate:
-        if estimate.kind != "number":
-            return estimate
         values = [getattr(each, name) for each in others]
-        return with_order(estimate, [each.value for each in values if each.kind == "number"])
+        numbers = [each.value for each in values if each.kind == "number"]
+        if estimate.kind == "at least":
+            return replace(estimate, value=min([estimate.value, *numbers]))
+        return with_order(estimate, numbers) if estimate.kind == "number" else estimate
 
     return replace(
         best,
@@ -146,24 +187,6 @@ def _phase(log: ComplexArray) -> Array:
 
 def _margin(log: ComplexArray) -> Array:
     return np.asarray(-DECIBEL * log.real)
-
-
-def _fall(log: ComplexArray) -> Array:
-    """Log of |T| over -3 dB."""
-    return np.asarray(-np.log(np.abs(1.0 + np.exp(-log)) * MINUS_3_DB))
-
-
-def _zeros(frequency: Array, values: Array, falling: bool = False) -> list[float]:
-    """Where values pass zero, by linear interpolation over log frequency (Hz)."""
-    sign = np.sign(values)
-    passed = (sign[:-1] > 0) & (sign[1:] <= 0)
-    if not falling:
-        passed |= (sign[:-1] < 0) & (sign[1:] >= 0)
-    found = []
-    for k in np.flatnonzero(passed):
-        share = values[k] / (values[k] - values[k + 1])
-        found.append(float(frequency[k] * (frequency[k + 1] / frequency[k]) ** share))
-    return found
 
 
 def _crossing(
@@ -200,28 +223,36 @@ def _crossing(
     return Crossing(level, place, margin)
 
 
-def _gain_bound(loop: _Loop, crossed: bool) -> Estimate | None:
-    """-|L| at the last frequency less 1.645 standard errors (dB); None where that is no margin."""
-    last = loop.fit.highest
-    by = loop.jacobian(last).real
-    error = math.sqrt(max(float(by @ loop.fit.scatter @ by), 0.0))
-    level = DECIBEL * (float(loop.logarithm(np.array([last]))[0].real) + ONE_SIDED * error)
-    if not crossed or level >= 0 or loop.fit.misfit:
+def _gain_bound(loop: _Loop, drawn: Drawn | None) -> Estimate | None:
+    """-|L| at the last frequency (dB), or less, by what 95 % of draws have there or before.
+
+    None where that is no margin.
+    """
+    if drawn is None:
         return None
-    reason = f"a bound: gain at {last:.4g} Hz less 1.645 standard errors, if it rises no more"
-    return Estimate("gain_margin", -level, "dB", method=METHOD, kind="at least", reason=reason)
+    last = loop.fit.highest
+    value = float(_margin(loop.logarithm(np.array([last])))[0])
+    value = min(value, least(drawn.gain_margin, math.inf))
+    if value <= 0:
+        return None
+    reason = f"a bound: the gain up to {last:.4g} Hz, if it rises no more behind"
+    return Estimate("gain_margin", value, "dB", method=DRAWN, kind="at least", reason=reason)
 
 
-def _outside(name: str, fit: RationalFit, above: Array) -> Estimate:
+def _outside(fit: RationalFit, above: Array, drawn: Drawn | None) -> Estimate:
+    """A bandwidth that lies beyond the band, or before it; scatter moves the bound inwards."""
     if np.all(above > 0):
-        return _bound(name, fit.highest, "at least", "the band ends before it")
+        value = fit.highest if drawn is None else least(drawn.bandwidth, fit.highest)
+        return _bound(value, "at least", "the band ends before it")
     if np.all(above < 0):
-        return _bound(name, fit.lowest, "at most", "the band begins after it")
-    return _none(name, "Hz", "the gain does not fall through -3 dB in the band")
+        value = fit.lowest if drawn is None else -least(-drawn.bandwidth, -fit.lowest)
+        return _bound(value, "at most", "the band begins after it")
+    return _none("bandwidth", "Hz", "the gain does not fall through -3 dB in the band")
 
 
-def _bound(name: str, value: float, kind: Any, reason: str) -> Estimate:
-    return Estimate(name, value, "Hz", method=METHOD, kind=kind, reason=f"a bound: {reason}")
+def _bound(value: float, kind: Any, reason: str) -> Estimate:
+    reason = f"a bound: {reason}"
+    return Estimate("bandwidth", value, "Hz", method=DRAWN, kind=kind, reason=reason)
 
 
 def _none(name: str, unit: str, reason: str) -> Estimate:

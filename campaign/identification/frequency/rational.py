@@ -84,6 +84,7 @@ class RationalFit:
         parameters: how many are free.
         with_delay: whether the delay is one of them.
         lowest, highest: of the frequencies (Hz).
+        condition: number of the weighted Jacobian, its columns scaled to length 1.
     """
 
     numerator: Array
@@ -98,6 +99,7 @@ class RationalFit:
     with_delay: bool
     lowest: float
     highest: float
+    condition: float = math.nan
 
     def value(self, frequency: Array) -> ComplexArray:
         """G at `frequency` (Hz), shape (n,)."""
@@ -110,6 +112,13 @@ class RationalFit:
         """Derivative of log G by (numerator, denominator, delay), shape (n, p)."""
         s = 1j * np.asarray(frequency, dtype=float) / self.scale
         return _log_jacobian(s, self.numerator, self.denominator, self.scale)
+
+    @property
+    def polynomials(self) -> tuple[Array, Array]:
+        """Numerator and denominator by powers of s (1/s), lowest first, without the delay."""
+        unit = 2.0 * np.pi * self.scale
+        up, down = (c / unit ** np.arange(len(c)) for c in (self.numerator, self.denominator))
+        return up, down
 
     @cached_property
     def scatter(self) -> Array:
@@ -291,7 +300,16 @@ def _refined(
         with_delay,
         float(measured.frequency[0]),
         float(measured.frequency[-1]),
+        condition_of(found.jacobian[:, free]),
     )
+
+
+def condition_of(jacobian: Array) -> float:
+    """Condition number of columns of unit length, so that no unit of a parameter decides."""
+    length = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(length)) or not np.all(length > 0):
+        return math.inf
+    return float(np.linalg.cond(jacobian / length))
 
 
 def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tuple[float, str]:

@@ -12,19 +12,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from campaign.estimate import Estimate, Systematic
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.identification.frequency.drive import PARTS, TwoMass, correlations_of
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency.modes import of_fit
+from campaign.identification.frequency.one_inertia import HIDDEN, load_side_fit, rigid_fit
 from campaign.identification.frequency.rational import (
-    RationalFit,
     Weights,
+    condition_of,
     judged_fit,
-    rational_fit,
 )
 from campaign.identification.frequency.two_mass_model import (
     Side,
@@ -36,14 +37,6 @@ from campaign.identification.frequency.two_mass_model import (
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.least_squares import Minimum, covariance, minimum
 
-PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
-HIDDEN_BY_PLACE = {
-    **dict(zip(PARTS, ("kg m^2", "kg m^2", "N m/rad", "N m s/rad"), strict=True)),
-    "antiresonance": "Hz",
-    "antiresonance_damping": "",
-    "inertia_ratio": "",
-}
-"""What a sensor at the load alone cannot tell, with units."""
 STEP = 1e-6
 ROUGH = 10
 """Steps after which most starts are given up ..."""
@@ -54,64 +47,14 @@ LARGEST = 50.0
 WIDEST_RATIO = 8.0
 """Largest logarithm of J2 / J1, either way."""
 METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
-HIDDEN = (
-    "a sensor at the load shows no antiresonance: any J1, J2 and k with the same resonance and the "
-    "same sum of inertias answer alike; measure the motor's rate too"
-)
 NO_SCALE = "the input is not a torque in N m, so that only frequencies and ratios are known"
-
-
-@dataclass(frozen=True)
-class TwoMass:
-    """What the responses tell of a two-mass drive; what they do not is *not determined*.
-
-    Attributes:
-        motor_inertia, load_inertia, total_inertia: (kg m^2).
-        stiffness: (N m/rad). damping: (N m s/rad).
-        resonance_damping: damping ratio of the resonance.
-        resonance, antiresonance: undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2) over 2 pi (Hz).
-        antiresonance_damping: d / (2 sqrt(k J2)).
-        inertia_ratio: J2 / J1.
-        misfit: why such a drive is no model of the responses; empty where it may be one.
-        excess: weighted square over what a right model leaves in the mean.
-        criterion: Schwarz' (BIC).
-        sides: that were measured.
-        point: parameters of `model` and a delay for each side, shape (p,).
-        function: what was fitted instead, to a load alone.
-        grounded: whether a spring holds the motor, as friction does before it slides.
-    """
-
-    motor_inertia: Estimate
-    load_inertia: Estimate
-    total_inertia: Estimate
-    stiffness: Estimate
-    damping: Estimate
-    resonance: Estimate
-    resonance_damping: Estimate
-    antiresonance: Estimate
-    antiresonance_damping: Estimate
-    inertia_ratio: Estimate
-    misfit: str
-    excess: float
-    criterion: float
-    sides: tuple[Side, ...]
-    point: Array
-    grounded: bool
-    function: RationalFit | None = None
-
-    def value(self, frequency: Array, side: Side) -> ComplexArray:
-        """The fitted response at `frequency` (Hz), shape (n,)."""
-        if self.function is not None:
-            return self.function.value(frequency)
-        delays = self.point[7:]
-        delay = float(delays[self.sides.index(side)]) if side in self.sides else 0.0
-        return model(np.asarray(frequency, dtype=float), self.point, side, delay)
 
 
 def two_mass(
     responses: Mapping[Side, MeasuredResponse],
     torque_known: bool = True,
     torque_uncertainty: float | None = None,
+    rigid: bool | None = None,
 ) -> TwoMass:
     """The drive whose responses fit best, with or without a spring that holds the motor.
 
@@ -121,6 +64,7 @@ def two_mass(
             inertias are told.
         torque_uncertainty: relative standard uncertainty of the torque (torque constant), a
             systematic part of all that is in N m.
+        rigid: whether it is one inertia; None: where that explains the response of a sensor.
 
     A fit that leaves more than scatter is *misfit*: values without intervals.
     Raises ValueError for variances that are no weights, or too few frequencies.
@@ -128,14 +72,32 @@ def two_mass(
     if not responses:
         raise ValueError("no response of a motor or a load")
     if set(responses) == {"load"}:
-        found = load_side_fit(responses["load"])
+        found = _or_rigid(load_side_fit(responses["load"]), responses, rigid)
         return _told(found, torque_known, torque_uncertainty)
     free = two_mass_fit(responses, False)
     held = two_mass_fit(responses, True)
     best = held if held.criterion < free.criterion - 6.0 else free
     if best.misfit and not held.misfit:
         best = held
-    return _told(best, torque_known, torque_uncertainty)
+    return _told(_or_rigid(best, responses, rigid), torque_known, torque_uncertainty)
+
+
+def _or_rigid(
+    found: TwoMass, responses: Mapping[Side, MeasuredResponse], rigid: bool | None
+) -> TwoMass:
+    """One inertia where that explains the response of a sensor as well, by Schwarz' criterion.
+
+    Or where it is no misfit, and of two the resonance is not determined within what was measured.
+    """
+    if len(responses) > 1 or rigid is False:
+        return found
+    ((side, measured),) = responses.items()
+    one = rigid_fit(measured, side)
+    rise = found.resonance
+    seen = rise.origin is Origin.MEASURED and rise.has_interval
+    seen = seen and measured.frequency[0] <= rise.value <= measured.frequency[-1]
+    better = not seen or one.criterion < found.criterion
+    return one if rigid or (better and not one.misfit) else found
 
 
 def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> TwoMass:
@@ -196,63 +158,12 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     if not misfit and np.any(open_[:3]):
         misfit = "the data leave a combination of the inertias and the stiffness open"
     criterion = best.cost + len(free) * math.log(2 * n)
-    return _estimates(point, spread * max(excess, 1.0), sides, misfit, excess, criterion, grounded)
+    found = _estimates(point, spread * max(excess, 1.0), sides, misfit, excess, criterion, grounded)
+    return replace(found, condition=condition_of(best.jacobian[:, free]))
 
 
 def _cost(found: Minimum) -> float:
     return found.cost if math.isfinite(found.cost) else math.inf
-
-
-def load_side_fit(measured: MeasuredResponse) -> TwoMass:
-    """What a rate at the load tells: by a function of third order with one zero and a delay.
-
-    With friction at one of the inertias it is (d s + k) / (J1 J2 s³ + ... + b k), of which the sum
-    of the inertias and sqrt(k (1/J1 + 1/J2)) follow, and neither J1, J2 nor k.
-    """
-    fit = rational_fit(measured, (1, 3))
-    if fit.zeros[0].real > 0:
-        # A zero with as much delay less answers nearly alike, but no spring has negative damping.
-        mirrored = np.array([fit.numerator[0], -fit.numerator[1]])
-        later = fit.delay + 2.0 / float(fit.zeros[0].real)
-        fit = rational_fit(
-            measured, (1, 3), start=np.concatenate([mirrored, fit.denominator, [later]])
-        )
-    unit = 2.0 * math.pi * fit.scale
-
-    def told(theta: Array) -> Array:
-        b, a = theta[:2], theta[2:6]
-        total = a[1] / b[0] - a[0] * b[1] / b[0] ** 2
-        rise = math.sqrt(abs(b[0] / a[3] * total)) * unit
-        roots = np.polynomial.polynomial.polyroots(a)
-        root = max(roots, key=abs)
-        return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
-
-    theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
-    found = told(theta)
-    steps = np.diag(np.maximum(1e-5 * np.abs(theta), 1e-12))
-    by = np.array([(told(theta + h) - told(theta - h)) / (2.0 * np.sum(h)) for h in steps])
-    error = np.sqrt(np.maximum(np.einsum("pi,pq,qi->i", by, fit.scatter, by), 0.0))
-    method = "function of third order with a delay, friction taken to be at one of the inertias"
-    misfit = fit.misfit
-    if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
-        misfit = "no resonance of two inertias lies in the band"
-    names = (("total_inertia", "kg m^2"), ("resonance", "Hz"), ("resonance_damping", ""))
-    estimates = {
-        name: of_fit(name, float(value), of, float(by_fit), misfit, method)
-        for (name, of), value, by_fit in zip(names, found, error, strict=True)
-    }
-    for name, of in HIDDEN_BY_PLACE.items():
-        estimates[name] = Estimate.without_interval(name, math.nan, of, HIDDEN)
-    return TwoMass(
-        **estimates,
-        misfit=misfit,
-        excess=fit.excess,
-        criterion=fit.criterion,
-        sides=("load",),
-        point=theta,
-        grounded=False,
-        function=fit,
-    )
 
 
 def _estimates(
@@ -276,10 +187,6 @@ def _estimates(
     by_rise = 0.5 * (unit[2] + of_total - unit[0] - of_second)
     by_dip = 0.5 * (unit[2] - of_second)
 
-    def estimate(name: str, value: float, unit_: str, gradient: Array) -> Estimate:
-        error = math.sqrt(max(float(gradient @ spread @ gradient), 0.0))
-        return of_fit(name, value, unit_, error, misfit, METHOD)
-
     share_of = 0.5 / math.sqrt(spring * second)
     by_share = share_of * (unit[3] - 0.5 * float(point[3]) * (unit[2] + of_second))
     damping = mode_damping(point)
@@ -288,23 +195,34 @@ def _estimates(
         (mode_damping(point + step) - mode_damping(point - step)) / (2.0 * np.sum(step))
         for step in np.diag(apart)
     ]
+    rows: Mapping[str, tuple[float, str, Array]] = {
+        "motor_inertia": (first, "kg m^2", first * unit[0]),
+        "load_inertia": (second, "kg m^2", second * of_second),
+        "total_inertia": (total, "kg m^2", total * of_total),
+        "stiffness": (spring, "N m/rad", spring * unit[2]),
+        "damping": (float(point[3]), "N m s/rad", unit[3]),
+        "resonance": (rise, "Hz", rise * by_rise),
+        "resonance_damping": (damping, "", np.array(by_damping)),
+        "antiresonance": (dip, "Hz", dip * by_dip),
+        "antiresonance_damping": (share_of * float(point[3]), "", by_share),
+        "inertia_ratio": (ratio, "", ratio * unit[1]),
+    }
+    gradients = np.array([gradient for _, _, gradient in rows.values()])
+    error = np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", gradients, spread, gradients), 0.0))
+    estimates: dict[str, Any] = {
+        name: of_fit(name, value, of, float(by_fit), misfit, METHOD)
+        for (name, (value, of, _)), by_fit in zip(rows.items(), error, strict=True)
+    }
     return TwoMass(
-        estimate("motor_inertia", first, "kg m^2", first * unit[0]),
-        estimate("load_inertia", second, "kg m^2", second * of_second),
-        estimate("total_inertia", total, "kg m^2", total * of_total),
-        estimate("stiffness", spring, "N m/rad", spring * unit[2]),
-        estimate("damping", float(point[3]), "N m s/rad", unit[3]),
-        estimate("resonance", rise, "Hz", rise * by_rise),
-        estimate("resonance_damping", damping, "", np.array(by_damping)),
-        estimate("antiresonance", dip, "Hz", dip * by_dip),
-        estimate("antiresonance_damping", share_of * float(point[3]), "", by_share),
-        estimate("inertia_ratio", ratio, "", ratio * unit[1]),
-        misfit,
-        excess,
-        criterion,
-        sides,
-        point,
-        grounded,
+        **estimates,
+        misfit=misfit,
+        excess=excess,
+        criterion=criterion,
+        sides=sides,
+        point=point,
+        grounded=grounded,
+        covariance=spread,
+        correlations={} if misfit else correlations_of(list(rows), gradients, spread),
     )
 
 
@@ -313,7 +231,7 @@ def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) 
     hidden: dict[str, str] = {}
     if not torque_known:
         hidden = dict.fromkeys((*PARTS, "total_inertia"), NO_SCALE)
-    if found.sides == ("load",):
+    if found.sides == ("load",) and not found.rigid:
         hidden |= dict.fromkeys(PARTS, HIDDEN)
     changed: dict[str, Any] = {
         name: Estimate.without_interval(name, math.nan, getattr(found, name).unit, reason)
@@ -325,4 +243,5 @@ def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) 
             continue
         part = Systematic("torque constant", abs(each.value) * torque_uncertainty)
         changed[name] = replace(each, systematic=(*each.systematic, part))
-    return replace(found, **changed)
+    kept = {pair: share for pair, share in found.correlations.items() if not {*pair} & {*hidden}}
+    return replace(found, **changed, correlations=kept)

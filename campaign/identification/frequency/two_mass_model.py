@@ -37,6 +37,50 @@ def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexAr
     return np.asarray(over / under * np.exp(-s * delay))
 
 
+def model_jacobian(
+    frequency: Array, point: Array, sides: tuple[Side, ...], side: Side
+) -> ComplexArray:
+    """Derivative of `model` by all parameters, (n, p); delays of `sides` follow 7 others."""
+    s = 2j * np.pi * np.asarray(frequency, dtype=float)
+    first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
+    coupling = spring / s + point[3]
+    motor, load = first * s + point[4] + point[6] / s, first * ratio * s + point[5]
+    under = motor * load + coupling * (motor + load)
+    own, nothing = load if side == "motor" else 0.0, np.zeros_like(s)
+    over = own + coupling
+    delay = float(point[7 + sides.index(side)])
+    value = over / under * np.exp(-s * delay)
+    columns = []
+    for of_motor, of_load, of_coupling in (
+        (first * s, first * ratio * s, nothing),
+        (nothing, first * ratio * s, nothing),
+        (nothing, nothing, spring / s),
+        (nothing, nothing, nothing + 1.0),
+        (nothing + 1.0, nothing, nothing),
+        (nothing, nothing + 1.0, nothing),
+        (1.0 / s, nothing, nothing),
+    ):
+        below = of_motor * (load + coupling) + of_load * (motor + coupling)
+        below = below + of_coupling * (motor + load)
+        above = of_coupling + (of_load if side == "motor" else nothing)
+        columns.append(value * (above / over - below / under))
+    columns += [-s * value if each == side else nothing for each in sides]
+    return np.column_stack(columns)
+
+
+def polynomials(point: Array, side: Side) -> tuple[Array, Array]:
+    """Numerator and denominator of `model` without delay, by powers of s (1/s), lowest first."""
+    first, ratio, spring = np.exp(point[:3])
+    coupling = np.array([spring, point[3]])  # times s
+    motor = np.array([point[6], point[4], first])  # times s
+    load = np.array([0.0, point[5], first * ratio])  # times s
+    product = np.polynomial.polynomial
+    both = product.polymul(coupling, product.polyadd(motor, load))
+    under = product.polyadd(product.polymul(motor, load), both)  # times s²
+    over = product.polyadd(coupling, load) if side == "motor" else coupling
+    return product.polymul(over, [0.0, 1.0]), under
+
+
 def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> Array:
     """What a step of each parameter is measured in.
 
@@ -91,17 +135,7 @@ def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) 
 
 def mode_damping(point: Array) -> float:
     """Damping ratio of the resonance: of the poles of `model` with the largest frequency."""
-    first, ratio, spring = np.exp(point[:3])
-    coupling = np.array([spring, point[3]])  # times s, lowest power first
-    motor = np.array([point[6], point[4], first])  # times s
-    load = np.array([point[5], first * ratio])
-    product = np.polynomial.polynomial
-    # (motor / s) (load) + (coupling / s) (motor / s + load), all times s².
-    under = product.polyadd(
-        product.polymul(product.polymul(motor, load), [0.0, 1.0]),
-        product.polymul(coupling, product.polyadd(motor, product.polymul(load, [0.0, 1.0]))),
-    )
-    roots = product.polyroots(under)
+    roots = np.polynomial.polynomial.polyroots(polynomials(point, "motor")[1])
     pairs = roots[np.abs(roots.imag) > 0]
     if not len(pairs):
         return 1.0

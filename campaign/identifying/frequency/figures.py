@@ -12,6 +12,7 @@ from campaign.identification.frequency.distortion import Level
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identifying.frequency.found import Found, Masses
+from campaign.identifying.frequency.tables import drive_name
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
@@ -48,15 +49,15 @@ def _bode_of(
         lines.append((label, fine, fit.fit.value(fine)))
     place = masses.places.get(side)  # type: ignore[call-overload]
     if masses.drive is not None and masses.source is each.source and place is not None:
-        label = "two inertias" + (", misfit" if masses.drive.misfit else "")
+        label = drive_name(masses.drive) + (", misfit" if masses.drive.misfit else "")
         lines.append((label, fine, masses.drive.value(fine, place)))
-    gain, phase = _panels(measured, lines, TORQUE)
-    panels = [gain, phase]
+    gain, phase = panels(measured, lines, TORQUE)
+    shown = [gain, phase]
     if fit is not None:
-        panels.append(_left(measured, fit.fit.value(measured.frequency)))
+        shown.append(_left(measured, fit.fit.value(measured.frequency)))
     modes = [m for m in each.modes.get(side, ()) if m.frequency.has_interval]  # type: ignore[call-overload]
     marks = tuple(Mark(f"{mode.frequency.value:.3g} Hz", x=mode.frequency.value) for mode in modes)
-    panels[0] = Panel(gain.x, gain.y, gain.curves, marks=marks)
+    shown[0] = Panel(gain.x, gain.y, gain.curves, marks=marks)
     return Figure(
         key,
         f"Torque to rate, {each.source.name}, sensor of the {side}",
@@ -64,14 +65,15 @@ def _bode_of(
         "of its scatter; where it is, the function is no model of the drive.",
         "Gain and phase from torque to rate over frequency with intervals and fitted functions, "
         "and what the rational function leaves.",
-        tuple(panels),
+        tuple(shown),
         trials=each.source.trials,
     )
 
 
-def _panels(
+def panels(
     measured: MeasuredResponse, lines: Sequence[tuple[str, Array, ComplexArray]], label: str
 ) -> tuple[Panel, Panel]:
+    """Gain and phase of a response with 95 % bars, and lines (name, frequency, response)."""
     size = np.maximum(np.abs(measured.values), 1e-300)
     half = 1.96 * measured.widened / size
     known = half < 1.0
@@ -123,7 +125,7 @@ def _loop(key: str, each: Found, loop: MeasuredResponse) -> Figure:
         fit = each.loop_fit.fit
         fine = np.geomspace(fit.lowest, fit.highest, FINE)
         lines.append(("rational function", fine, fit.value(fine)))
-    gain, phase = _panels(loop, lines, "Gain")
+    gain, phase = panels(loop, lines, "Gain")
     return Figure(
         key,
         f"Open loop from error to rate, {each.source.name}",
@@ -143,7 +145,7 @@ def _distortion(key: str, each: Found, side: str, best: BestLinear) -> Figure:
     if distortion is None:
         raise ValueError("there is no distortion to draw")
     x = best.response.frequency
-    answered = _decibel(np.sqrt(distortion.excited))
+    answered = decibel(np.sqrt(distortion.excited))
     curves = [Curve(x, answered, "excited lines", "measured", "points")]
 
     def level(name: str, told: Level) -> None:
@@ -153,12 +155,12 @@ def _distortion(key: str, each: Found, side: str, best: BestLinear) -> Figure:
             curves.append(
                 Curve(
                     told.frequency[sure],
-                    _decibel(told.rms[sure]),
+                    decibel(told.rms[sure]),
                     name,
                     name,
                     "points",
-                    low=np.where(low[sure] > 0, _decibel(low[sure]), np.nan),
-                    high=_decibel(high[sure]),
+                    low=np.where(low[sure] > 0, decibel(low[sure]), np.nan),
+                    high=decibel(high[sure]),
                 )
             )
 
@@ -167,7 +169,7 @@ def _distortion(key: str, each: Found, side: str, best: BestLinear) -> Figure:
     noise = np.concatenate([distortion.even.noise, distortion.odd.noise])
     at = np.concatenate([distortion.even.frequency, distortion.odd.frequency])
     order = np.argsort(at)
-    curves.append(Curve(at[order], _decibel(np.sqrt(noise[order])), "noise", "noise", "thin"))
+    curves.append(Curve(at[order], decibel(np.sqrt(noise[order])), "noise", "noise", "thin"))
     return Figure(
         key,
         f"Distortion, {each.source.name}, sensor of the {side}",
@@ -180,7 +182,8 @@ def _distortion(key: str, each: Found, side: str, best: BestLinear) -> Figure:
     )
 
 
-def _decibel(values: Array | float) -> Array:
+def decibel(values: Array | float) -> Array:
+    """20 log10 of sizes."""
     return np.asarray(DECIBEL * np.log(np.maximum(values, 1e-300)))
 
 

@@ -13,11 +13,12 @@ import numpy as np
 from campaign.identification.elastic_mode import ElasticMode, elastic_mode
 from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.distortion import total
+from campaign.identification.frequency.drive import TwoMass
 from campaign.identification.frequency.margins import chosen_margins, measured_margins
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency.modes import Mode, chosen_modes
 from campaign.identification.frequency.orders import Chosen, chosen_order
-from campaign.identification.frequency.two_mass import TwoMass, two_mass
+from campaign.identification.frequency.two_mass import two_mass
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.intervals import judged, shifted_by
 from campaign.identification.servo import ServoCharacteristics
@@ -240,12 +241,17 @@ def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float 
         tried["behind"] = two_mass({"load": part}, torque_uncertainty=torque)
     if place == "auto":
         fits = [name for name, drive in tried.items() if not drive.misfit] or list(tried)
+        rigid = [name for name in fits if tried[name].rigid]
+        least = min(tried[name].criterion for name in fits)
+        if rigid and tried[rigid[0]].criterion < least + TOLD_APART:
+            fits = rigid[:1]  # one inertia is driven, wherever its sensor is
         if len(fits) > 1:
             apart = tried["driven"].criterion - tried["behind"].criterion
             if abs(apart) < TOLD_APART:
                 return Masses(None, source, AMBIGUOUS)
             fits = ["behind"] if apart > 0 else ["driven"]
-        place, how = fits[0], "the response fits that place better"
+        place = fits[0]
+        how = "" if tried[place].rigid else "the response fits that place better"
     side: Side = "motor" if place == "driven" else "load"
     return Masses(tried[place], source, places={"load": side}, how=how)
 
@@ -267,7 +273,7 @@ def _bent(told: Masses, source: Source, others: Sequence[Source], band: Band) ->
         bent = (
             f"Odd distortion is {100 * max(level.value for level in odd):.0f} % of the output: "
             "friction bends the response, by how much one amplitude does not tell. Repeat it at "
-            "half the amplitude; until then no inertia goes to the bench."
+            "half the amplitude; until then none of its numbers goes to the bench."
         )
         return replace(told, drive=_shifted(told.drive, None, 1.0), bent=bent)
     other = max(weaker, key=lambda each: each.rms)
@@ -285,7 +291,7 @@ def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
             for side in other.responses
         }
         with suppress(ValueError):  # too little of the band is left
-            tried.append(two_mass(parts))
+            tried.append(two_mass(parts, rigid=told.drive is not None and told.drive.rigid))
     if not tried:
         raise ValueError("the weaker excitation has too few frequencies")
     return min(tried, key=lambda each: (bool(each.misfit), each.excess))

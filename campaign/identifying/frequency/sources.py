@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -32,6 +33,8 @@ from campaign.units import rate_here
 STEADY = "steady"
 FEWEST_SINES = 6
 """frequencies below which sines are no response."""
+GAP = 3.0
+"""Ratio of neighbours in size from which on the smaller is none of the excited lines."""
 HANN_APART = 2
 """Lines of a Hann window from which on neighbours hardly know of each other."""
 EXCITED_SHARE = 0.03
@@ -249,13 +252,23 @@ def _of_multisine(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: 
     return Source(
         name,
         "multisine",
-        str(first.excitation),
+        _named(first, told[0][0]),
         tuple(numbers),
         responses,
         closed,
         best,
         remarks=tuple(remarks),
     )
+
+
+def _named(best: BestLinear, trial: ArchivedTrial) -> str:
+    """The excitation in words; of a loop what came into it, too."""
+    torque = str(replace(best.excitation, unit="N·m"))
+    command = trial.trial.task.command
+    if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
+        return torque
+    rms = float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
+    return f"{torque}, of a rate of rms {rate_here(rms)} that was asked for"
 
 
 def _loop_of(
@@ -284,13 +297,22 @@ def _period_of(trial: ArchivedTrial, how: Reading) -> float:
 
 
 def _lines(trial: ArchivedTrial, period: float, leading: Array, periods: int) -> Lines:
-    """Excited lines: those of the command, or those that stand out of what leads."""
+    """Excited lines: those of the command, or those that stand out of what leads.
+
+    They stand out by the widest gap in size there is below the largest: what a drive distorts, or
+    a loop puts beside them, may be a tenth of what was asked.
+    """
     command = trial.trial.task.command
     if isinstance(command, MultiSine):
         return np.sort(np.round(np.array(command.frequencies) * period).astype(np.int64))
     size = np.mean(np.abs(np.fft.rfft(leading, axis=1))[:, ::periods], axis=0)
     size[0] = 0.0
-    return np.flatnonzero(size > EXCITED_SHARE * np.max(size)).astype(np.int64)
+    falling = np.sort(size[size > EXCITED_SHARE * np.max(size)])[::-1]
+    steps = falling[:-1] / falling[1:]
+    least = EXCITED_SHARE * np.max(size)
+    if len(steps) and np.max(steps) > GAP:
+        least = math.sqrt(float(np.prod(falling[np.argmax(steps) :][:2])))
+    return np.flatnonzero(size > least).astype(np.int64)
 
 
 def _of_records(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: Reading) -> Source:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from campaign.estimate import Estimate
-from campaign.identification.frequency.distortion import total
+from campaign.identification.frequency.drive import TwoMass
 from campaign.identification.frequency.orders import order_of
 from campaign.identification.frequency.two_mass import METHOD
 from campaign.identifying.frequency.found import Found, Masses
@@ -41,35 +41,8 @@ def sources_table(found: Sequence[Found]) -> Table:
     )
 
 
-def distortion_table(found: Sequence[Found]) -> Table | None:
-    """Even and odd distortion of the output, as shares of its rms."""
-    rows: list[dict[str, Any]] = []
-    for each in found:
-        for side, best in each.source.best.items():
-            if best.distortion is None:
-                continue
-            rows.append(
-                {
-                    "source": each.source.name,
-                    "side": side,
-                    "even": total(best.distortion, "even"),
-                    "odd": total(best.distortion, "odd"),
-                }
-            )
-    if not rows:
-        return None
-    return Table(
-        "distortion",
-        "Distortion over the rms of the output",
-        (NAME, SENSOR, Column("even", "Even", "", "%"), Column("odd", "Odd", "", "%")),
-        tuple(rows),
-        note="From lines that the excitation left out, less the noise and the input's own part "
-        "there. Coulomb friction and a bristle are odd; what differs by direction is even.",
-    )
-
-
-def fits_table(found: Sequence[Found]) -> Table:
-    """The function chosen for each response."""
+def fits_table(found: Sequence[Found], masses: Masses) -> Table:
+    """The function chosen for each response, and the two masses beside it."""
     rows: list[dict[str, Any]] = []
     for each in found:
         parts = [(str(side), fit) for side, fit in each.fits.items()]
@@ -89,7 +62,21 @@ def fits_table(found: Sequence[Found]) -> Table:
                     "order": f"{up} / {down}",
                     "excess": chosen.fit.excess,
                     "delay": late,
+                    "condition": chosen.fit.condition,
                     "says": chosen.fit.misfit or "fits",
+                }
+            )
+        drive = masses.drive
+        if drive is not None and masses.source is each.source:
+            sides = ", ".join(masses.places)
+            rows.append(
+                {
+                    "source": each.source.name,
+                    "side": sides,
+                    "order": drive_name(drive),
+                    "excess": drive.excess,
+                    "condition": drive.condition,
+                    "says": drive.misfit or "fits",
                 }
             )
     return Table(
@@ -101,11 +88,14 @@ def fits_table(found: Sequence[Found]) -> Table:
             Column("order", "Order", exact=True),
             Column("excess", "Square over expected", exact=True),
             Column("delay", "Delay", "s", "ms"),
+            Column("condition", "Condition", exact=True),
             Column("says", "Verdict", exact=True),
         ),
         tuple(rows),
-        note="Order of numerator and denominator by Schwarz' criterion. A function that leaves "
-        "more than scatter is a misfit: what follows from it has no interval.",
+        note="Condition number of the weighted Jacobian with columns of one length: large where "
+        "parameters are hardly told apart. Order of numerator and denominator by Schwarz' "
+        "criterion. A function that leaves more than scatter is a misfit: what follows from it "
+        "has no interval.",
     )
 
 
@@ -185,7 +175,7 @@ def margins_table(found: Sequence[Found]) -> Table | None:
 def masses_table(masses: Masses) -> Table | None:
     """The two-mass drive, in one row; None where it is no model of the response."""
     drive = masses.drive
-    if drive is None or drive.misfit:
+    if drive is None or drive.misfit or drive.rigid:
         return None
     columns = (
         Column("motor_inertia", "Driven inertia", "kg m^2", "kg m^2"),
@@ -209,4 +199,37 @@ def masses_table(masses: Masses) -> Table | None:
         columns,
         ({column.name: getattr(drive, column.name) for column in columns},),
         note=f"{METHOD}.{spring}",
+    )
+
+
+def drive_name(drive: TwoMass) -> str:
+    """What was fitted, for people."""
+    return "one inertia" if drive.rigid else "two inertias"
+
+
+def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
+    """Pairs of the numbers of the two masses that have these names, the most alike first."""
+    if masses.drive is None:
+        return None
+    pairs = [
+        (one, other, share)
+        for (one, other), share in masses.drive.correlations.items()
+        if {one, other} <= {*names}
+    ]
+    pairs.sort(key=lambda each: -abs(each[2]))
+    if not pairs:
+        return None
+    return Table(
+        "correlations",
+        "How numbers of the two inertias go together",
+        (
+            Column("one", "Number"),
+            Column("other", "and"),
+            Column("share", "Correlation", exact=True),
+        ),
+        tuple(
+            {"one": one.replace("_", " "), "other": other.replace("_", " "), "share": share}
+            for one, other, share in pairs
+        ),
+        note="By scatter alone: what a wrong torque constant or friction does, moves them as well.",
     )

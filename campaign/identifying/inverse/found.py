@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,27 +12,32 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.identification.inverse.choosing import Structure, choose, structure
 from campaign.identification.inverse.delay import find_delay
-from campaign.identification.inverse.instruments import WEAK, Instrumented, by_instruments
 from campaign.identification.inverse.motion import Array, Filtering, Motion
 from campaign.identification.inverse.position_period import find_period
-from campaign.identification.inverse.regression import Piece, Regression, regress
-from campaign.identification.inverse.rows import all_rows, moving, rows
+from campaign.identification.inverse.regression import Regression, regress
+from campaign.identification.inverse.rows import all_rows, rows
 from campaign.identification.inverse.simulation import relative_rate_error
 from campaign.identification.inverse.terms import (
     DIRECTIONAL,
     SYMMETRIC,
     TERMS,
     Term,
-    columns,
     periodic,
 )
 from campaign.identification.inverse.validation import Prediction, improvement, relative_error
-from campaign.identifying.inverse.motions import Moved
+from campaign.identifying.inverse.instrumented import (
+    NORMAL_95,
+    Instruments,
+    held_against,
+    instruments,
+    told_delay,
+)
+from campaign.identifying.inverse.motions import Moved, never_moved
 
 HAC = "least squares; deviation with autocorrelation (Newey and West)"
 ROUNDS = 4
 """Most times that terms are chosen at a delay, and the delay is found anew with them."""
-NORMAL_95 = 1.96
+BENDS = "friction bends over these rates: it is one share of a sum, and nothing by itself"
 
 
 @dataclass(frozen=True)
@@ -61,13 +66,16 @@ class InverseDynamics:
     """All that was found.
 
     Attributes:
-        delay: of the force, as found; or as it was stated.
+        delay: of the force, with what a loop may have to do with it; or as it was stated.
         plain: symmetric and directional model without any delay, as anybody would fit them.
         tried: all structures, those of `plain` first.
         chosen: index in `tried`.
-        estimates: of the chosen structure's terms, by name, with their systematic parts.
-        instruments: of the chosen structure; None without a wanted motion, and `no_instruments`
-            says why.
+        squares: of the chosen structure's terms, by name, with their systematic parts.
+        estimates: the same as they are told, held against instruments.
+        instruments: of the chosen structure, or None.
+        no_instruments: why there are none, or none along a wanted motion.
+        biased: whether least squares differ from instruments by more than scatter explains, so
+            that these are told.
         period: over position, that was tried; None without any.
     """
 
@@ -76,9 +84,11 @@ class InverseDynamics:
     delay: Estimate
     tried: tuple[Tried, ...]
     chosen: int
+    squares: dict[str, Estimate]
     estimates: dict[str, Estimate]
-    instruments: Instrumented | None
+    instruments: Instruments | None
     no_instruments: str
+    biased: bool
     period: float | None
 
     @property
@@ -111,14 +121,7 @@ def find(
     Raises ValueError where the motions cannot tell even the symmetric model.
     """
     motions = [each.motion for each in pieces]
-    everything = replace(filtering, slowest=0.0)
-    plain = [
-        structure(motions, [TERMS[name] for name in names], everything)
-        for names in (SYMMETRIC, DIRECTIONAL)
-        if _possible(motions, names)
-    ]
-    if not plain:
-        plain = [structure(motions, [TERMS[n] for n in _possible_terms(motions)], everything)]
+    plain = _plain(motions, filtering)
     start = tuple(terms) if terms is not None else plain[-1].terms
     late = _delay(motions, start, filtering, delay)
     shift = _taken_out(late, delay)
@@ -133,7 +136,10 @@ def find(
         before, shift = shift, _taken_out(late, delay)
         if abs(shift - before) <= (late.standard_error or 0.0):
             shift = before
-            break
+            # Beside gravity no ripple shows: it is looked for again in what the new terms leave.
+            again = _period(motions, more[picked].terms, filtering, shift)
+            if again == period or _repeats(more[picked]):
+                break
     else:
         more = [structure(motions, each.terms, filtering, shift) for each in more]
     offset = len(plain)
@@ -143,20 +149,44 @@ def find(
     told = {*range(len(plain)), picked}
     tried = _validated(found, motions, unseen_motions, filtering, told)
     best = tried[picked]
-    estimates = _estimates(best, motions, filtering, late)
-    instruments, why = _instruments(pieces, best, filtering)
+    squares = _estimates(best, motions, filtering, late)
+    held, why = instruments(
+        pieces,
+        best.structure.terms,
+        best.structure.fit.values,
+        filtering,
+        best.delay,
+        stated=delay is not None,
+    )
+    estimates, biased = held_against(squares, held)
+    if terms is None:
+        estimates = _without_shares(estimates, best.structure.terms)
     return InverseDynamics(
-        tuple(pieces), filtering, late, tuple(tried), picked, estimates, instruments, why, period
+        tuple(pieces),
+        filtering,
+        told_delay(late, held),
+        tuple(tried),
+        picked,
+        squares,
+        estimates,
+        held,
+        why,
+        biased,
+        period,
     )
 
 
-def _possible(motions: Sequence[Motion], names: Sequence[str]) -> bool:
-    return set(names) <= set(_possible_terms(motions, names))
-
-
-def _possible_terms(motions: Sequence[Motion], names: Sequence[str] = SYMMETRIC) -> list[str]:
-    """Terms whose columns are not zero throughout: a motion of one direction has no other."""
-    return [n for n in names if any(np.any(TERMS[n].column(motion)) for motion in motions)]
+def _plain(motions: Sequence[Motion], filtering: Filtering) -> list[Structure]:
+    """The usual models without any delay; of one direction alone only that one's friction."""
+    everything = replace(filtering, slowest=0.0)
+    missing = tuple(f"_{way}" for way in never_moved(motions, filtering.slowest))
+    if not missing:
+        sets = (SYMMETRIC, DIRECTIONAL)
+        return [structure(motions, [TERMS[n] for n in names], everything) for names in sets]
+    # Dry friction and a constant force are one column there, and standstill tells neither.
+    names = [name for name in DIRECTIONAL if not name.endswith(missing)]
+    moving_only = filtering if filtering.slowest > 0 else everything
+    return [structure(motions, [TERMS[name] for name in names], moving_only)]
 
 
 def _delay(
@@ -201,6 +231,11 @@ def _period(
     place = [rows(motion, own, filtering).columns for motion in motions]
     whole = np.concatenate(place)
     return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals))
+
+
+def _repeats(which: Structure) -> bool:
+    """Whether something that repeats over position is in it."""
+    return any(name.startswith(("cogging", "ripple")) for name in which.names)
 
 
 def _validated(
@@ -255,7 +290,10 @@ def _estimates(
 ) -> dict[str, Estimate]:
     """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
     fit, terms = best.structure.fit, best.structure.terms
-    parts = {"band": _shift(motions, terms, filtering.half_band, best.delay, fit)}
+    parts = {
+        "band": _shift(motions, terms, filtering.half_band, best.delay, fit),
+        "slow": _shift(motions, terms, filtering.faster, best.delay, fit),
+    }
     if late.origin is not Origin.GIVEN:
         parts["delay"] = _shift(
             motions, terms, filtering, best.delay + _doubt(best, late, motions[0]), fit
@@ -278,6 +316,27 @@ def _estimates(
     return found
 
 
+def _without_shares(
+    estimates: Mapping[str, Estimate], terms: Sequence[Term]
+) -> dict[str, Estimate]:
+    """Without intervals of friction where a term that bends was added because it fits better.
+
+    It stands in for whatever bends friction, most often a Stribeck curve; what is called Coulomb
+    and viscous friction then takes what is too much of it elsewhere.
+    """
+    if not any(term.family == "bend" for term in terms):
+        return dict(estimates)
+    shares = {term.name for term in terms if term.family == "bend"}
+    return {
+        name: Estimate.without_interval(
+            name, one.value, one.unit, BENDS, method=one.method, origin=Origin.NOT_DETERMINED
+        )
+        if name in shares or name.startswith(("coulomb", "viscous"))
+        else one
+        for name, one in estimates.items()
+    }
+
+
 def _doubt(best: Tried, late: Estimate, motion: Motion) -> float:
     """By how much the delay may be wrong (s, 1 sigma): a sample where it was not taken out."""
     if best.delay == 0.0 or math.isnan(late.half_width):
@@ -298,33 +357,3 @@ def _shift(
     except ValueError:
         return None
     return np.asarray(np.abs(other.values - fit.values))
-
-
-def _instruments(
-    pieces: Sequence[Moved], best: Tried, filtering: Filtering
-) -> tuple[Instrumented | None, str]:
-    wanted = [each.wanted for each in pieces]
-    if any(each is None for each in wanted):
-        return None, "nobody recorded what motion was wanted"
-    terms = best.structure.terms
-    own: list[Piece] = []
-    other: list[Piece] = []
-    for each in pieces:
-        if each.wanted is None:
-            continue
-        # Where the two move in different directions, one says nothing of the other.
-        both = moving(each.motion, filtering) * moving(each.wanted, filtering)
-        for motion, late, into in ((each.motion, best.delay, own), (each.wanted, 0.0, other)):
-            piece = all_rows(motion, terms, filtering, late)
-            into.append(Piece(piece.columns * both[:, None], piece.force * both, piece.time))
-    if any(not np.any(columns(each, terms[:1])) for each in wanted if each is not None):
-        return None, "what was wanted stands still"
-    try:
-        found = by_instruments(own, other)
-    except ValueError as error:
-        return None, str(error)
-    if float(np.min(found.strength)) < WEAK:
-        weakest = terms[int(np.argmin(found.strength))].name
-        told = f"what was wanted hardly tells {weakest} (F {np.min(found.strength):.2g})"
-        return None, told
-    return found, ""

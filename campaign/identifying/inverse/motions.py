@@ -12,6 +12,7 @@ from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
     GYRO_RATE,
+    JOINT_TORQUE,
     REFERENCE,
     RELATIVE_ANGLE,
     RELATIVE_RATE,
@@ -33,17 +34,28 @@ SLOWEST = 0.02
 MOST_SAMPLES = 5_000_000
 """of all trials together that are read; further trials are left out, and it is told."""
 SHORTEST_PIECE = 1.0
-"""s of a motion without a lost sample, to be used."""
+"""s of a motion without a lost sample, to be used; or most of its trial."""
+MOST = 0.9
+"""of a trial."""
+FORCES = (DRIVE_TORQUE, JOINT_TORQUE)
+"""What moves the axis, the better first: a sensor at the load knows nothing of motor and gear."""
 FEWEST_SAMPLES = 100
+FORCE = "force"
+ONE_WAY = 0.02
+"""Share of the moving samples up to which a direction counts as one that nothing moves in."""
 
 
 @dataclass(frozen=True)
 class Moved:
-    """A piece of a trial as it moved, and as it was meant to; None where nobody recorded that."""
+    """A piece of a trial as it moved, and as it was meant to; None where nobody recorded that.
+
+    of_rate: whether a rate was measured, and its position is no more than what that adds up to.
+    """
 
     trial: int
     motion: Motion
     wanted: Motion | None
+    of_rate: bool = False
 
 
 def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
@@ -52,14 +64,15 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     samples = 0
     for each in trials:
         names = each.channel_names()
-        if DRIVE_TORQUE not in names or not names & {RELATIVE_ANGLE, RELATIVE_RATE}:
+        if not names & {*FORCES} or not names & {RELATIVE_ANGLE, RELATIVE_RATE}:
             continue
         samples += round(each.trial.task.duration * each.trial.task.sample_rate)
         if found and samples > MOST_SAMPLES:
             break
         found.append(each)
     if not found:
-        return (), f"no trial has {DRIVE_TORQUE} and {RELATIVE_ANGLE} or {RELATIVE_RATE}"
+        force = f"{DRIVE_TORQUE} or {JOINT_TORQUE}"
+        return (), f"no trial has {force}, and {RELATIVE_ANGLE} or {RELATIVE_RATE}"
     return found, ""
 
 
@@ -67,10 +80,15 @@ def moved(trials: Sequence[ArchivedTrial], filtering: Filtering) -> tuple[Moved,
     """All pieces of all trials without a lost sample. Raises ValueError without any."""
     found = tuple(piece for each in trials for piece in _pieces(each, filtering))
     if not found:
-        raise ValueError(f"nothing is recorded for {SHORTEST_PIECE:g} s without a lost sample")
+        raise ValueError(
+            f"nothing is recorded for {SHORTEST_PIECE:g} s without a lost sample, and no whole "
+            f"trial with {FEWEST_SAMPLES} samples"
+        )
     if not any(np.any(each.motion.force) for each in found):
-        raise ValueError(f"{DRIVE_TORQUE} is zero throughout")
-    if not any(_moves(each.motion, filtering.low_pass) for each in found):
+        raise ValueError(f"{force_of(trials[0])} is zero throughout")
+    if not any(_moves(each, filtering.low_pass) for each in found):
+        if all(each.of_rate for each in found):
+            raise ValueError("the rate is constant but for its sensor's noise")
         raise ValueError("the axis stands still: what it moves is no more than its sensor's noise")
     rates = {round(each.motion.sample_rate, 6) for each in found}
     if len(rates) > 1:
@@ -79,15 +97,36 @@ def moved(trials: Sequence[ArchivedTrial], filtering: Filtering) -> tuple[Moved,
     return found
 
 
-def _moves(motion: Motion, low_pass: float) -> bool:
-    """Whether the position goes further than from one independent sample to the next.
+def force_of(trial: ArchivedTrial) -> str:
+    """The channel that is taken for what moves the axis."""
+    names = trial.channel_names()
+    return next((name for name in FORCES if name in names), DRIVE_TORQUE)
+
+
+def _moves(piece: Moved, low_pass: float) -> bool:
+    """Whether what was measured goes further than from one independent sample to the next.
 
     What is left of white noise behind its low-pass does not: its samples twice a period of the
-    corner apart differ by 1.4 times of how far they scatter.
+    corner apart differ by 1.4 times of how far they scatter. The sum of a rate's noise does, and
+    tells nothing.
     """
+    motion = piece.motion
+    measured = motion.rate if piece.of_rate else motion.position
     apart = max(1, round(0.5 * motion.sample_rate / low_pass))
-    steps = motion.position[apart:] - motion.position[:-apart]
-    return bool(np.std(motion.position) > np.std(steps))
+    return bool(np.std(measured) > np.std(measured[apart:] - measured[:-apart]))
+
+
+def never_moved(motions: Sequence[Motion], slowest: float) -> tuple[str, ...]:
+    """Directions in which nothing moves faster than `slowest` (SI), but for a few samples' noise.
+
+    Raises ValueError where that are both.
+    """
+    rate = np.concatenate([motion.rate for motion in motions])
+    count = {"positive": np.sum(rate > slowest), "negative": np.sum(rate < -slowest)}
+    total = sum(count.values())
+    if total == 0:
+        raise ValueError("the axis never moves faster than what counts as standing still")
+    return tuple(way for way, samples in count.items() if samples <= ONE_WAY * total)
 
 
 def with_slowest(filtering: Filtering, pieces: Sequence[Moved], slowest: float | None) -> Filtering:
@@ -99,22 +138,26 @@ def with_slowest(filtering: Filtering, pieces: Sequence[Moved], slowest: float |
 
 def _pieces(archived: ArchivedTrial, filtering: Filtering) -> Iterator[Moved]:
     recording = archived.recording()
-    sources = _sources(recording)
+    force = force_of(archived)
+    sources = _sources(recording, force)
     good = np.all([np.isfinite(recording[name]) for name in sources], axis=0)
     rate = archived.trial.task.sample_rate
-    fewest = max(FEWEST_SAMPLES, round(SHORTEST_PIECE * rate) + filtering.skip)
+    enough = min(round(SHORTEST_PIECE * rate), round(MOST * len(good)))
+    fewest = max(FEWEST_SAMPLES, enough + filtering.skip)
     for piece in whole_pieces(good, fewest):
         parts = {name: np.asarray(recording[name][piece], dtype=float) for name in sources}
+        parts[FORCE] = parts.pop(force)
         yield Moved(
             archived.trial.number,
             _motion(recording.time[piece], parts, filtering),
             _wanted(recording.time[piece], parts, filtering),
+            RELATIVE_ANGLE not in parts,
         )
 
 
-def _sources(recording: Recording) -> list[str]:
+def _sources(recording: Recording, force: str) -> list[str]:
     """Channels that are read: an angle rather than a rate, a gyro for what is accelerated."""
-    names = [DRIVE_TORQUE]
+    names = [force]
     names.append(RELATIVE_ANGLE if RELATIVE_ANGLE in recording.channels else RELATIVE_RATE)
     names += [name for name in (TEMPERATURE, REFERENCE) if name in recording.channels]
     if GYRO_RATE in recording.channels:
@@ -126,7 +169,7 @@ def _sources(recording: Recording) -> list[str]:
 
 
 def _motion(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motion:
-    force, warm = parts[DRIVE_TORQUE], parts.get(TEMPERATURE)
+    force, warm = parts[FORCE], parts.get(TEMPERATURE)
     if RELATIVE_ANGLE in parts:
         motion = motion_of_position(time, parts[RELATIVE_ANGLE], force, filtering.low_pass, warm)
     else:
@@ -139,7 +182,7 @@ def _motion(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motio
 
 
 def _wanted(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motion | None:
-    force, warm = parts[DRIVE_TORQUE], parts.get(TEMPERATURE)
+    force, warm = parts[FORCE], parts.get(TEMPERATURE)
     if REFERENCE in parts:
         found = motion_of_position(time, parts[REFERENCE], force, filtering.low_pass, warm)
     elif COMMAND in parts:

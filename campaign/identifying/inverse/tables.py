@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from campaign.estimate import Estimate
-from campaign.identification.inverse.instruments import Instrumented
 from campaign.identification.inverse.regression import Regression
 from campaign.identification.inverse.terms import Term
 from campaign.identifying.inverse.found import InverseDynamics, Tried
+from campaign.identifying.inverse.instrumented import Instruments, differs
 from campaign.result import Cell, Column, Table
 
 STRONG = 0.9
@@ -105,26 +104,18 @@ def deviations_table(key: str, title: str, tried: Tried) -> Table:
     return Table(key, title, columns, rows, note=note)
 
 
-def instruments_table(
-    terms: tuple[Term, ...], estimates: Mapping[str, Estimate], found: Instrumented
-) -> Table:
-    """Least squares beside instruments."""
-    rows: list[Mapping[str, Cell]] = []
-    for index, term in enumerate(terms):
-        value, error = float(found.fit.values[index]), float(found.fit.robust[index])
-        half = found.fit.quantile * error
-        rows.append(
-            {
-                "term": term.name,
-                "unit": term.unit,
-                "squares": estimates[term.name],
-                "instruments": Estimate(
-                    term.name, value, term.unit, value - half, value + half, 0.95,
-                    "instruments from the wanted motion", standard_error=error,
-                ),
-                "strength": float(found.strength[index]),
-            }
-        )  # fmt: skip
+def instruments_table(found: InverseDynamics, held: Instruments) -> Table:
+    """Least squares beside instruments, and which of the two is told."""
+    rows: list[Mapping[str, Cell]] = [
+        {
+            "term": term.name,
+            "unit": term.unit,
+            "squares": found.squares[term.name],
+            "instruments": held.estimates[term.name],
+            "strength": held.strength(index),
+        }
+        for index, term in enumerate(found.best.structure.terms)
+    ]
     columns = (
         Column("term", "Coefficient"),
         Column("unit", "Unit"),
@@ -132,12 +123,40 @@ def instruments_table(
         Column("instruments", "Instruments"),
         Column("strength", "F, first stage", exact=True),
     )
-    note = (
-        "Where the two differ by more than their intervals, noise of the measured motion is in the "
-        "force that answers it, or the wanted motion is not what the axis could do."
-    )
     return Table(
-        "instruments", "Instruments from the wanted motion", columns, tuple(rows), note=note
+        "instruments",
+        f"Instruments {held.along}",
+        columns,
+        tuple(rows),
+        note=instruments_note(found),
+    )
+
+
+def instruments_note(found: InverseDynamics) -> str:
+    """What the comparison comes to."""
+    held = found.instruments
+    if held is None:
+        return ""
+    if found.biased:
+        return (
+            "The two differ by more than scatter explains: noise of the motion biases least "
+            "squares (or, where that is quiet, what filters make of jumps of friction). What "
+            "instruments say is told, and goes to the bench file; predictions are of least "
+            "squares, which predict what the same loop does of the same noise."
+        )
+    alike = "How far the two differ is a systematic part (“instruments”) of what least squares say."
+    if held.of_wanted:
+        return f"{alike} They do not differ by more than scatter explains: no bias shows."
+    undecided = (
+        f"{alike} They decide nothing: a recorded force may have been made, by a loop, of the very "
+        "noise that instruments are to be free of."
+    )
+    if not differs(found.squares, held):
+        return undecided
+    return (
+        "The two differ by more than scatter explains: noise of the motion, or what disturbed it "
+        "unrecorded, biases one of them. Record the motion that was wanted to tell which. "
+        f"{undecided}"
     )
 
 

@@ -7,25 +7,36 @@ with a delay tells its modes, and two inertias on a spring what the sensors' pla
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
+from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
+from campaign.identification.frequency.one_inertia import RIGID
+from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
+from campaign.identifying.frequency.distortion_tables import distortion_tables
 from campaign.identifying.frequency.figures import figures
 from campaign.identifying.frequency.found import Band, Found, Masses, best_source, found_in, masses
 from campaign.identifying.frequency.signals import Excited, usable
 from campaign.identifying.frequency.sources import Reading, sources
 from campaign.identifying.frequency.tables import (
-    distortion_table,
+    correlations_table,
     fits_table,
     margins_table,
     masses_table,
     modes_table,
     sources_table,
+)
+from campaign.identifying.frequency.validation import Validation, models, validated
+from campaign.identifying.frequency.validation_shown import (
+    residual_figures,
+    validation_conclusions,
+    validation_figures,
+    validation_tables,
 )
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.options import Options
@@ -36,6 +47,8 @@ from campaign.units import Frequency, Time
 TORQUE_CONSTANT = "motor.torque_constant"
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
 LOWER = "excite further below the antiresonance, above what friction holds"
+SURELY = 3.0
+"""Standard deviations by which a delay lies below zero where it is told."""
 MEANINGS = (
     ("total_inertia", "Inertia of the whole drive, seen at the load.", "kg m^2", LOWER),
     ("motor_inertia", "Inertia that the torque drives directly.", "kg m^2", LOUDER),
@@ -90,25 +103,58 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
     found.sort(key=lambda each: each is not best)  # what tells most comes first
     torque = _torque_uncertainty(material.bench)
     told = masses(best, material.bench, options.place, band, torque, found)
-    parameters = tuple(_parameters(told, best))
+    parameters = tuple(_parameters(told, best or found[0]))
+    fits = tuple(models(found, told, band))
+    unseen: Sequence[ArchivedTrial] = ()
+    if material.validation:
+        unseen, why = usable(material.validation)
+        if why:
+            raise ValueError(f"of the validation {why}")
+    validation = validated(material.trials, unseen, material.bench, how, fits)
     tables = (
         sources_table(found),
         masses_table(told),
+        correlations_table(told, _told_names(parameters)),
         modes_table(found),
         margins_table(found),
-        distortion_table(found),
-        fits_table(found),
+        *distortion_tables(found),
+        fits_table(found, told),
+        *validation_tables(validation),
     )
     return Identified(
         parameters,
         Result(
             tables=tuple(each for each in tables if each is not None and each.rows),
-            figures=tuple(figures(found, told)),
+            figures=(
+                *validation_figures(validation),
+                *figures(found, told),
+                *residual_figures(found, fits),
+            ),
             findings=tuple(_findings(found, parameters)),
-            notes=tuple(_notes(found, told, remarks)),
-            conclusions=tuple(_conclusions(best, told)),
+            notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
+            conclusions=(
+                *_conclusions(best or found[0], told),
+                *validation_conclusions(validation),
+            ),
         ),
+        correlations=_correlations(told, parameters),
     )
+
+
+def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tuple[str, str], float]:
+    """By scatter, of the numbers that are told."""
+    if told.drive is None:
+        return {}
+    names = _told_names(parameters)
+    return {pair: share for pair, share in told.drive.correlations.items() if {*pair} <= names}
+
+
+def _told_names(parameters: Sequence[Parameter]) -> set[str]:
+    return {each.estimate.name for each in parameters if each.estimate.has_interval}
+
+
+def _validation_notes(validation: Validation) -> Iterator[str]:
+    yield from (f"Of the validation: {each}" for each in validation.remarks)
 
 
 def _torque_uncertainty(bench: Bench) -> float | None:
@@ -119,8 +165,12 @@ def _torque_uncertainty(bench: Bench) -> float | None:
     return known / bench.motor.torque_constant
 
 
-def _parameters(told: Masses, best: Found | None) -> Iterator[Parameter]:
+def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
     if told.drive is None:
+        local = _local(told, best)
+        for name, meaning, unit, advice in MEANINGS:
+            if name in local:
+                yield Parameter(local[name], meaning, unit, "", advice)
         return
     hangs_on_load = dict(told.places) == {"load": "motor"}
     if told.drive.misfit:
@@ -138,22 +188,22 @@ def _parameters(told: Masses, best: Found | None) -> Iterator[Parameter]:
         usable_ = estimate.origin is Origin.MEASURED and estimate.has_interval
         usable_ = usable_ and estimate.value > 0
         key = keys.get(name, "") if usable_ else ""
-        if told.bent and name in ("total_inertia", "load_inertia"):
+        if told.bent:  # by an amount that nobody knows
             key = ""
         yield Parameter(estimate, meaning, unit, key, advice)
 
 
-def _local(told: Masses, best: Found | None) -> dict[str, Estimate]:
+def _local(told: Masses, best: Found) -> dict[str, Estimate]:
     """A mode on top of a smooth response, where no model of the whole drive fits, by name.
 
     Its antiresonance is that of a part behind the spring only for a sensor at the driven inertia.
     """
-    modes = {} if best is None else best.local
-    if len(modes) != 1:
+    if not best.local:
         return {}
-    mode = next(iter(modes.values()))
+    side: Side = "motor" if "motor" in best.local else "load"
+    mode = best.local[side]
     found = {"resonance": mode.frequency, "resonance_damping": mode.damping_ratio}
-    if "motor" in told.places.values():
+    if side == "motor" or told.places.get(side) == "motor":
         found["antiresonance"] = mode.antiresonance
     return {name: replace(each, name=name) for name, each in found.items()}
 
@@ -179,6 +229,7 @@ def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iter
             "the band (lowest, highest) to where friction does not bend it, or excite it by "
             "repeated multisines, whose scatter holds what friction does."
         )
+    yield from _early(found)
     if told.reason:
         yield f"Two inertias on a spring are not determined: {told.reason}."
     if told.bent:
@@ -188,6 +239,8 @@ def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iter
             f"Two inertias on a spring were fitted from {told.lowest:.3g} Hz on: further down, "
             "what the drive answers is not theirs alone, as friction makes it."
         )
+    if told.drive is not None and told.drive.rigid:
+        yield f"Two inertias are not told: {RIGID}."
     if told.how:
         place = "at the driven inertia" if "motor" in told.places.values() else "behind the spring"
         yield f"The load's sensor is taken to be {place}: {told.how}."
@@ -197,8 +250,30 @@ def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iter
     )
 
 
-def _conclusions(best: Found | None, told: Masses) -> Iterator[Conclusion]:
+def _early(found: Sequence[Found]) -> Iterator[str]:
+    """Of rates that answer before their torque, which no drive does."""
+    for each in found:
+        for side, chosen in each.fits.items():
+            fit = chosen.fit
+            if fit.misfit or fit.delay + SURELY * float(fit.scatter[-1, -1]) ** 0.5 >= 0:
+                continue
+            yield (
+                f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
+                "the torque. Either the torque is recorded late, or a controller holds it and it "
+                "is sampled at points: then gain and inertia are off by up to a few percent at the "
+                "highest frequencies, and no scatter shows that. A lower highest line, or a faster "
+                "controller, makes it small."
+            )
+
+
+def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
     drive = told.drive
+    local = _local(told, best)
+    if (drive is None or drive.misfit) and "resonance" in local:
+        mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
+        if "antiresonance" in local:
+            mode += [", with an antiresonance at ", Amount(local["antiresonance"], "Hz")]
+        yield Conclusion((*mode, "; no two inertias on a spring were found."))
     if drive is not None and drive.resonance.has_interval:
         parts: list[str | Amount] = ["The drive resonates at ", Amount(drive.resonance, "Hz")]
         if drive.antiresonance.has_interval:
@@ -206,7 +281,10 @@ def _conclusions(best: Found | None, told: Masses) -> Iterator[Conclusion]:
         if drive.total_inertia.has_interval:
             parts += ["; all of it has an inertia of ", Amount(drive.total_inertia, "kg m^2")]
         yield Conclusion((*parts, "."))
-    if best is None or best.margins is None:
+    elif drive is not None and drive.total_inertia.has_interval:
+        inertia = Amount(drive.total_inertia, "kg m^2")
+        yield Conclusion(("The drive moves as one inertia of ", inertia, "."))
+    if best.margins is None:
         return
     margins = best.margins
     if margins.phase_margin.has_interval:

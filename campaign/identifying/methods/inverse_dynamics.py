@@ -2,7 +2,7 @@
 
 The force of a motion is a sum of terms (`identification.inverse.terms`); their coefficients follow
 from least squares on filtered rows, with deviations that know of autocorrelation, and are held
-against instruments from the wanted motion where that was recorded. Delay first, then structure.
+against instruments from a simulated motion. Delay first, then structure.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systema
 from campaign.identification.inverse.motion import Filtering
 from campaign.identification.inverse.terms import TERMS
 from campaign.identifying.inverse.figures import figures
-from campaign.identifying.inverse.found import InverseDynamics, find
-from campaign.identifying.inverse.motions import Moved, moved, usable, with_slowest
+from campaign.identifying.inverse.found import BENDS, InverseDynamics, find
+from campaign.identifying.inverse.motions import Moved, force_of, moved, usable, with_slowest
 from campaign.identifying.inverse.tables import (
     correlated,
     deviations_table,
+    instruments_note,
     instruments_table,
     structures_table,
 )
@@ -80,7 +81,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
     if options.terms:
         unknown = [name for name in options.terms if name not in TERMS]
         if unknown:
-            raise ValueError(f"there is no term {unknown[0]!r}; there are {', '.join(TERMS)}")
+            raise ValueError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
         terms = [TERMS[name] for name in options.terms]
     rate = material.trials[0].trial.task.sample_rate
     plain = Filtering.for_rate(rate)
@@ -109,7 +110,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
     return Identified(
         parameters,
         Result(
-            tables=tuple(_tables(found, parameters)),
+            tables=tuple(_tables(found)),
             figures=tuple(figures(found)),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
             notes=tuple(_notes(found, material)),
@@ -142,7 +143,7 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
             )
         if bench and not _possible(term.name, one):
             bench = ""
-        if bench.startswith(FRICTION) and not dissipates:
+        if bench.startswith(FRICTION) and (not dissipates or one_way(found)):
             bench = ""
         yield Parameter(one, term.meaning, bench=bench, advice=advice)
     late = found.delay
@@ -174,6 +175,13 @@ def _impossible(found: InverseDynamics, begin: str) -> list[str]:
     ]
 
 
+def one_way(found: InverseDynamics) -> str:
+    """The only direction it moves in; empty where it does in both."""
+    names = set(found.best.structure.names)
+    ways = [way for way in ("positive", "negative") if f"coulomb_{way}" in names]
+    return ways[0] if len(ways) == 1 else ""
+
+
 def _is_plain(found: InverseDynamics) -> bool:
     """Whether the chosen terms are those that a bench's friction model has."""
     return {term.name for term in found.best.structure.terms} <= PLAIN
@@ -181,8 +189,10 @@ def _is_plain(found: InverseDynamics) -> bool:
 
 def _scaled(one: Estimate, material: Material) -> Estimate:
     """With what a wrong constant of the force would do to it."""
+    if one.origin is Origin.NOT_DETERMINED:
+        return one
     data = material.trials[0]
-    return with_scale(_with_constant(one, material), data, DRIVE_TORQUE)
+    return with_scale(_with_constant(one, material), data, force_of(data))
 
 
 def _with_constant(one: Estimate, material: Material) -> Estimate:
@@ -196,7 +206,7 @@ def _from_elsewhere(material: Material) -> bool:
     return bool(material.trials[0].trial.recording)
 
 
-def _tables(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Table]:
+def _tables(found: InverseDynamics) -> Iterator[Table]:
     yield structures_table(found)
     for number, each in enumerate(found.tried[:2]):
         if each.delay == 0.0 and number != found.chosen:
@@ -204,8 +214,7 @@ def _tables(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterat
             yield deviations_table(f"plain-{number + 1}", f"Plain fit, {name}", each)
     yield deviations_table("chosen", "The chosen model and its deviations", found.best)
     if found.instruments is not None:
-        by_name = {each.estimate.name: each.estimate for each in parameters}
-        yield instruments_table(found.best.structure.terms, by_name, found.instruments)
+        yield instruments_table(found, found.instruments)
 
 
 def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
@@ -215,11 +224,33 @@ def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
         f"one of {filtering.decimation} samples is kept behind the same low-pass on both sides; "
         f"{filtering.skip} samples were left out at each beginning."
     )
-    if found.no_instruments:
+    held = found.instruments
+    if held is None:
         yield f"No instruments: {found.no_instruments}."
+    elif not held.of_wanted:
+        yield f"No instruments along the wanted motion: {found.no_instruments}."
+    if found.biased:
+        yield instruments_note(found)
+    if BENDS in {each.reason for each in found.estimates.values()}:
+        yield (
+            "A term that bends over the rate was added because it predicts better. It stands in "
+            "for whatever bends friction, most often a Stribeck curve, which `--model whole_model` "
+            "fits: shares of it are told without intervals."
+        )
     late = found.delay
     if math.isnan(late.value):
         yield f"The delay of the force is not determined: {late.reason}."
+    if way := one_way(found):
+        yield (
+            f"The axis moves in the {way} direction only: friction of the other is not known, and "
+            "what is called Coulomb friction holds every constant force as well, such as a weight "
+            "or a sensor's zero. Friction goes to no bench file."
+        )
+    if (force := force_of(material.trials[0])) != DRIVE_TORQUE:
+        yield (
+            f"The force is {force}, measured at the load: what motor and gear need themselves, "
+            "their inertia and friction, is not in it."
+        )
     for one, two, share in correlated(found.fit, found.best.structure.terms):
         yield (
             f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
@@ -264,7 +295,9 @@ def _conclusions(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> I
 
 
 def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
-    matrix, terms = found.fit.correlation, found.best.structure.terms
+    held, terms = found.instruments, found.best.structure.terms
+    fit = held.found.fit if found.biased and held is not None else found.fit
+    matrix = fit.correlation
     return {
         (terms[i].name, terms[j].name): float(matrix[i, j])
         for i in range(len(terms))
@@ -274,7 +307,7 @@ def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
 
 def _settings(found: InverseDynamics, material: Material) -> dict[str, tuple[object, str, str]]:
     """What a friction model needs besides: no Stribeck part was looked for, so it has none."""
-    if not _is_plain(found) or "load" in material.bench.friction:
+    if not _is_plain(found) or one_way(found) or "load" in material.bench.friction:
         return {}
     coulomb = found.estimates.get("coulomb", found.estimates.get("coulomb_positive"))
     if coulomb is None or not coulomb.value > 0:

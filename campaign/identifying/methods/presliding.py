@@ -1,6 +1,7 @@
-"""Presliding: stiffness and damping of the bristles, and inertia, from small multisines of torque.
+"""Presliding: stiffness and damping of the bristles, and inertia, from motions below breakaway.
 
-The simulation of the whole motion is fitted to all trials of `presliding_multisine` at once. What
+The simulation of the whole motion is fitted to all trials at once: of `presliding_multisine`, or
+else of whatever stays below breakaway (`identifying.presliding.small_motions`). What
 is found is the sum over all interfaces, before any of them slips: with one interface that is a
 number of the bench, with several only their sum is known, and no bench file has a place for it.
 """
@@ -15,19 +16,18 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial
-from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
-from campaign.experiments.presliding_multisine import EXPERIMENT as SHAKEN
-from campaign.experiments.presliding_multisine import PreslidingMultisineOptions
 from campaign.experiments.results.presliding_dynamics import (
+    BY_TORQUE,
     assumed_of,
     damping_figure,
     estimates_of,
     figures_of,
-    record_of,
     remarks,
     viscous_of,
 )
+from campaign.experiments.shared.elsewhere import with_scale
 from campaign.identification.intervals import shifted_by
 from campaign.identification.presliding_dynamics.found import (
     PreslidingDynamics,
@@ -36,12 +36,17 @@ from campaign.identification.presliding_dynamics.found import (
 from campaign.identification.presliding_dynamics.prediction import unexplained
 from campaign.identification.presliding_dynamics.record import Record
 from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.presliding.small_motions import (
+    is_planned,
+    small_motion,
+    span_of,
+    usable,
+)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Column, Conclusion, Finding, Result, Table
 from campaign.units import RotationalDamping
 
-MOTION = (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE)
 MEANINGS = {
     "stiffness_at_rest": "Slope of friction over angle before any interface slips, of all of them.",
     "damping_at_rest": "Damping of small motions, bristles' and viscous friction's together.",
@@ -79,26 +84,19 @@ class PreslidingOptions(Options):
     """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
 
 
-def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
-    """Trials of `presliding_multisine` with torque and motion, or why there are none."""
-    found = [
-        each
-        for each in trials
-        if each.trial.kind == SHAKEN.name
-        and DRIVE_TORQUE in each.channel_names()
-        and each.channel_names() & set(MOTION)
-    ]
-    why = f"no trial of {SHAKEN.name} has {DRIVE_TORQUE} and {' or '.join(MOTION)}"
-    return found, "" if found else why
-
-
 def _identify(material: Material, options: PreslidingOptions) -> Identified:
+    records = [small_motion(each) for each in material.trials]
+    unseen = _unseen(material.validation)
     found = identify_presliding_dynamics(
-        _records(material.trials), assumed_of(material.bench, _span(material.trials))
+        records, assumed_of(material.bench, _span(material.trials, records))
     )
     told = estimates_of(found, material.bench)
+    for name in BY_TORQUE:
+        if name in told and told[name].has_interval:
+            told[name] = with_scale(told[name], material.trials[0], DRIVE_TORQUE)
     told |= _bristle_damping(told, material.bench, options)
-    parameters = tuple(_parameters(told, material.bench))
+    planned = all(map(is_planned, material.trials))
+    parameters = tuple(_parameters(told, material.bench, planned or _gives_way(found)))
     shown = tuple(each.trial.number for each in material.trials)
     figures = list(figures_of(found, "", shown))
     if "damping_at_rest" in told and told["damping_at_rest"].has_interval:
@@ -107,32 +105,30 @@ def _identify(material: Material, options: PreslidingOptions) -> Identified:
     return Identified(
         parameters,
         Result(
-            tables=tuple(_tables(found, told, _records(material.validation))),
+            tables=tuple(_tables(found, told, unseen)),
             figures=tuple(figures),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=(*remarks(found), *_notes(material.bench)),
+            notes=(*remarks(found), *_notes(material.bench, found, planned)),
             conclusions=tuple(_conclusions(told)),
         ),
         correlations=_correlations(found),
     )
 
 
-def _records(trials: Sequence[ArchivedTrial]) -> list[Record]:
-    return [
-        record_of(each, 1.0 / _options(each).lowest)
-        for each in trials
-        if each.trial.kind == SHAKEN.name
-    ]
+def _unseen(trials: Sequence[ArchivedTrial]) -> list[Record]:
+    """Of a validation, what stays below breakaway. Raises ValueError where nothing does."""
+    if not trials:
+        return []
+    chosen, why = usable(trials)
+    if why:
+        raise ValueError(f"of the validation {why}")
+    return [small_motion(each) for each in chosen]
 
 
-def _options(data: ArchivedTrial) -> PreslidingMultisineOptions:
-    return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
-
-
-def _span(trials: Sequence[ArchivedTrial]) -> tuple[float, float]:
-    """Lowest and highest line of all trials (Hz)."""
-    options = [_options(each) for each in trials]
-    return min(each.lowest for each in options), max(each.highest for each in options)
+def _span(trials: Sequence[ArchivedTrial], records: Sequence[Record]) -> tuple[float, float]:
+    """Lowest and highest frequency of all trials (Hz)."""
+    spans = [span_of(*each) for each in zip(trials, records, strict=True)]
+    return min(low for low, _ in spans), max(high for _, high in spans)
 
 
 def _bristle_damping(
@@ -166,9 +162,19 @@ def _interface(bench: Bench) -> str:
     return name if at_load and hasattr(options, "bristle_stiffness") else ""
 
 
-def _parameters(told: dict[str, Estimate], bench: Bench) -> Iterator[Parameter]:
+def _gives_way(found: PreslidingDynamics) -> bool:
+    """Whether the spring surely softens towards a torque, as bristles do and a spring does not."""
+    yielding = found.estimates.get("yielding")
+    if yielding is None or not yielding.has_interval:
+        return False
+    low, _ = yielding.combined
+    return low is not None and low > 0
+
+
+def _parameters(told: dict[str, Estimate], bench: Bench, bristles: bool) -> Iterator[Parameter]:
+    """`bristles`: whether what holds the load is known to be friction."""
     keys, own = dict(KEYS), _interface(bench)
-    if own:
+    if own and bristles:
         keys["stiffness_at_rest"] = f"friction.{own}.bristle_stiffness"
         keys["bristle_damping"] = f"friction.{own}.bristle_damping"
     for name, meaning in MEANINGS.items():
@@ -218,7 +224,18 @@ def _tables(
     )
 
 
-def _notes(bench: Bench) -> Iterator[str]:
+def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[str]:
+    if not planned:
+        yield (
+            "Nobody planned these as small motions. The torque is taken as it was recorded: noise "
+            "in it makes everything stiffer, more damped and heavier by about its share of the "
+            "torque's power."
+        )
+    if not planned and not _gives_way(found):
+        yield (
+            "What holds the load is not seen to give way as bristles do: a spring, a cable or "
+            "gravity would look the same. Stiffness and damping go to no bench file."
+        )
     if len(bench.friction) > 1:
         yield (
             f"The bench states {len(bench.friction)} interfaces. Before the first of them slips a "
@@ -256,7 +273,7 @@ def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
 
 METHOD = Method(
     name="presliding",
-    summary="stiffness, damping and inertia from small multisines below breakaway",
+    summary="stiffness, damping and inertia from small motions below breakaway",
     options=PreslidingOptions,
     suits=usable,
     identify=_identify,

@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import Field
 
 from campaign.archive import ArchivedTrial
-from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
@@ -21,7 +20,7 @@ from campaign.identification.inverse.motion import Filtering
 from campaign.identification.inverse.terms import Term
 from campaign.identifying.inverse.found import InverseDynamics
 from campaign.identifying.inverse.found import find as find_inverse
-from campaign.identifying.inverse.motions import Moved, moved, usable, with_slowest
+from campaign.identifying.inverse.motions import Moved, force_of, moved, usable, with_slowest
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.identifying.tables import words
 from campaign.identifying.whole.found import Fit, find, product
@@ -44,12 +43,14 @@ FORCES = (
 """Beginnings of names whose numbers grow with the force's constant."""
 MOST_SAMPLES = 60_000
 """of all trials together that are fitted: a fit simulates them some hundred times."""
+RATIO = "static_over_coulomb"
+"""of both directions, or the beginning of the name of one's own."""
 STILL = 0.25
 """of the rate below which a plain regression takes an axis for standing: curves begin there."""
 LINEAR = ("spring", "gravity", "cogging")
 """Beginnings of terms of a plain regression that no friction model stands in for."""
 ADVICE = {
-    "static_over_coulomb": "slide more slowly, and reverse more often",
+    RATIO: "slide more slowly, and reverse more often",
     "stribeck_velocity": "slide at more speeds between rest and the fastest",
     "bristle": "stay below breakaway: `presliding_multisine` measures it",
     "coulomb": "reverse more often",
@@ -94,7 +95,9 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
     filtering = replace(filtering, slowest=STILL * moves.slowest)
     regression = find_inverse(pieces, unseen, moves, linear=material.bench.is_linear)
     extra = _linear_terms(regression)
-    found = find(pieces, unseen, filtering, extra, options.starts, material.say)
+    held = regression.instruments
+    known = held.delay if held is not None and held.of_wanted else None
+    found = find(pieces, unseen, filtering, extra, options.starts, material.say, known=known)
     names = [each.model.name for each in found.fits]
     if options.model and options.model not in names:
         raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
@@ -156,17 +159,17 @@ def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
         display = "ms" if name == "delay" else ""
         one = _scaled(estimate, material)
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
-    ratio = told["static_over_coulomb"]
     for each in best.model.numbers:
         if not each.over:
             continue
+        ratio = told[each.unknown.name]
         base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
         share = best.fit.correlation.get((ratio.name, base), 0.0)
         share = share or best.fit.correlation.get((base, ratio.name), 0.0)
         way = base.removeprefix("coulomb")
         made = product(f"static_torque{way}", ratio, told[base], share)
         meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
-        advice = ADVICE["static_over_coulomb"]
+        advice = ADVICE[RATIO]
         yield Parameter(_scaled(made, material), meaning, "", f"{FRICTION}.{each.key}", advice)
 
 
@@ -177,7 +180,7 @@ def _scaled(one: Estimate, material: Material) -> Estimate:
     data = material.trials[0]
     if material.bench.motor is not None and not data.trial.recording:
         one = with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
-    return with_scale(one, data, DRIVE_TORQUE)
+    return with_scale(one, data, force_of(data))
 
 
 def _settings(best: Fit) -> dict[str, tuple[object, str, str]]:
@@ -191,12 +194,11 @@ def _settings(best: Fit) -> dict[str, tuple[object, str, str]]:
         if name in flat and estimate.origin is not Origin.MEASURED:
             each = flat[name]
             told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, estimate.reason)
-    if best.fit.estimates["static_over_coulomb"].origin is not Origin.MEASURED:
-        for each in best.model.numbers:
-            if each.over:
-                base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
-                value = values["static_over_coulomb"] * values[base]
-                told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
+    for each in best.model.numbers:
+        if each.over and best.fit.estimates[each.unknown.name].origin is not Origin.MEASURED:
+            base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+            value = values[each.unknown.name] * values[base]
+            told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
     return told
 
 
@@ -207,8 +209,19 @@ def _notes(best: Fit) -> Iterator[str]:
     for (one, two), share in best.fit.correlation.items():
         if abs(share) >= 0.9:
             yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."
-    if best.values["static_over_coulomb"] < 1.0:
-        yield "Friction rises as sliding sets in: static friction lies below Coulomb friction."
+    for name, ratio in best.fit.estimates.items():
+        if not name.startswith(RATIO):
+            continue
+        way = name.removeprefix(RATIO).lstrip("_")
+        where = f"In the {way} direction static" if way else "Static"
+        low, high = ratio.combined
+        if ratio.origin is Origin.MEASURED and high is not None and high < 1.0:
+            yield f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
+        elif ratio.origin is not Origin.MEASURED or low is None or low <= 1.0:
+            yield (
+                f"{where} friction is not told from Coulomb friction: there is no Stribeck part "
+                "that this motion could identify."
+            )
     yield (
         "Each model met the rate that was measured, in steps of the recording; a loop that was "
         "closed on that rate is in the data, and not in the model."

@@ -31,10 +31,11 @@ from campaign.identification.whole_model import (
     Values,
     fit_model,
     held_out,
+    moved_with,
     refitted,
 )
 from campaign.identifying.inverse.found import together
-from campaign.identifying.inverse.motions import Moved
+from campaign.identifying.inverse.motions import Moved, never_moved
 from campaign.identifying.whole.along import Along
 from campaign.identifying.whole.models import Model, Sizes, models
 
@@ -46,6 +47,7 @@ BAND = 0.4
 """of the rows' rate that their low-pass leaves."""
 RESOLVED = 3.0
 """Time constants of the low-pass that something must take to be seen as more than a jump."""
+NORMAL_95 = 1.96
 WIDE = 5.0
 """How many times more or less than plain inverse dynamics the inertia may be."""
 
@@ -96,15 +98,20 @@ def find(
     extra: Sequence[Term] = (),
     starts: int = 3,
     say: Callable[[str], None] = lambda text: None,
+    *,
+    known: Estimate | None = None,
 ) -> Whole:
-    """Fit every model. Raises ValueError where the motion does not slide in both directions."""
+    """Fit every model. Raises ValueError where the motion does not slide in both directions.
+
+    known: the delay as instruments along the wanted motion have it (s); None without any.
+    """
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
     fits: list[Fit] = []
     for model in models(sizes):
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
-        one = _fitted(model, terms, motions, filtering, inertia, starts, say)
+        one = _fitted(model, terms, motions, filtering, inertia, starts, say, known)
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
@@ -114,8 +121,8 @@ def find(
 
 def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
     """From plain inverse dynamics."""
-    if not all(any(np.any(TERMS[n].column(m)) for m in motions) for n in DIRECTIONAL):
-        raise ValueError("the axis does not slide in both directions")
+    if missing := never_moved(motions, filtering.slowest):
+        raise ValueError(f"the axis does not slide in the {missing[0]} direction")
     plain = structure(motions, [TERMS[name] for name in DIRECTIONAL], filtering)
     inertia, up, down, dry, back = plain.fit.values
     coulomb = (max(float(dry), 1e-9), max(float(back), 1e-9))
@@ -134,6 +141,7 @@ def _fitted(
     inertia: float,
     starts: int,
     say: Callable[[str], None],
+    known: Estimate | None,
 ) -> Fit:
     along = [Along(motion) for motion in motions]
     rate = motions[0].sample_rate
@@ -165,7 +173,9 @@ def _fitted(
     )
     # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
     other = refitted(unknowns, partial(left_in, filtering.half_band), fit.found.shares)
-    fit = _with_band(fit, dict(zip(names, other, strict=True)))
+    again = dict(zip(names, other, strict=True))
+    doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
+    fit = _with_delay(_with_band(fit, again), doubt)
     fit = resolved(fit, model, motions, filtering)
     forces = [_rows(motion.force, filtering) * moving(motion, filtering) for motion in motions]
     norm = float(np.sqrt(sum(float(each @ each) for each in forces)))
@@ -188,6 +198,42 @@ def _fitted(
     )
 
 
+def _with_delay(fit: ModelFit, doubt: float) -> ModelFit:
+    """With the doubt about the delay (s) as a systematic part; too much of it leaves open."""
+    moved = moved_with(fit, "delay", doubt)
+    found = dict(fit.estimates)
+    for name, one in fit.estimates.items():
+        if not one.has_interval or name not in moved:
+            continue
+        found[name] = shifted_by(one, "delay", abs(moved[name]))
+        if found[name].half_width > USELESS * abs(one.value):
+            reason = f"a delay of {1e3 * doubt:.2g} ms more or less leaves it open"
+            found[name] = _open(one, reason)
+    return replace(fit, estimates=found)
+
+
+def _doubt(delay: Estimate, again: float, sample: float, known: Estimate | None) -> float:
+    """By how much a fitted delay may be wrong (s, 1 sigma).
+
+    What a loop makes of noise looks like a delay, and times the inertia like viscous friction: all
+    of it may be that, and none a delay; what is held for a sample is half of it late. Instruments
+    along a wanted motion may know better. again: what half the band finds (s).
+    """
+    scatter = delay.standard_error or 0.0
+    spread = math.hypot(scatter, again - delay.value)
+    doubt = max(0.5 * sample, spread, abs(delay.value) / NORMAL_95)
+    if known is None or not known.has_interval:
+        return doubt
+    told = math.hypot(scatter, known.half_width / NORMAL_95, known.value - delay.value)
+    return min(doubt, told)
+
+
+def _open(one: Estimate, reason: str) -> Estimate:
+    return Estimate.without_interval(
+        one.name, one.value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
+    )
+
+
 def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     """With what half the band says otherwise as a systematic part; too much of it leaves open."""
     found = {}
@@ -195,9 +241,7 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
         told = shifted_by(one, "band", abs(other[name] - one.value)) if one.has_interval else one
         if told.half_width > USELESS * abs(told.value):
             reason = f"half the band finds {other[name]:.3g} {one.unit}".rstrip()
-            told = Estimate.without_interval(
-                name, one.value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
-            )
+            told = _open(one, reason)
         found[name] = told
     delay = found["delay"]
     found["delay"] = Estimate.without_interval(
@@ -205,11 +249,9 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     )
     stiffness = found.get("bristle_stiffness")
     if stiffness is not None and stiffness.origin is not Origin.MEASURED:
-        damping = found["bristle_damping"]
-        found["bristle_damping"] = Estimate.without_interval(
-            damping.name, damping.value, damping.unit, "without a stiffness it means nothing",
-            method=METHOD, origin=Origin.NOT_DETERMINED,
-        )  # fmt: skip
+        found["bristle_damping"] = _open(
+            found["bristle_damping"], "without a stiffness it means nothing"
+        )
     return replace(fit, estimates=found)
 
 
@@ -233,14 +275,11 @@ def resolved(
         reason = f"{what} takes {takes * 1e3:.2g} ms, and rows show {shortest * 1e3:.2g} ms"
         for name in names:
             if name in found:
-                one = found[name]
-                found[name] = Estimate.without_interval(
-                    name, one.value, one.unit, reason, method=METHOD,
-                    origin=Origin.NOT_DETERMINED,
-                )  # fmt: skip
+                found[name] = _open(found[name], reason)
 
     slow = values["stribeck_velocity"]
-    refuse(("stribeck_velocity", "static_over_coulomb"), slow / turning, "passing it in a reversal")
+    ratios = [name for name in found if name.startswith("static_over_coulomb")]
+    refuse(("stribeck_velocity", *ratios), slow / turning, "passing it in a reversal")
     if "bristle_stiffness" in values:
         bent = float(model.options(values)["coulomb_torque"]) / values["bristle_stiffness"]
         takes = math.sqrt(2.0 * bent / turning)

@@ -10,6 +10,8 @@ from campaign.identification.unknowns import Unknown
 
 STATIC = (0.05, 3.0)
 """Static friction over Coulomb friction; real axes have less than 1."""
+MOST_VISCOUS = 5.0
+"""Viscous over Coulomb friction at the fastest rate, at least up to which it is looked for."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ def _curve(sizes: Sizes, *, by_direction: bool) -> tuple[Fitted, ...]:
     """Coulomb, static and viscous friction, and the rate between them."""
     mean = 0.5 * sum(sizes.coulomb)
     largest = max(0.5 * sum(sizes.viscous), 0.02 * mean / sizes.rate)
+    # Where friction falls as sliding sets in, a plain line has hardly any slope.
+    most = max(6.0 * largest, MOST_VISCOUS * mean / sizes.rate)
     found = []
     ways = (("", "positive"), ("negative.", "negative")) if by_direction else (("", ""),)
     for number, (prefix, way) in enumerate(ways):
@@ -111,15 +115,17 @@ def _curve(sizes: Sizes, *, by_direction: bool) -> tuple[Fitted, ...]:
                 f"Dry friction of fast sliding{told}.",
             ),
             Fitted(
-                Unknown(f"viscous{tail}", 0.0, 6.0 * largest, min(max(viscous, 0.0), largest)),
+                Unknown(f"viscous{tail}", 0.0, most, min(max(viscous, 0.0), largest)),
                 f"{prefix}viscous_friction",
                 "N m s/rad",
                 f"Viscous friction{told}.",
             ),
         ]
-    static = Unknown("static_over_coulomb", *STATIC, 0.9)
-    meaning = "Static friction over Coulomb friction; below 1 where none stands out."
-    for prefix in [prefix for prefix, _ in ways]:
+    # One direction may rise to its Coulomb friction, and the other fall to it.
+    for prefix, way in ways:
+        static = Unknown(f"static_over_coulomb{'_' * bool(way)}{way}", *STATIC, 0.9)
+        told = f", {way} direction" if way else ""
+        meaning = f"Static friction over Coulomb friction{told}; below 1 where none stands out."
         found.append(
             Fitted(static, f"{prefix}static_torque", "", meaning, f"{prefix}coulomb_torque")
         )

@@ -25,6 +25,10 @@ OPAQUE = (
     "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y')"
 )
 
+OBJECT = "an object of a MATLAB class, which other programs cannot read"
+"""What is said of one that stands beside numbers."""
+NOTHING = "no variable of it is a series of numbers"
+
 
 def tables(path: Path) -> Sequence[Table]:
     """What is in a MAT file, read in this process. Raises RecordingError."""
@@ -37,23 +41,18 @@ def tables(path: Path) -> Sequence[Table]:
         why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         message = f"this is no MAT file of version 4 to 7.2 that can be read ({why})"
         raise RecordingError([Problem(path, 0, 0, message)]) from None
-    opaque = [
-        name
-        for name, value in found.items()
-        if name in ("None", "__function_workspace__") or _is_opaque(value)
-    ]
-    if opaque:
-        shown = next((name for name in opaque if not name.startswith(("None", "__"))), "a variable")
-        raise RecordingError([Problem(path, 0, 0, f"{shown} {OPAQUE}")])
     whole: list[Table] = []
     arrays: list[Named] = []
     said: dict[str, str] = {}
+    objects = [name for name in ("None", "__function_workspace__") if name in found]
     for name, value in found.items():
-        if not name.startswith("__"):
+        if not name.startswith("__") and name != "None":
             _sort_out(name, value, whole, arrays, said)
+    objects += [name for name, what in said.items() if what == OBJECT]
     whole += tables_of(arrays, said) if arrays else []
     if not whole:
-        message = "no variable of it is a series of numbers"
+        shown = next((name for name in objects if not name.startswith(("None", "__"))), "")
+        message = f"{shown or 'a variable'} {OPAQUE}" if objects else NOTHING
         raise RecordingError([Problem(path, 0, 0, message)])
     return whole
 
@@ -68,6 +67,9 @@ def _sort_out(
 ) -> None:
     """Put a variable where it belongs: a table of its own, an array, or what the file says."""
     if deep > DEEPEST:
+        return
+    if _is_opaque(value):
+        said[name] = OBJECT
         return
     fields = _fields(value)
     if fields is not None:

@@ -7,6 +7,7 @@ said here is likely, and is marked so wherever it is shown.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,9 +61,32 @@ class Likely:
     why: str
 
 
-def unit_of_time(values: Array) -> Likely | None:
-    """By size and step: what no rig samples at is not meant."""
+RATE_NAMES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
+STEP_NAMES = {"ts", "dt", "sampletime", "samplingtime", "sampleinterval", "samplinginterval"}
+"""What files call their sample rate (Hz) and its inverse (s), without what is between words."""
+
+
+def stated_rate(said: Mapping[str, str]) -> tuple[str, float] | None:
+    """The sample rate (Hz) that a file says besides its columns, and the name that says it."""
+    for key, text in said.items():
+        name = "".join(filter(str.isalpha, key.rsplit(".", 1)[-1].lower()))
+        try:
+            value = float(text)
+        except ValueError:
+            continue
+        if name in RATE_NAMES | STEP_NAMES and 0.0 < value < math.inf:
+            return key, value if name in RATE_NAMES else 1.0 / value
+    return None
+
+
+def unit_of_time(values: Array, stated: tuple[str, float] | None = None) -> Likely | None:
+    """By a rate that the file states, or by size and step: what no rig samples at is not meant."""
     first = float(values[0])
+    if stated is not None and (apart := ticks(values).step) > 0:
+        name, rate = stated
+        for unit, seconds in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+            if abs(apart * seconds * rate - 1.0) < 1e-3:
+                return Likely(unit, f"{apart:.4g} apart, and the file says {name}: {rate:g} Hz")
     for low, high, unit in EPOCHS:
         if low <= first < high:
             return Likely(unit, "they would be times since 1970")

@@ -18,7 +18,14 @@ from campaign.importing.defects.clock import ticks
 from campaign.importing.guess.axes import axes
 from campaign.importing.guess.beside import beside
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGuess
-from campaign.importing.guess.evidence import counts, evenly, increases, seconds_of, unit_of_time
+from campaign.importing.guess.evidence import (
+    counts,
+    evenly,
+    increases,
+    seconds_of,
+    stated_rate,
+    unit_of_time,
+)
 from campaign.importing.guess.names import OF_ANYTHING, named
 from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
 from campaign.importing.guess.relations import by_numbers, with_units
@@ -181,7 +188,7 @@ def _time(
             continue
         values = _without_holes(series[place])
         if each.basis is not Basis.STATED:
-            likely = unit_of_time(values)
+            likely = unit_of_time(values, stated_rate(table.said))
             if likely is None:
                 continue
             each = replace(each, unit=likely.unit, basis=Basis.LIKELY, unit_why=likely.why)

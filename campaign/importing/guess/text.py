@@ -24,6 +24,7 @@ from campaign.channels import (
     Quantity,
 )
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
+from campaign.importing.guess.evidence import stated_rate
 from campaign.importing.guess.layouts import LayoutGuess, Placed, layouts
 from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
 from campaign.unit_grammar import parse_unit
@@ -160,7 +161,10 @@ def _columns(layout: LayoutGuess) -> Iterator[str]:
     if TIME not in taken and not first.clock:
         yield ""
         yield _doubt(f"[columns.{layout.name}.time]  # no column of times was found")
-        yield _doubt('sample_rate = "... Hz"')
+        rate = stated_rate(first.said)
+        told = "..." if rate is None else f"{rate[1]:g}"
+        why = "" if rate is None else f"  # the file says {rate[0]}"
+        yield _doubt(f'sample_rate = "{told} Hz"{why}')
 
 
 def _lacking(layout: LayoutGuess, taken: set[str]) -> Iterator[str]:

@@ -1,0 +1,1 @@
+"""Which recordings are small motions below breakaway, as the presliding method needs them."""
