@@ -70,6 +70,22 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
 
 
+def test_a_stated_rate_tells_the_unit_of_times(tmp_path: Path):
+    """Whole numbers 400 apart would be ms; a rate of 2.5 kHz makes them microseconds."""
+    time = 400.0 * np.arange(200)
+    rate = np.sin(time / 1e4)
+    scipy.io.savemat(tmp_path / "a.mat", {"time": time, "omega": rate, "fs": 2500.0})
+    scipy.io.savemat(tmp_path / "b.mat", {"omega": rate, "dt": 4e-4})
+    scipy.io.savemat(tmp_path / "c.mat", {"time": time, "omega": rate, "fs": 12.0})
+    assert guess([tmp_path / "a.mat"]).tables[0].columns[0].unit == "us"
+    assert "2500 Hz" in guess([tmp_path / "a.mat"]).tables[0].columns[0].unit_why
+    assert 'sample_rate = "2500 Hz"  # the file says dt' in mapping_text(
+        guess([tmp_path / "b.mat"])
+    )
+    # A rate that no unit of time agrees with is something else's.
+    assert guess([tmp_path / "c.mat"]).tables[0].columns[0].unit == "ms"
+
+
 def test_signals_beside_their_times_in_a_matrix_are_no_axes(tmp_path: Path):
     m = rig.sines(12)
     own = {"theta": np.vstack([m.t, m.target, m.q])}

@@ -8,11 +8,15 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from scipy.io.matlab import MatlabOpaque
 
 from campaign.importing.formats import hdf5, tdms
+from campaign.importing.formats import mat as mat_format
 from campaign.importing.interface import Clock, RecordingError, Table
 from campaign.importing.opening import open_recordings
 from tests.importing.files import LVM, MADE, RATE, RIGOL, TIME, TORQUE, TWINCAT, N, mat
+
+OPAQUE_FIELDS = ("s0", "s1", "s2", "arr")
 
 
 def made(folder: Path, name: str) -> Path:
@@ -134,6 +138,22 @@ def test_rows_of_a_matrix_are_named_as_rows(tmp_path):
     (table,) = opened(path, "mat")
     assert [name for name, _ in headings(table)] == ["data(1,:)", "data(2,:)"]
     np.testing.assert_array_equal(table.whole([1]).ravel(), RATE)
+
+
+def test_objects_beside_numbers_are_left_out(tmp_path, monkeypatch):
+    """A design of MATLAB's toolboxes beside a recording; of it alone there is nothing to read."""
+    design = MatlabOpaque(np.array([("", "MCOS", "tf", 1)], [(k, "O") for k in OPAQUE_FIELDS]))
+    numbers = {"t": TIME, "w": RATE, "fs": np.float64(1000.0), "plan": design}
+    for held, columns in ((numbers, ["t", "w"]), ({"plan": design}, [])):
+        monkeypatch.setattr(scipy.io, "loadmat", lambda *_, h=held, **__: {**h, "None": design})
+        if not columns:
+            with pytest.raises(RecordingError, match="plan is an object of a MATLAB class"):
+                mat_format.tables(tmp_path / "bench.mat")
+            continue
+        (table,) = mat_format.tables(tmp_path / "bench.mat")
+        assert [name for name, _ in headings(table)] == columns
+        assert "object" in table.said["plan"]
+        assert "None" not in table.said
 
 
 def test_whole_numbers_do_not_wrap_around(tmp_path):

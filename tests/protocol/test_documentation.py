@@ -22,7 +22,9 @@ def blocks(kind: str) -> list[str]:
     return re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize(("block", "trials"), list(zip(blocks("toml"), [4, 72, 2], strict=True)))
+@pytest.mark.parametrize(
+    ("block", "trials"), list(zip(blocks("toml"), [4, 72, 2, 15], strict=True))
+)
 def test_example(tmp_path: Path, block: str, trials: int) -> None:
     path = tmp_path / "my.toml"
     path.write_text(block)

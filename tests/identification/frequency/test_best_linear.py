@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.estimate import Origin
 from campaign.identification.frequency.best_linear import best_linear
 from campaign.identification.frequency.distortion import total
 from campaign.identification.frequency.multisine import (
@@ -196,7 +195,13 @@ def test_what_too_little_leaves_open_is_said(realisations: int, periods: int, to
     assert (found.distortion is None) == (periods == 1)
     assert np.all(np.isnan(found.nonlinear)) == (realisations == 1 or periods == 1)
     if realisations == 1 and found.distortion is not None:
-        assert total(found.distortion, "odd").origin is Origin.NOT_DETERMINED
+        even = total(found.distortion, "even")
+        assert not even.has_interval
+        assert "single realisation" in even.reason
+        v = inputs(7, 2)
+        several = best_linear(v, distorted(v, 0.002, 1), RATE, 2, GRID.excited).distortion
+        assert several is not None
+        assert even.value == pytest.approx(total(several, "even").value, rel=0.2)
 
 
 def test_refused() -> None:

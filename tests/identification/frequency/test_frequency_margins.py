@@ -18,7 +18,7 @@ from campaign.identification.frequency.orders import chosen_order
 from campaign.identification.frequency.rational import rational_fit
 from tests.identification.coverage import holds, rejected
 from tests.identification.frequency.measured import noisy, scatter_as_told
-from tests.identification.loops import random_loop
+from tests.identification.loops import Truth, random_loop
 
 # L = w / s exp(-s t): 0 dB at w, phase margin 90 deg - w t, -180 deg at pi / (2 t).
 CROSSOVER, DELAY = 2 * math.pi * 5.0, 0.01
@@ -94,6 +94,79 @@ def test_margins_hold_the_truth_as_often_as_they_say() -> None:
     assert not rejected(held, "less")
     # A function through all points knows more than the points around a crossing.
     assert np.nanmedian(wide["phase_margin"]) < 0.7
+
+
+@pytest.mark.slow
+def test_margins_near_the_last_frequency_hold_the_truth() -> None:
+    """60 loops with one crossing just before or behind it: intervals, open ends and bounds."""
+    held: dict[str, list[bool]] = defaultdict(list)
+    for seed in range(60):
+        random = np.random.default_rng(5000 + seed)
+        truth = random_loop(random)
+        name = ("gain_margin", "bandwidth", "phase_margin")[seed % 3]
+        ends = {
+            "gain_margin": half_turn(truth),
+            "bandwidth": truth.bandwidth,
+            "phase_margin": truth.scale,
+        }
+        last = ends[name] * random.uniform(0.95, 1.06)
+        frequency = np.geomspace(truth.scale / 10, last, int(random.choice([24, 40, 60])))
+        values = truth.loop(2j * np.pi * frequency)
+        share, floor = 10 ** random.uniform(-2.5, -1), 10 ** random.uniform(-3, -1.3)
+        level = np.hypot(share * np.abs(values), floor)
+        measured = noisy(frequency, values, level, random, of=int(random.integers(7, 12)))
+        found = chosen_margins(chosen_order(measured, stable=False))
+        for each in ("bandwidth", "phase_margin", "gain_margin"):
+            told, expected = getattr(found, each), getattr(truth, each)
+            if told.kind == "at least":
+                held[each].append(told.value <= expected)
+            elif told.has_interval:
+                held[each].append(holds(told, expected))
+    assert not rejected(held, "less")
+
+
+def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that() -> None:
+    """Of a loop with -3 dB at 7.914 Hz, measured to hardly more: bounds count as intervals do."""
+    width, held = 7.9141274721853, defaultdict(list)
+    assert abs(loop(np.array([width])) / (1 + loop(np.array([width]))))[0] == pytest.approx(
+        10**-0.15
+    )
+    for over in (1.002, 1.01, 1.03):
+        bounds = 0
+        for seed in range(60):
+            frequency = np.geomspace(0.5, over * width, 40)
+            truth, random = loop(frequency), np.random.default_rng(seed)
+            measured = noisy(frequency, truth, 0.05 * np.abs(truth), random, of=20)
+            told = fitted_margins(rational_fit(measured, (0, 1))).bandwidth
+            if told.kind == "at least":
+                bounds += 1
+                held[str(over)].append(told.value <= width)
+            else:
+                held[str(over)].append(holds(told, width))
+        assert bounds > 5  # else nothing was tried
+    assert not rejected(held, "less")
+
+
+def half_turn(truth: Truth) -> float:
+    """Where a loop's phase is -180 deg (Hz), above its gain crossover."""
+    grid = truth.scale * np.geomspace(1, 100, 8000)
+    phase = np.unwrap(np.angle(truth.loop(2j * np.pi * grid)))
+    return float(grid[np.flatnonzero(phase < -np.pi)[0]])
+
+
+def test_an_end_that_may_lie_beyond_the_band_is_open() -> None:
+    """-180 deg is at 25 Hz and the band ends at 25.2 Hz: whether it is in it, scatter hides."""
+    kinds = []
+    for seed in range(20):
+        frequency = np.geomspace(0.5, 25.2, 40)
+        truth = loop(frequency)
+        measured = noisy(frequency, truth, 0.05 * np.abs(truth), np.random.default_rng(seed), of=20)
+        found = fitted_margins(rational_fit(measured, (0, 1))).gain_margin
+        if found.kind == "number":
+            assert found.low is not None
+            assert found.low <= GAIN_MARGIN + 0.3
+            kinds.append(found.high is None)
+    assert np.mean(kinds) > 0.8
 
 
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:

@@ -9,8 +9,9 @@ import pytest
 
 from campaign.estimate import Origin
 from campaign.identification.frequency.best_linear import best_linear
+from campaign.identification.frequency.drive import PARTS
 from campaign.identification.frequency.multisine import odd_grid, random_phases
-from campaign.identification.frequency.two_mass import PARTS, two_mass, two_mass_fit
+from campaign.identification.frequency.two_mass import two_mass, two_mass_fit
 from campaign.identification.frequency.two_mass_model import Side, mode_damping
 from tests.identification.coverage import holds, rejected
 from tests.identification.frequency.drives import Drive, random_drive
@@ -97,6 +98,48 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
     for name in ("total_inertia", "resonance", "resonance_damping"):
         ratio = scatter_as_told([getattr(each, name) for each in found])
         assert ratio == pytest.approx(1, abs=0.2), name
+
+
+def test_correlations_are_those_of_repeated_measurements() -> None:
+    truth = DRIVE.response(FREQUENCY, "motor")
+    level = 0.02 * np.median(np.abs(truth))
+    found = [
+        two_mass_fit(
+            {"motor": noisy(FREQUENCY, truth, level, np.random.default_rng(seed), of=30)}, False
+        )
+        for seed in range(60)
+    ]
+    names = list(truths(DRIVE))
+    seen = np.corrcoef([[getattr(each, name).value for each in found] for name in names])
+    told = found[0].correlations
+    assert len(told) == len(names) * (len(names) - 1) // 2
+    for (one, other), share in told.items():
+        # 60 tell Fisher's z of a correlation within 0.13; five of those in any of 45.
+        expected = seen[names.index(one), names.index(other)]
+        apart = np.arctanh(0.999 * share) - np.arctanh(0.999 * expected)
+        assert abs(apart) < 0.65, (one, other)
+    assert told["stiffness", "load_inertia"] > 0.8
+    assert 1.0 < found[0].condition < 1000.0
+
+
+@pytest.mark.parametrize("side", ["motor", "load"])
+def test_one_inertia_is_told_as_one(side: Side) -> None:
+    """A rigid axis has no second inertia, and no interval of a sum of two that are not there."""
+    truth = 1.0 / (2j * np.pi * FREQUENCY * 3.0 + 9.0) * np.exp(-2j * np.pi * FREQUENCY * 5e-4)
+    held = []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        found = two_mass({side: noisy(FREQUENCY, truth, 0.02 * np.median(np.abs(truth)), random)})
+        if not found.rigid:
+            continue
+        assert found.resonance.origin is Origin.NOT_DETERMINED
+        assert "one inertia explains" in found.load_inertia.reason
+        assert found.total_inertia.half_width < 0.05
+        held.append(holds(found.total_inertia, 3.0))
+    assert len(held) >= 18
+    assert not rejected({"inertia": held}, "less")
+    # A drive with a resonance in the band is none.
+    assert not two_mass({side: measured(DRIVE, side, 1)}).rigid
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -1,0 +1,217 @@
+"""How often intervals of `campaign identify` hold the truth, on rigs that nobody tuned them on.
+
+Run with `python -m benchmarks.identification_coverage [--rigs 100] [--whole 24] [--seed 4711]`.
+The rigs, half of them linear, are those of `tests.identification.blind_rigs`: simulated without
+this program, with encoders, tachometers, noise, delays, and friction of many kinds; truth is read
+when everything has been identified. Columns: how many intervals hold (with the 95 % interval of
+that share, Clopper and Pearson), how many have none, their median half-width. The table goes into
+docs/identification.md with `--write`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
+
+from scipy.stats import binomtest
+
+from benchmarks.document import DOCS, table
+from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.identifying.method import Identified, Material
+from campaign.identifying.methods import inverse_dynamics, whole_model
+from campaign.physics.bench import Bench
+from campaign.trial import Channel, Recording
+from tests.identification.blind_rigs import RATE, BlindRig, blind_rigs
+
+NAMES = (
+    "inertia",
+    "coulomb_positive",
+    "coulomb_negative",
+    "viscous_positive",
+    "viscous_negative",
+    "spring",
+    "static_over_coulomb_positive",
+    "static_over_coulomb_negative",
+    "stribeck_velocity",
+    "delay",
+)
+NOWHERE = ("bristle_stiffness", "bristle_damping")
+"""What none of the rigs has: an interval of it holds nothing."""
+MODEL = "stribeck, by direction"
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was told of one number of one rig.
+
+    Attributes:
+        held: whether the interval holds the truth; None where it has none.
+        width: half of it over the truth.
+        error: of the value, in half-widths.
+        to_bench: whether it would go to a bench file.
+    """
+
+    rig: int
+    name: str
+    held: bool | None
+    width: float
+    error: float
+    to_bench: bool
+
+
+def recorded(rig: BlindRig) -> Any:
+    """A trial as an archive has it, of channels that such a rig records."""
+    made = [Channel(DRIVE_TORQUE, "N m", "force", "N m", rig.force)]
+    if rig.angle is not None:
+        made.append(Channel(RELATIVE_ANGLE, "rad", "position", "deg", rig.angle))
+    if rig.rate is not None:
+        made.append(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", rig.rate))
+    if rig.wanted is not None:
+        made.append(Channel(REFERENCE, "rad", "wanted", "deg", rig.wanted))
+    channels = {each.name: each for each in made}
+    recording = Recording(rig.time, channels)
+    task = SimpleNamespace(sample_rate=RATE, duration=len(rig.time) / RATE)
+    return SimpleNamespace(
+        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}),
+        recording=lambda: recording,
+        channel_names=lambda: frozenset(channels),
+    )
+
+
+def material(rig: BlindRig) -> Material:
+    """What a method gets of such a recording."""
+    axis = {"name": "axis", "kind": "linear"} if rig.is_linear else {"name": "axis"}
+    bench = Bench.model_validate({"name": "blind", "axis": axis})
+    return Material(bench, (cast("Any", recorded(rig)),))
+
+
+def by_inverse_dynamics(rig: BlindRig) -> Identified:
+    """As `campaign identify --model inverse_dynamics` does."""
+    method = inverse_dynamics.METHOD
+    return method.identify(material(rig), method.options())
+
+
+def by_whole_model(rig: BlindRig) -> Identified:
+    """The model that can be right: Stribeck friction by direction; one start."""
+    method = whole_model.METHOD
+    return method.identify(material(rig), method.options(model=MODEL, starts=1))
+
+
+def told(method: Callable[[BlindRig], Identified], rig: BlindRig, number: int) -> list[Told]:
+    """Every number of a rig against its truth; nothing where the method refused."""
+    try:
+        found = method(rig)
+    except ValueError as error:
+        print(f"rig {number} refused: {error}")
+        return []
+    made = []
+    for each in found.parameters:
+        name, one = each.estimate.name, each.estimate
+        if name not in NAMES and name not in NOWHERE:
+            continue
+        low, high = one.combined
+        if low is None or high is None:
+            made.append(Told(number, name, None, math.nan, math.nan, bool(each.bench)))
+            continue
+        truth = rig.truth.get(name)
+        held = truth is not None and low <= truth <= high
+        size = abs(truth) if truth else math.nan
+        error = (one.value - (truth or 0.0)) / one.half_width
+        made.append(Told(number, name, held, one.half_width / size, error, bool(each.bench)))
+    return made
+
+
+def _inverse(job: tuple[int, BlindRig]) -> list[Told]:
+    return told(by_inverse_dynamics, job[1], job[0])
+
+
+def _whole(job: tuple[int, BlindRig]) -> list[Told]:
+    return told(by_whole_model, job[1], job[0])
+
+
+def rows(method: str, found: Iterable[Told]) -> Iterator[list[str]]:
+    """One row for each number."""
+    by_name: dict[str, list[Told]] = defaultdict(list)
+    for each in found:
+        by_name[each.name].append(each)
+    for name in (*NAMES, *NOWHERE):
+        if name not in by_name:
+            continue
+        judged = [each for each in by_name[name] if each.held is not None]
+        held = [each for each in judged if each.held]
+        none = len(by_name[name]) - len(judged)
+        words = name.replace("_", " ")
+        if not judged:
+            yield [method, words, "0 of 0", "", str(none), ""]
+            continue
+        share = binomtest(len(held), len(judged)).proportion_ci(0.95)
+        width = sorted(each.width for each in judged)[len(judged) // 2]
+        yield [
+            method,
+            words,
+            f"{len(held)} of {len(judged)}",
+            f"{100 * share.low:.0f} to {100 * share.high:.0f} %",
+            str(none),
+            f"{100 * width:.2g} %" if math.isfinite(width) else "",
+        ]
+
+
+def missed(method: str, found: Iterable[Told], rigs: Sequence[BlindRig]) -> Iterator[str]:
+    """What kind of rig each interval missed is of."""
+    for each in found:
+        if each.held is False:
+            facts = ", ".join(
+                f"{k} {v:.3g}" if isinstance(v, float) else f"{v}"
+                for k, v in rigs[each.rig].facts.items()
+            )
+            far = f"{each.error:+.2f} half-widths"
+            yield f"{method}: rig {each.rig}, {each.name} {far} ({facts})"
+
+
+def write(text: str, page: str = "identification.md", name: str = "coverage") -> None:
+    """Replace what stands between `<!-- coverage -->` and `<!-- /coverage -->`."""
+    path = DOCS / page
+    whole = path.read_text(encoding="utf-8")
+    before, begin, rest = whole.partition(f"<!-- {name} -->\n")
+    _, end, after = rest.partition(f"<!-- /{name} -->")
+    if not begin or not end:
+        raise ValueError(f"{path} has no section {name}")
+    path.write_text(f"{before}{begin}{text.strip()}\n{end}{after}", encoding="utf-8")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--rigs", type=int, default=100, help="for inverse dynamics")
+    parser.add_argument("--whole", type=int, default=24, help="of these, for whole models")
+    parser.add_argument("--seed", type=int, default=4711)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--write", action="store_true", help="into docs/identification.md")
+    options = parser.parse_args()
+    rigs = blind_rigs(options.rigs, options.seed)
+    jobs = list(enumerate(rigs))
+    with ProcessPoolExecutor(options.workers) as pool:
+        inverse = [one for each in pool.map(_inverse, jobs) for one in each]
+        whole = [one for each in pool.map(_whole, jobs[: options.whole]) for one in each]
+    sent = [each for each in inverse if each.to_bench and each.name not in ("inertia", "delay")]
+    made = [
+        *rows("`inverse_dynamics`", inverse),
+        *rows("the same, of what goes to a bench file", sent),
+        *rows("`whole_model`", whole),
+    ]
+    headings = ["method", "number", "hold", "95 % interval of that", "without", "half-width"]
+    text = table(headings, made)
+    print(text)
+    for line in (*missed("inverse", inverse, rigs), *missed("whole", whole, rigs)):
+        print(line)
+    if options.write:
+        write(text)
+
+
+if __name__ == "__main__":
+    main()
