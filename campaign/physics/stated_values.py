@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.physics.bench import Bench
 from campaign.physics.known import NORMAL_95, number_at
 from campaign.physics.true_values import true_value
@@ -24,8 +24,9 @@ def stated_value(
     """The number (SI) that the bench's own values come to, with the interval that they give it.
 
     To first order in the stated standard uncertainties, with the stated correlations (GUM 5.1.2,
-    5.2.2). None where the bench has no such number, or where one of the values of friction that it
-    comes from has no stated uncertainty: the interval would leave that out.
+    5.2.2); *measured* where all that it comes from was, else *given*. None where the bench has no
+    such number, or where one of the values of friction that it comes from has no stated
+    uncertainty: the interval would leave that out.
 
     Args:
         quantity, conditions: as of a finding (`true_value`).
@@ -35,6 +36,7 @@ def stated_value(
     if value is None:
         return None
     effects: dict[str, float] = {}
+    origins = set()
     for path in dict.fromkeys((*_of_friction(bench), *bench.known.values)):
         found = number_at(bench, path)
         if found is None:
@@ -47,6 +49,7 @@ def stated_value(
         if other is None or sigma is None:
             return None
         effects[path] = other - value
+        origins.add(bench.known.values[path].origin)
     if not effects:
         return None
     sigma = math.sqrt(_variance(effects, bench))
@@ -58,6 +61,7 @@ def stated_value(
         value + NORMAL_95 * sigma,
         LEVEL,
         "stated in the bench file",
+        origin=Origin.MEASURED if origins == {"measured"} else Origin.GIVEN,
         standard_error=sigma,
     )
 

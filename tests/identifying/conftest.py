@@ -81,14 +81,6 @@ def results(tmp_path_factory: pytest.TempPathFactory, rig: Rig) -> Path:
         write(folder / f"{name}.csv", rig, part, shift)
     mapping = MAPPING + "".join(TEST.format(name=name) for name in parts)
     (folder / "rig-mapping.toml").write_text(mapping, encoding="utf-8")
-    code = import_recordings(
-        [str(folder / "rig-mapping.toml")],
-        folder / "results",
-        only=(),
-        changes=(),
-        workers=1,
-        report=False,
-        sign=None,
-    )
+    code = import_recordings([str(folder / "rig-mapping.toml")], folder / "results")
     assert code is ExitCode.DONE
     return folder / "results"

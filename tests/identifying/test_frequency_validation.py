@@ -12,10 +12,11 @@ import pytest
 from campaign.archive import ArchivedTrial
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
+from campaign.errors import UsageError
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
-from campaign.identifying.material import choose
+from campaign.identifying.material import Chosen, choose
 from campaign.identifying.method import Identified, Material
 from campaign.identifying.page import write_identification
 from campaign.physics.bench import Bench
@@ -38,12 +39,16 @@ from tests.identifying.test_frequency_response_method import (
 
 
 def run_of(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> list[ArchivedTrial]:
-    """An archive of multisines of its own phases."""
+    """Trials of an archive of multisines of its own phases."""
+    return list(chosen(folder, answer, first, count).trials)
+
+
+def chosen(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> Chosen:
     folder.mkdir()
     commands = [random_phases(GRID, 5.0, first + k) for k in range(count)]
     made = trials(folder, commands, "torque", 16.0)
     path = archived(folder / "results", [(each, answered(each, answer)) for each in made])
-    return list(choose(path.parent, path.name).trials)
+    return choose(path.parent, path.name)
 
 
 def held(own: Sequence[ArchivedTrial], unseen: Sequence[ArchivedTrial]) -> Identified:
@@ -95,9 +100,11 @@ def test_a_drive_that_has_changed_is_not_predicted(
 
 
 def test_the_same_samples_are_refused_whatever_run_they_are_in(tmp_path: Path) -> None:
-    own, again = run_of(tmp_path / "a", driven()), run_of(tmp_path / "b", driven())
-    with pytest.raises(ValueError, match="has the samples of a trial that the model is fitted to"):
-        held(own, again)
+    own = chosen(tmp_path / "a", driven())
+    again = chosen(tmp_path / "b", driven(), count=8)  # of which one is new
+    assert own.run.identity != again.run.identity
+    with pytest.raises(UsageError, match="the same samples as"):
+        identify(own, methods(), models=("frequency_response",), validation=again)
 
 
 def test_the_same_phases_are_told(tmp_path: Path) -> None:

@@ -184,9 +184,7 @@ def test_a_recording_that_was_imported_twice_is_not_held_against_itself(
     mapping = (results.parent / "rig-mapping.toml").read_text(encoding="utf-8")
     again = results.parent / "again.toml"
     again.write_text(mapping.replace("made up", "imported again"), encoding="utf-8")
-    code = import_recordings(
-        [str(again)], tmp_path, only=("monday",), changes=(), workers=1, report=False, sign=None
-    )
+    code = import_recordings([str(again)], tmp_path, only=("monday",))
     assert code is ExitCode.DONE
     other = choose(tmp_path, next(tmp_path.glob("*.nxs")).stem)
     one = choose(results, f"{run}:monday")

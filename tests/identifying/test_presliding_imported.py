@@ -74,15 +74,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
             f'\n[[test.recording]]\nfile = "{name}.csv"\n'
         )
     (folder / "small.toml").write_text(mapping, encoding="utf-8")
-    code = import_recordings(
-        [str(folder / "small.toml")],
-        folder / "results",
-        only=(),
-        changes=(),
-        workers=1,
-        report=False,
-        sign=None,
-    )
+    code = import_recordings([str(folder / "small.toml")], folder / "results")
     assert code is ExitCode.DONE
     return folder / "results"
 

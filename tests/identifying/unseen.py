@@ -50,9 +50,13 @@ def imported(
     count = len(next(iter(columns.values()))[1])
     table = np.column_stack([np.arange(count) / rate, *(each for _, each in columns.values())])
     np.savetxt(
-        folder / f"{name}.csv", table, delimiter=",", header=",".join(["t", *columns]), comments="",
+        folder / f"{name}.csv",
+        table,
+        delimiter=",",
+        header=",".join(["t", *columns]),
+        comments="",
         fmt="%.9g",
-    )  # fmt: skip
+    )
     axis = f'schema = 3\nname = "rig"\n[axis]\nname = "axis"\nkind = "{kind}"\n'
     (folder / "rig.toml").write_text(axis + bench, encoding="utf-8")
     text = HEAD + '[columns.a.time]\ncolumn = "t"\nunit = "s"\n'
@@ -62,10 +66,7 @@ def imported(
     text += f'[[test]]\nname = "{name}"\nkind = "motion"\nbench = "./rig.toml"\n{test}'
     text += f'[[test.recording]]\nfile = "{name}.csv"\n'
     (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-    code = import_recordings(
-        [str(folder / f"{name}.toml")], folder / f"results-{name}",
-        only=(), changes=(), workers=1, report=False, sign=None,
-    )  # fmt: skip
+    code = import_recordings([str(folder / f"{name}.toml")], folder / f"results-{name}")
     assert code is ExitCode.DONE
     return folder / f"results-{name}"
 

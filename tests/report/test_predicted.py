@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment, TestData
 from campaign.physics.bench import Bench
+from campaign.physics.bench_fingerprint import fingerprint
 from campaign.protocol.problems import find_faults
 from campaign.report.build import render
 from campaign.report.content.document import Document, document_of
@@ -20,10 +22,12 @@ from campaign.result import Finding, Result
 CONDITIONS = {"direction": "positive"}
 
 
-def bench(known: bool = True) -> Bench:
+def bench(
+    known: bool = True, origin: str = "measured", coulomb: str = "16 N m", **more: Any
+) -> Bench:
     values = {
-        "friction.load.coulomb_torque": {"standard_uncertainty": "0.2 N m", "origin": "measured"},
-        "axis.inertia": {"standard_uncertainty": "0.1 kg m^2", "origin": "measured"},
+        "friction.load.coulomb_torque": {"standard_uncertainty": "0.2 N m", "origin": origin},
+        "axis.inertia": {"standard_uncertainty": "0.1 kg m^2", "origin": origin},
     }
     made = find_faults(
         Bench,
@@ -33,7 +37,7 @@ def bench(known: bool = True) -> Bench:
             "friction": {
                 "load": {
                     "model": "stribeck",
-                    "coulomb_torque": "16 N m",
+                    "coulomb_torque": coulomb,
                     "static_torque": "20 N m",
                     "stribeck_velocity": "0.03 rad/s",
                     "viscous_friction": "4 N m s/rad",
@@ -47,6 +51,7 @@ def bench(known: bool = True) -> Bench:
                     "program": "campaign",
                     "command": "campaign identify monday",
                 },
+                **more,
             },
         },
     )
@@ -85,19 +90,19 @@ def test_what_has_changed_is_named_with_its_size(made_up: ModuleType, tmp_path: 
         found("coulomb_torque", 18.4, 0.2, "N m"),
         found("inertia", 2.01, 0.05, "kg m^2"),
     )
-    rows = document.predictions["breakaway"].rows
-    assert [row["verdict"] for row in rows] == ["changed", "no change shown"]
+    rows = document.predictions["breakaway"].table.rows
+    assert [row["verdict"] for row in rows] == ["differs", "no difference shown"]
     assert rows[0]["difference"].value == pytest.approx(2.4)
     (answer,) = document.opening.answers
     assert answer.prediction == (
         "1 of 2 numbers changed since they were identified: "
         "Coulomb friction Tc (direction positive) by +15 % (+12 to +18 %)"
     )
-    assert "monday" in document.predictions["breakaway"].note
+    assert "monday" in document.predictions["breakaway"].table.note
     page, folder, _ = render(run, tmp_path, kinds, templates_folder())  # type: ignore[arg-type]
     assert answer.prediction in page
     assert "Identified before, and found now" in page
-    assert "tables/breakaway-identified.csv" in folder.files
+    assert "tables/breakaway-stated.csv" in folder.files
 
 
 def test_what_agrees_is_not_called_the_same(made_up: ModuleType, tmp_path: Path) -> None:
@@ -118,8 +123,41 @@ def test_of_repeated_measurements_the_mean_is_judged(made_up: ModuleType, tmp_pa
     ]
     findings.append(Finding.of(mean, {**CONDITIONS, "statistic": "mean"}))
     *_, document = analysed(made_up, tmp_path, findings=findings)
-    (row,) = document.predictions["breakaway"].rows
-    assert (row["found"], row["verdict"]) == (findings[-1].known, "changed")
+    (row,) = document.predictions["breakaway"].table.rows
+    assert (row["found"], row["verdict"]) == (findings[-1].known, "differs")
+
+
+def test_a_mean_stands_for_its_own_place_only(made_up: ModuleType, tmp_path: Path) -> None:
+    """At the second preload there was one measurement, and no mean."""
+    one = found("coulomb_torque", 17.0, 0.1, "N m")
+    places = ({"preload": 1.0, "statistic": "mean"}, {"preload": 1.0, "measurement": 1})
+    elsewhere = {"preload": 2.0, "measurement": 2}
+    findings = [Finding.of(one, {**CONDITIONS, **each}) for each in (*places, elsewhere)]
+    *_, document = analysed(made_up, tmp_path, findings=findings)
+    rows = document.predictions["breakaway"].table.rows
+    assert ["preload 2" in str(row["conditions"]) for row in rows] == [False, True]
+
+
+def test_what_nobody_identified_is_not_told_as_changed(made_up: ModuleType, tmp_path: Path) -> None:
+    told = found("coulomb_torque", 18.4, 0.2, "N m")
+    *_, document = analysed(made_up, tmp_path, told, rig=bench(origin="given"))
+    said = document.opening.answers[0].prediction
+    assert said.startswith("1 of 1 numbers differ from what the bench file states: Coulomb")
+    assert document.predictions["breakaway"].table.title == "Stated by the bench, and found"
+    assert "monday" not in document.predictions["breakaway"].table.note
+
+
+def test_what_was_said_of_another_bench_is_compared_with_nothing(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    """A test that sweeps friction, and a hand that edits it, leave the old interval behind."""
+    stated = fingerprint(bench()).model_dump(mode="json")
+    told = found("coulomb_torque", 18.4, 0.2, "N m")
+    *_, same = analysed(made_up, tmp_path, told, rig=bench(fingerprint=stated))
+    assert same.predictions
+    edited = bench(coulomb="18 N m", fingerprint=stated)
+    *_, other = analysed(made_up, tmp_path, told, rig=edited)
+    assert other.predictions == {}
 
 
 def test_a_number_without_interval_is_shown_and_not_judged(
@@ -127,8 +165,8 @@ def test_a_number_without_interval_is_shown_and_not_judged(
 ) -> None:
     open_one = Estimate.without_interval("coulomb_torque", 18.4, "N m", "a single run")
     *_, document = analysed(made_up, tmp_path, open_one)
-    (row,) = document.predictions["breakaway"].rows
-    assert row["verdict"] not in ("changed", "no change shown")
+    (row,) = document.predictions["breakaway"].table.rows
+    assert row["verdict"] not in ("differs", "no difference shown")
     assert document.opening.answers[0].prediction == ""
 
 

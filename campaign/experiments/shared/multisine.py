@@ -16,6 +16,7 @@ import numpy as np
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.choices import Choices, nice
 from campaign.experiments.shared.rig import Rig
+from campaign.identification.excitation_design.passage import first_passage
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.loop import at_load
@@ -64,20 +65,12 @@ def _course(count: int, phases: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, A
     spectrum = np.zeros(points // 2 + 1, dtype=complex)
     spectrum[1 : 2 * count : 2] = np.exp(1j * (phases - 0.5 * np.pi))
     course = np.fft.irfft(spectrum, points) * points / 2.0
-    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
     odd = 2.0 * np.arange(count) + 1.0
 
     def value(share: float) -> float:
         return float(np.sum(np.sin(2.0 * np.pi * odd * share + phases)))
 
-    low, high = index / points, (index + 1) / points
-    for _ in range(60):  # bisection
-        middle = 0.5 * (low + high)
-        if value(low) * value(middle) <= 0.0:
-            high = middle
-        else:
-            low = middle
-    return course, 0.5 * (low + high)
+    return course, first_passage(course, value)
 
 
 def first_slip(bench: Bench) -> tuple[float, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from campaign.identification.excitation_design.passage import first_passage
 from campaign.identification.frequency.multisine import Lines, OddGrid, random_phases
 from campaign.identification.inverse.motion import Array
 from campaign.signals import MultiSine
@@ -82,18 +83,10 @@ def _begun(lines: Lines, phases: Array, order: int) -> Array:
     """The same signal from where its `order`-th integral first passes zero."""
     count = POINTS * int(lines[-1])
     course = _course(lines, phases, count, 1.0, order)
-    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
     size = 1.0 / lines.astype(float) ** order
 
     def value(share: float) -> float:
         turned = 2.0 * np.pi * lines * share + phases - 0.5 * np.pi * order
         return float(np.sum(size * np.sin(turned)))
 
-    low, high = index / count, (index + 1) / count
-    for _ in range(60):  # bisection
-        middle = 0.5 * (low + high)
-        if value(low) * value(middle) <= 0.0:
-            high = middle
-        else:
-            low = middle
-    return np.asarray((phases + np.pi * (low + high) * lines) % (2.0 * np.pi))
+    return np.asarray((phases + 2.0 * np.pi * first_passage(course, value) * lines) % (2.0 * np.pi))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.identification.excitation_design.passage import first_passage
 from campaign.identification.frequency.multisine import Lines
 from campaign.identification.inverse.motion import Array
 
@@ -51,16 +52,8 @@ def _passage(spectrum: Spectrum, lines: Lines, count: int) -> float:
     whole = np.zeros(count // 2 + 1, dtype=complex)
     whole[lines] = spectrum
     course = np.fft.irfft(whole, count)
-    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
 
     def value(share: float) -> float:
         return float(np.real(np.sum(spectrum * np.exp(2j * np.pi * lines * share))))
 
-    low, high = index / count, (index + 1) / count
-    for _ in range(60):  # bisection
-        middle = 0.5 * (low + high)
-        if value(low) * value(middle) <= 0.0:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
+    return first_passage(course, value)

@@ -1,12 +1,13 @@
-"""Coefficients of an inverse dynamic model whose terms are known, with what scatter and band do.
+"""Coefficients of an inverse dynamic model as estimates: scatter, and what other rows would say.
 
-Where terms and delay are to be found as well, `campaign.identifying.inverse` does that.
+`coefficients` is for terms that are known and a force that is not late. Where terms and delay are
+to be found as well, `campaign.identifying.inverse` does that, with the same two steps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +37,18 @@ def coefficients(
     parts = {"band": filtering.half_band}
     if filtering.slowest > 0.0:
         parts["slow rows"] = replace(filtering, slowest=FASTER * filtering.slowest)
-    moved = {name: _moved(fit, motions, terms, each) for name, each in parts.items()}
+    moved = {name: shifts(fit, motions, terms, each) for name, each in parts.items()}
+    return fit, estimates(fit, terms, moved)
+
+
+def estimates(
+    fit: Regression, terms: Sequence[Term], parts: Mapping[str, Array | None]
+) -> dict[str, Estimate]:
+    """Of a regression, by the names of its terms: scatter with autocorrelation.
+
+    parts: sources of systematic parts, and how far each shifts the coefficients, shape (k,); None
+        where that is not known.
+    """
     found = {}
     for index, term in enumerate(terms):
         value, error = float(fit.values[index]), float(fit.robust[index])
@@ -49,18 +61,25 @@ def coefficients(
             term.name, value, term.unit, value - wide, value + wide, LEVEL, METHOD,
             standard_error=error, freedom=fit.freedom,
         )  # fmt: skip
-        for name, shifts in moved.items():
-            one = shifted_by(one, name, None if shifts is None else float(shifts[index]))
+        for source, far in parts.items():
+            one = shifted_by(one, source, None if far is None else float(far[index]))
         found[term.name] = one
-    return fit, found
+    return found
 
 
-def _moved(
-    fit: Regression, motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering
+def shifts(
+    fit: Regression,
+    motions: Sequence[Motion],
+    terms: Sequence[Term],
+    filtering: Filtering,
+    delay: float = 0.0,
 ) -> Array | None:
-    """How far coefficients go with rows made otherwise, shape (k,); None where they tell none."""
+    """How far coefficients go with rows made otherwise, shape (k,); None where they tell none.
+
+    delay: by which the force is late in these rows (s).
+    """
     try:
-        other = regress([rows(motion, terms, filtering) for motion in motions])
+        other = regress([rows(motion, terms, filtering, delay) for motion in motions])
     except ValueError:
         return None
     return np.asarray(np.abs(other.values - fit.values))

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.identification.inverse.choosing import Structure, choose, structure
+from campaign.identification.inverse.coefficients import estimates, shifts
 from campaign.identification.inverse.delay import find_delay
-from campaign.identification.inverse.motion import Array, Filtering, Motion
+from campaign.identification.inverse.motion import Filtering, Motion
 from campaign.identification.inverse.position_period import find_period
-from campaign.identification.inverse.regression import Regression, regress
+from campaign.identification.inverse.regression import Regression
 from campaign.identification.inverse.rows import all_rows, rows
 from campaign.identification.inverse.simulation import relative_rate_error
 from campaign.identification.inverse.terms import (
@@ -34,7 +34,6 @@ from campaign.identifying.inverse.instrumented import (
 )
 from campaign.identifying.inverse.motions import Moved, never_moved
 
-HAC = "least squares; deviation with autocorrelation (Newey and West)"
 ROUNDS = 4
 """Most times that terms are chosen at a delay, and the delay is found anew with them."""
 BENDS = "friction bends over these rates: it is one share of a sum, and nothing by itself"
@@ -291,29 +290,14 @@ def _estimates(
     """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
     fit, terms = best.structure.fit, best.structure.terms
     parts = {
-        "band": _shift(motions, terms, filtering.half_band, best.delay, fit),
-        "slow": _shift(motions, terms, filtering.faster, best.delay, fit),
+        "band": shifts(fit, motions, terms, filtering.half_band, best.delay),
+        "slow": shifts(fit, motions, terms, filtering.faster, best.delay),
     }
     if late.origin is not Origin.GIVEN:
-        parts["delay"] = _shift(
-            motions, terms, filtering, best.delay + _doubt(best, late, motions[0]), fit
+        parts["delay"] = shifts(
+            fit, motions, terms, filtering, best.delay + _doubt(best, late, motions[0])
         )
-    found = {}
-    for index, term in enumerate(terms):
-        value, error = float(fit.values[index]), float(fit.robust[index])
-        half = fit.quantile * error
-        if fit.freedom < 1.0 or not math.isfinite(half):
-            reason = "what is left over is worth too few independent rows"
-            found[term.name] = Estimate.without_interval(term.name, value, term.unit, reason)
-            continue
-        one = Estimate(
-            term.name, value, term.unit, value - half, value + half, LEVEL, HAC,
-            standard_error=error, freedom=fit.freedom,
-        )  # fmt: skip
-        for source, shifts in parts.items():
-            one = shifted_by(one, source, None if shifts is None else float(shifts[index]))
-        found[term.name] = one
-    return found
+    return estimates(fit, terms, parts)
 
 
 def _without_shares(
@@ -342,18 +326,3 @@ def _doubt(best: Tried, late: Estimate, motion: Motion) -> float:
     if best.delay == 0.0 or math.isnan(late.half_width):
         return 1.0 / motion.sample_rate
     return late.half_width / NORMAL_95
-
-
-def _shift(
-    motions: Sequence[Motion],
-    terms: Sequence[Term],
-    filtering: Filtering,
-    delay: float,
-    fit: Regression,
-) -> Array | None:
-    """How far each coefficient goes with another band or delay, shape (k,); None: nowhere."""
-    try:
-        other = regress([rows(motion, terms, filtering, delay) for motion in motions])
-    except ValueError:
-        return None
-    return np.asarray(np.abs(other.values - fit.values))

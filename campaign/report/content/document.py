@@ -24,7 +24,7 @@ from campaign.published.values import Published
 from campaign.recording import Outcome
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.opening import Opening, opening_of
-from campaign.report.content.predicted import predicted_tables
+from campaign.report.content.predicted import Predicted, predicted
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables
 from campaign.result import Table
@@ -50,7 +50,7 @@ class Document:
     published: Published
     scoreboard: Scoreboard
     truths: Mapping[str, Table]
-    predictions: Mapping[str, Table]
+    predictions: Mapping[str, Predicted]
     incidents: Incidents
     opening: Opening
     damaged: tuple[Damage, ...]
@@ -123,7 +123,7 @@ def document_of(
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = truth_tables(run, tests)
-    predictions = predicted_tables(run, tests)
+    predictions = predicted(run, tests)
     return Document(
         run,
         tests,

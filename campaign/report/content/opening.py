@@ -11,7 +11,7 @@ from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.published.headline import NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
-from campaign.report.content.predicted import told_of_changes
+from campaign.report.content.predicted import Predicted
 from campaign.report.content.truth import biases, held
 from campaign.report.content.wrong import wrong_with
 from campaign.result import Factor, Figure, Result, Table
@@ -109,7 +109,7 @@ def opening_of(
     tests: Sequence[AnalysedTest],
     scoreboard: Scoreboard,
     truths: Mapping[str, Table],
-    predictions: Mapping[str, Table],
+    predictions: Mapping[str, Predicted],
     damaged: Sequence[Damage] = (),
 ) -> Opening:
     """The opening of a run's report; `damaged` is all damage that the report met."""
@@ -179,7 +179,7 @@ def _in_short(chosen: Sequence[Answer]) -> Group:
     return Group("", tuple(answers), tuple(told))
 
 
-def _answer(test: AnalysedTest, truth: Table | None, prediction: Table | None) -> Answer:
+def _answer(test: AnalysedTest, truth: Table | None, prediction: Predicted | None) -> Answer:
     result = test.result
     said = tuple(sentence(each) for each in result.conclusions)
     figure = _figure(result)
@@ -190,7 +190,7 @@ def _answer(test: AnalysedTest, truth: Table | None, prediction: Table | None) -
         "" if figure is None else figure.key,
         tuple(remarks(result.conclusions)),
         "" if truth is None else _held(truth),
-        "" if prediction is None else told_of_changes(prediction.rows),
+        "" if prediction is None else prediction.told,
         test.problem or ("" if said else _nothing(test)),
         test.kind.replace("_", " "),
         tuple(remarks(result.conclusions[:1])),

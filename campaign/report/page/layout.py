@@ -190,7 +190,8 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
         mine = [n for n in published if n in test.reproduces and n not in spoken]
         spoken.update(mine)
         tables_ = [published[n] for n in mine]
-        expected = (document.truths.get(test.name), document.predictions.get(test.name))
+        stated = document.predictions.get(test.name)
+        expected = (document.truths.get(test.name), stated.table if stated else None)
         sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
     return tuple(sections)
 
