@@ -108,6 +108,7 @@ def test_what_is_found_is_waited_for_when_it_is_asked_for(
 
     monkeypatch.setattr(processes.ProcessPoolExecutor, "submit", begin)
     with workers(open_run(archive), 2) as two:
+        assert len(begun) == 2  # at once: nobody has asked for anything yet
         found = two.found
         assert len(begun) == 2
         for each in begun:
