@@ -58,15 +58,20 @@ def remarks(conclusions: Iterable[Conclusion]) -> Iterator[str]:
         yield f"Without an interval: {'; '.join(without)}."
     for reason in dict.fromkeys(e.reason for e in found if e.has_interval and e.reason):
         yield f"{reason[:1].upper()}{reason[1:]}."
+    if any(_narrow(each) for each in found if each.has_interval):
+        yield "Where a number stands without an interval, that is narrower than its digits."
+    yield from of_unknown_size(found)
+
+
+def of_unknown_size(estimates: Iterable[Estimate]) -> Iterator[str]:
+    """The sentence on what no interval of theirs has in it; none where there is nothing."""
     unknown = dict.fromkeys(
         each.source
-        for estimate in found
+        for estimate in estimates
         if estimate.has_interval
         for each in estimate.systematic
         if each.standard_uncertainty is None
     )
-    if any(_narrow(each) for each in found if each.has_interval):
-        yield "Where a number stands without an interval, that is narrower than its digits."
     if unknown:
         yield f"Of unknown size, and in no interval: {', '.join(unknown)}."
 

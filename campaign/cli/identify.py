@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rich.text import Text
 
+from campaign.access.sentences import of_unknown_size
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
@@ -187,6 +188,8 @@ def _tell(section: Section) -> None:
         for each in section.parameters
     ]
     print_table(("parameter", "value, 95 %", "unit", "key of the bench"), rows)
+    for remark in of_unknown_size(each.estimate for each in section.parameters):
+        _wrapped(remark)
 
 
 def _wrapped(text: str) -> None:

@@ -12,7 +12,7 @@ from campaign import __version__
 from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
-from campaign.access.sentences import sentence
+from campaign.access.sentences import remarks, sentence
 from campaign.axis_kind import speaking_of
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
@@ -48,6 +48,7 @@ class ShownSection:
     anchor: str
     section: Section
     conclusions: tuple[str, ...]
+    remarks: tuple[str, ...]
     figures: tuple[ShownFigure, ...]
     tables: tuple[ShownTable, ...]
     changes: ShownTable | None
@@ -168,6 +169,7 @@ def _section(
         anchor=f"method-{name.replace('_', '-')}",
         section=section,
         conclusions=tuple(sentence(each) for each in result.conclusions),
+        remarks=tuple(remarks(result.conclusions)),
         figures=tuple(figures),
         tables=tuple(tables),
         changes=changes,

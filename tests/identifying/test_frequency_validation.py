@@ -252,8 +252,8 @@ def test_a_linear_bench_has_masses_in_its_own_units(tmp_path: Path) -> None:
         (str(row["source"]), row["model"]): row["verdict"]
         for row in table(section.identified, "validation").rows
     }
-    assert verdicts["shaken, force, rms 300", "two masses"] == "as closely as scatter allows"
-    assert "times the square" in str(verdicts["shaken, force, rms 150", "two masses"])
+    assert verdicts["shaken, force, rms 300 N", "two masses"] == "as closely as scatter allows"
+    assert "times the square" in str(verdicts["shaken, force, rms 150 N", "two masses"])
     assert any("before the force" in note for note in result.notes)
     page = write_identification(found, tmp_path / "page", templates_folder(), "campaign identify")
     text = page.read_text(encoding="utf-8")

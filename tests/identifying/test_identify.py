@@ -5,19 +5,24 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from campaign.cli.identify import identify_run
+from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
+from campaign.estimate import Systematic
 from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
 from campaign.identifying.material import choose
+from campaign.identifying.page import write_identification
 from campaign.identifying.tables import parameters_table
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
+from campaign.resources import templates_folder
+from campaign.result import Amount, Conclusion
 from tests.identification.coverage import holds
 from tests.identification.rigs import Rig
 
@@ -47,6 +52,26 @@ def test_parameters_hold_the_rig(found: Identification, rig: Rig) -> None:
         assert told[name].half_width < 0.2 * told[name].value
     assert told["inertia"].unit == "kg"  # of an axis that travels
     assert told["coulomb_positive"].unit == "N"
+
+
+def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
+    found: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A narrow interval beside a doubt of unknown size is no interval that holds."""
+    (section,) = found.sections
+    assert section.identified is not None
+    first, *rest = section.identified.parameters
+    doubt = Systematic("friction, at this excitation")
+    doubted = replace(first, estimate=replace(first.estimate, systematic=(doubt,)))
+    said = Conclusion(("It has an inertia of ", Amount(doubted.estimate), "."))
+    result = replace(section.identified.result, conclusions=(said,))
+    own = replace(section.identified, parameters=(doubted, *rest), result=result)
+    told = replace(found, sections=(replace(section, identified=own),))
+    remark = "Of unknown size, and in no interval: friction, at this excitation."
+    page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
+    assert remark in page.read_text(encoding="utf-8")
+    _say(told)
+    assert remark in " ".join(capsys.readouterr().out.split())
 
 
 def test_unseen_motion_is_predicted(found: Identification) -> None:

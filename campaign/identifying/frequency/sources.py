@@ -111,7 +111,7 @@ def _key(trial: ArchivedTrial, how: Reading) -> tuple[str, ...]:
         return ("sines", *common)
     if isinstance(command, MultiSine) and task.mode in ("rate", "torque"):
         period = _period(command, task.duration)
-        rms = np.sqrt(0.5 * np.sum(np.square(command.amplitudes)))
+        rms = _rms(command)
         if period is not None:
             lines = ",".join(f"{each * period:.0f}" for each in command.frequencies)
             return ("multisine", *common, f"{rms:.3g}", lines, f"{period:.9g}")
@@ -133,7 +133,8 @@ def _label(group: Sequence[ArchivedTrial]) -> str:
     if first.task.compensation != "none":
         told.append(first.task.compensation)
     if isinstance(command, MultiSine):
-        told.append(f"rms {np.sqrt(0.5 * np.sum(np.square(command.amplitudes))):.3g}")
+        rms = _rms(command)
+        told.append(f"rms {rate_here(rms) if mode == 'rate' else f'{rms:.3g} N·m'}")
     return ", ".join(told)
 
 
@@ -267,8 +268,11 @@ def _named(best: BestLinear, trial: ArchivedTrial) -> str:
     command = trial.trial.task.command
     if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
         return torque
-    rms = float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
-    return f"{torque}, of a rate of rms {rate_here(rms)} that was asked for"
+    return f"{torque}, of a rate of rms {rate_here(_rms(command))} that was asked for"
+
+
+def _rms(command: MultiSine) -> float:
+    return float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
 
 
 def _loop_of(

@@ -288,7 +288,7 @@ def validation_conclusions(validation: Validation) -> Iterator[Conclusion]:
     for name in dict.fromkeys(each.model.name for each in validation.predictions):
         some = [each for each in validation.predictions if each.model.name == name]
         each = min(some, key=lambda one: apart(one.model.source, one.source))
-        told = f"The unseen response {each.source.name} is predicted by the {name} "
+        told = f"Unseen, {each.source.name}: the response is predicted by the {name} "
         parts: list[str | Amount] = [told + each.against.verdict]
         if each.output is not None:
             low, high = each.model.lowest, each.model.highest
