@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -21,11 +22,11 @@ from campaign.identifying.method import Identified, Parameter
 from campaign.identifying.tables import changes_table, parameters_table, words
 from campaign.plain_text import on_a_page
 from campaign.report.drawing.drawn import Drawn
-from campaign.report.drawing.figures import draw
+from campaign.report.drawing.figures import draw, series_of
 from campaign.report.output import replaced_folder
 from campaign.report.page.folder import Folder, ShownFigure, ShownTable
 from campaign.report.page.packaged import fill_packaged
-from campaign.report.palette import variables
+from campaign.report.palette import Look, looks_of_page, variables
 from campaign.result import Figure
 
 CURES = {
@@ -58,6 +59,8 @@ class ShownSection:
 class _Making:
     folder: Folder = field(default_factory=Folder)
     problems: list[str] = field(default_factory=list)
+    looks: Mapping[str, Look] = field(default_factory=dict)
+    """Of the series of all figures: the same series looks the same all over the page."""
 
     def attempt(self, what: str, make: Callable[[], T]) -> Iterator[T]:
         try:
@@ -75,7 +78,7 @@ def write_identification(
     bytes. Raises UsageError when `output` is something else than an identification.
     """
     refuse_foreign(output)
-    making = _Making()
+    making = _Making(looks=_looks(found))
     with speaking_of(found.bench.sides):
         parameters = parameters_table(found.sections)
         first = making.folder.shown_table(parameters, (), "parameters")  # as on the page
@@ -158,7 +161,7 @@ def _section(
     figures = [
         shown
         for figure in result.figures
-        for shown in making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, folder))
+        for shown in making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
     ]
     tables = [folder.shown_table(each, (), f"{name}-{each.key}") for each in result.tables]
     changes = None
@@ -176,10 +179,18 @@ def _section(
     )
 
 
-def _drawn(figure: Figure, name: str, folder: Folder) -> ShownFigure:
-    return folder.figure(
-        figure, Drawn.of(draw(figure), figure), (), f"{name}-{figure.key}", trials=figure.trials
-    )
+def _looks(found: Identification) -> Mapping[str, Look]:
+    series: list[list[str]] = []
+    for section in found.sections:
+        for figure in section.identified.result.figures if section.identified else ():
+            with suppress(Exception):  # a plug-in's, which is told where it is shown
+                series.append(series_of(figure))
+    return looks_of_page(series)
+
+
+def _drawn(figure: Figure, name: str, making: _Making) -> ShownFigure:
+    drawn = Drawn.of(draw(figure, chosen=making.looks), figure)
+    return making.folder.figure(figure, drawn, (), f"{name}-{figure.key}", trials=figure.trials)
 
 
 def as_json(found: Identification, command: str) -> str:

@@ -18,7 +18,7 @@ from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
 from campaign.identifying.material import Chosen, choose
 from campaign.identifying.method import Identified, Material
-from campaign.identifying.page import write_identification
+from campaign.identifying.page import _looks, write_identification
 from campaign.physics.bench import Bench
 from campaign.protocol import as_tree
 from campaign.resources import protocols_folder, templates_folder
@@ -280,3 +280,19 @@ def test_a_rigid_carriage_is_one_mass(tmp_path: Path, first: int) -> None:
     assert told["total_inertia"].estimate.half_width < 3.0
     assert not told["stiffness"].estimate.has_interval
     assert "one mass explains" in told["stiffness"].estimate.reason
+
+
+def test_a_model_has_one_colour_all_over_the_page(tmp_path: Path) -> None:
+    """It stands beside the measurement in one figure, and alone in another."""
+    found = identified(shaken(tmp_path / "a", 0), shaken(tmp_path / "b", 100))
+    write_identification(found, tmp_path / "page", templates_folder(), "campaign identify")
+    figures = sorted((tmp_path / "page" / "figures").glob("*.svg"))
+    told = {path.name: path.read_text(encoding="utf-8") for path in figures}
+    prediction = next(text for name, text in told.items() if "prediction-1" in name)
+    residuals = next(text for name, text in told.items() if "residuals-1" in name)
+    looks = _looks(found)
+    names = ("rational function", "two inertias")
+    assert len({looks[name].light for name in names}) == len(names)
+    for name in names:
+        assert looks[name].light in prediction
+        assert looks[name].light in residuals
