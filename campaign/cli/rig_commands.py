@@ -116,8 +116,18 @@ def trend(
         typer.Option(
             "--model",
             metavar="NAME",
-            help="Follow what this method identifies, too (`campaign kinds identify` lists them); "
+            help="Follow what this method identifies, too (`campaign kinds` lists them); "
             "may be given again.",
+            show_default=False,
+        ),
+    ] = None,
+    exchanged: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--exchanged",
+            metavar="SOURCE@RUN",
+            help="From this run on a systematic part is another piece's, although all benches say "
+            "the same: the `torque constant` of a motor that was exchanged; may be given again.",
             show_default=False,
         ),
     ] = None,
@@ -130,6 +140,8 @@ def trend(
     """Say which numbers of a rig drift or jump over its runs, or follow the temperature."""
     from campaign.cli.trend import trend_of_archives
 
-    page, code = trend_of_archives(runs, results, output, over, model or (), open_it=open_it)
+    page, code = trend_of_archives(
+        runs, results, output, over, model or (), exchanged or (), open_it=open_it
+    )
     typer.echo(page)
     raise typer.Exit(code)

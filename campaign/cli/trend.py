@@ -11,7 +11,7 @@ from pathlib import Path
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table
-from campaign.errors import ExitCode, worst_exit_code
+from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
 from campaign.identifying import methods
 from campaign.interrupts import unwinding
@@ -39,16 +39,23 @@ def trend_of_archives(
     output: Path | None,
     over: str,
     models: Sequence[str],
+    exchanged: Sequence[str] = (),
     *,
     open_it: bool,
 ) -> tuple[Path, ExitCode]:
-    """Follow the numbers of the runs that `names` mean; the page, and whether all was read."""
+    """Follow the numbers of the runs that `names` mean; the page, and whether all was read.
+
+    exchanged: `SOURCE@RUN`, a systematic part and the first run with another piece.
+    """
+    pieces = [_exchange(results, each) for each in exchanged]
     paths = [find_run(results, name) for name in names]
     runs = [open_run(path) for path in paths]
-    trends = follow(runs, experiments(), over, methods(), models)
+    trends = follow(runs, experiments(), over, methods(), models, pieces)
     last = trends.members[-1].run.path
     folder = output or last.with_name(f"{last.stem[:STEM]}-trend-over-{_slug(over)}")
-    page = write_trends(trends, folder, templates_folder(), _command(names, over, models))
+    page = write_trends(
+        trends, folder, templates_folder(), _command(names, over, models, exchanged)
+    )
     _tell(trends)
     for member in trends.members:
         for problem in member.problems:
@@ -62,13 +69,33 @@ def trend_of_archives(
     return page, worst_exit_code(codes)
 
 
-def _command(names: Sequence[str], over: str, models: Sequence[str]) -> str:
+def _exchange(results: Path, told: str) -> tuple[str, Path]:
+    source, at, run = told.rpartition("@")
+    if not (at and source.strip() and run.strip()):
+        raise UsageError(f'--exchanged {told!r}: say it as "torque constant@RUN"')
+    return source.strip(), find_run(results, run.strip())
+
+
+def _without_folder(told: str) -> str:
+    source, at, run = told.rpartition("@")
+    return f"{source}{at}{Path(run).name}"
+
+
+def _command(
+    names: Sequence[str], over: str, models: Sequence[str], exchanged: Sequence[str]
+) -> str:
     """What makes the same again; names of runs, and no folders of anybody."""
     shown = [Path(name).name for name in names]
     if len(shown) > NAMED:
         shown = [*shown[: NAMED - 1], "...", shown[-1]]
     return " ".join(
-        ["campaign trend", *shown, f"--over '{over}'", *(f"--model {name}" for name in models)]
+        [
+            "campaign trend",
+            *shown,
+            f"--over '{over}'",
+            *(f"--model {name}" for name in models),
+            *(f"--exchanged '{_without_folder(each)}'" for each in exchanged),
+        ]
     )
 
 

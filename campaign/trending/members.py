@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 
 from campaign.access.analysis import AnalysedTest, analyse_run, source_of
 from campaign.archive import RunReader
@@ -36,6 +37,7 @@ class Member:
         tests: without figures, of which 200 runs would have too many.
         constants: of the bench, by the name of the systematic part that they make; what is the
             same text in two runs is the same constant.
+        exchanged: those of them that are another piece's from this run on, whatever the bench says.
     """
 
     number: int
@@ -43,6 +45,7 @@ class Member:
     created: datetime
     tests: tuple[AnalysedTest, ...]
     constants: Mapping[str, str] = field(default_factory=dict)
+    exchanged: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -79,6 +82,44 @@ def members_of(
     return tuple(_member(n, run, experiments) for n, run in enumerate(begun, start=1))
 
 
+def with_exchanged(
+    members: Sequence[Member], exchanged: Sequence[tuple[str, Path]]
+) -> tuple[Member, ...]:
+    """The same runs, told what no bench file says.
+
+    exchanged: systematic parts, each with the path of the run from which on its piece was another
+        one of its kind: an error that runs before and behind do not have in common.
+
+    Raises UsageError for what is no constant of these runs, or none of the runs but the first.
+    """
+    for source, path in exchanged:
+        told = f"--exchanged {source}@{path.stem}"
+        known = dict.fromkeys(name for member in members for name in member.constants)
+        if source not in known:
+            raise UsageError(f"{told}: {source!r} is none of {', '.join(known) or 'nothing'}")
+        first = next((each.number for each in members if each.run.path == path), None)
+        if first is None:
+            raise UsageError(f"{told}: none of the runs that are followed")
+        if first == 1:
+            raise UsageError(f"{told}: the first run; name the first one with the new piece")
+        members = [
+            each if each.number < first else _with_another(each, source, first) for each in members
+        ]
+    return tuple(members)
+
+
+def _with_another(member: Member, source: str, first: int) -> Member:
+    if source not in member.constants:
+        return member
+    constant = f"{member.constants[source]}, exchanged before run {first}"
+    new = (source,) if member.number == first else ()
+    return replace(
+        member,
+        constants={**member.constants, source: constant},
+        exchanged=(*member.exchanged, *new),
+    )
+
+
 def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
     """For each run but the first, what differs from the one before it besides what it found."""
     return tuple(
@@ -87,6 +128,7 @@ def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
             for change in changes(one.run, other.run, pair_tests(one.tests, other.tests))
             if change.path not in OWN_OF_EACH
         )
+        + tuple(Change("rig", source, "one piece", "another") for source in other.exchanged)
         for one, other in pairwise(members)
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,13 @@ from campaign.trending.covariates import (
     covariate_of,
     together,
 )
-from campaign.trending.members import LEAST, Member, changes_before, members_of
+from campaign.trending.members import (
+    LEAST,
+    Member,
+    changes_before,
+    members_of,
+    with_exchanged,
+)
 from campaign.trending.models import Fitted, fit_models
 from campaign.trending.series import Series, series_of
 from campaign.units import convert
@@ -170,16 +177,18 @@ def follow(
     over: str = TIME,
     methods: Kinds[Method] | None = None,
     models: Sequence[str] = (),
+    exchanged: Sequence[tuple[str, Path]] = (),
 ) -> Trends:
     """Hold the numbers of runs of one rig against time, or something else.
 
     Args:
         over: `time`, `order`, `temperature`, a tag that has a number, or one of the numbers.
         models: of `methods`, those whose parameters are followed as well.
+        exchanged: what was exchanged before which run (`with_exchanged`).
 
     Raises UsageError for runs and names that nothing can be made of.
     """
-    members = members_of(runs, experiments)
+    members = with_exchanged(members_of(runs, experiments), exchanged)
     series = series_of(members)
     fitted: tuple[Fitted, ...] = ()
     if models and methods is not None:

@@ -1,4 +1,7 @@
-"""The pages that a browser is shown: a usual one, a hostile one, a damaged one, a long one."""
+"""The pages that a browser is shown: a usual one, a hostile one, a damaged one, a long one.
+
+And one of an identification, which has a table of more columns than any report.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,14 @@ import h5py
 import numpy as np
 
 from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
+from campaign.cli.identify import identify_run
+from campaign.cli.import_command import import_recordings
 from campaign.experiments.interface import Experiment, TestData
 from campaign.recording import ChannelInfo, Ending, Outcome
 from campaign.report.build import build_report
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Result, Table
+from tests.identification.rigs import random_rigs
+from tests.identifying import conftest as rig_files
 from tests.report import made_up
 
 WORD = "W" * 10_000
@@ -221,12 +228,29 @@ def _report(
     return report.path
 
 
+def identification(folder: Path) -> Path:
+    """Of a rig that was made up: some methods find much of it, and others nothing."""
+    made = folder / "made"
+    made.mkdir()
+    rig = random_rigs(3, seed=4, seconds=15.0)[1]
+    (made / "rig.toml").write_text(rig_files.RIG, encoding="utf-8")
+    rig_files.write(made / "monday.csv", rig, slice(None))
+    mapping = rig_files.MAPPING + rig_files.TEST.format(name="monday")
+    (made / "mapping.toml").write_text(mapping, encoding="utf-8")
+    import_recordings([str(made / "mapping.toml")], made)
+    run = next(made.glob("*.nxs")).stem
+    methods = ("friction_map", "inverse_dynamics", "presliding")
+    page, _ = identify_run(run, made, models=methods, page=folder / "report")
+    return page.rename(page.with_name("report.html"))
+
+
 PAGES: dict[str, Callable[[Path], Path]] = {
     "usual": usual,
     "hostile": hostile,
     "damaged": damaged,
     "long": long,
     "interactive": interactive,
+    "identification": identification,
 }
 """What every page must be, each of these is."""
 MADE = {**PAGES, "hostile-interactive": hostile_interactive}

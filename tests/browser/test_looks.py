@@ -87,6 +87,34 @@ def test_a_shift_would_be_noticed(show):
     assert shown.page.evaluate("window.moved()") > LARGEST_SHIFT
 
 
+@pytest.mark.parametrize("width", [360, 390, 768, 1300, 1440])
+def test_the_parameters_of_a_rig_are_seen_without_scrolling_sideways(show, width):
+    """All of them: eight columns, of which one has keys that no line holds."""
+    page = show("identification", width=width).page
+    table = page.locator("#table-1")
+    text = table.inner_text()
+    assert "friction.load.negative.coulomb_torque" in text  # and copied without any break
+    wider, wide = table.locator(".scroll").evaluate(
+        "e => [e.scrollWidth - e.clientWidth, e.clientWidth]"
+    )
+    assert wider <= 0
+    ends = table.locator("td, tbody th").evaluate_all(
+        "all => all.filter((e) => e.checkVisibility()).map((e) => e.getBoundingClientRect().right)"
+    )
+    left = table.evaluate("e => e.getBoundingClientRect().left")
+    assert max(ends) <= left + wide + 0.5
+    headings = table.locator("thead th").all_inner_texts()
+    assert len(headings) == 8
+    if width < 800:  # a block for each row, in which each cell says what it is
+        shown = (
+            table.locator("tbody tr")
+            .first.locator("td")
+            .evaluate_all("all => all.map((e) => getComputedStyle(e, '::before').content)")
+        )
+        named = [each.strip('"').removesuffix(": ") for each in shown]
+        assert named == [heading.replace("\u00a0", " ") for heading in headings[1:]]
+
+
 EDGES = """() => [...document.querySelectorAll(".scroll, .sheet")]
   .filter((e) => e.scrollWidth > e.clientWidth + 40 && e.checkVisibility())
   .map((e) => { e.id ||= `wide-${e.parentElement.id}`; return e.id; })"""

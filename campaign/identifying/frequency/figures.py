@@ -41,15 +41,17 @@ def figures(found: Sequence[Found], masses: Masses) -> Iterator[Figure]:
 def _bode_of(
     key: str, each: Found, side: str, measured: MeasuredResponse, masses: Masses
 ) -> Figure:
-    fine = np.geomspace(measured.frequency[0], measured.frequency[-1], FINE)
     lines: list[tuple[str, Array, ComplexArray]] = []
     fit = each.fits.get(side)  # type: ignore[call-overload]
     if fit is not None:
         label = "rational function" + (", misfit" if fit.fit.misfit else "")
+        fine = np.geomspace(fit.fit.lowest, fit.fit.highest, FINE)
         lines.append((label, fine, fit.fit.value(fine)))
     place = masses.places.get(side)  # type: ignore[call-overload]
     if masses.drive is not None and masses.source is each.source and place is not None:
         label = drive_name(masses.drive) + (", misfit" if masses.drive.misfit else "")
+        first = max(masses.lowest, measured.frequency[0])
+        fine = np.geomspace(first, measured.frequency[-1], FINE)
         lines.append((label, fine, masses.drive.value(fine, place)))
     gain, phase = panels(measured, lines, TORQUE)
     shown = [gain, phase]
@@ -61,7 +63,8 @@ def _bode_of(
     return Figure(
         key,
         f"Torque to rate, {each.source.name}, sensor of the {side}",
-        "Bars are 95 % intervals by scatter. What a fit leaves should be no larger than the line "
+        "Bars are 95 % intervals by scatter. A model's line begins where it was fitted from on. "
+        "What a fit leaves should be no larger than the line "
         "of its scatter; where it is, the function is no model of the drive.",
         "Gain and phase from torque to rate over frequency with intervals and fitted functions, "
         "and what the rational function leaves.",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.identification.inverse.motion import Array, kept_times
 from campaign.identification.inverse.rows import all_rows, moving
@@ -35,21 +36,16 @@ def figures(found: InverseDynamics) -> Iterator[Figure]:
 
 
 def friction_figure(found: InverseDynamics) -> Figure:
-    """Force less what accelerates, over the rate; the model's line."""
+    """Force less what accelerates, over the rate; the model's line. Both of rows that move."""
     best = found.best
-    own = _motion_columns(found)
-    force = np.concatenate(
-        [
-            all_rows(each.motion, best.structure.terms, found.filtering, best.delay).force
-            for each in found.pieces
-        ]
-    )
-    design = np.concatenate(
-        [
-            all_rows(each.motion, best.structure.terms, found.filtering, best.delay).columns
-            for each in found.pieces
-        ]
-    )
+    moves = _moving(found)
+    own = _motion_columns(found)[moves]
+    pieces = [
+        all_rows(each.motion, best.structure.terms, found.filtering, best.delay)
+        for each in found.pieces
+    ]
+    force = np.concatenate([each.force for each in pieces])[moves]
+    design = np.concatenate([each.columns for each in pieces])[moves]
     terms, values = best.structure.terms, best.structure.fit.values
     inertia = [i for i, term in enumerate(terms) if term.name == "inertia"]
     rest = force - design[:, inertia] @ values[inertia]
@@ -82,8 +78,7 @@ def residual_figure(found: InverseDynamics) -> Figure:
     fit = found.fit
     own = _motion_columns(found)
     time = np.concatenate([kept_times(piece.motion, found.filtering) for piece in found.pieces])
-    moves = np.concatenate([moving(p.motion, found.filtering) for p in found.pieces]) > 0.0
-    left = np.where(moves, np.concatenate(fit.residuals), np.nan)
+    left = np.where(_moving(found), np.concatenate(fit.residuals), np.nan)
     lag, correlation, bound = autocorrelation(fit.residuals)
     step = float(np.median(np.diff(time)))
     return Figure(
@@ -94,7 +89,7 @@ def residual_figure(found: InverseDynamics) -> Figure:
         f"of it would lie if they were white. {fit.count} rows are worth {fit.effective:.0f}.",
         alt="Residual torque over time, over rate, over angle, and its autocorrelation.",
         panels=(
-            Panel(TIME, LEFT, (Curve(time, left, "", "measured", "thin"),), "Over time"),
+            Panel(TIME, LEFT, (Curve(*apart(time, left), "", "measured", "thin"),), "Over time"),
             Panel(RATE, LEFT, (Curve(own[:, 1], left, "", "measured", "points"),), "Over rate"),
             Panel(PLACE, LEFT, (Curve(own[:, 0], left, "", "measured", "points"),), "Over angle"),
             Panel(
@@ -126,10 +121,12 @@ def validation_figure(found: InverseDynamics) -> Figure:
         alt="Measured and predicted torque over time, and their difference.",
         panels=(
             Panel(TIME, FORCE, (
-                Curve(whole.time, whole.force, "measured", "measured"),
-                Curve(whole.time, whole.predicted, "predicted", "fit", "thin"),
+                Curve(*apart(whole.time, whole.force), "measured", "measured"),
+                Curve(*apart(whole.time, whole.predicted), "predicted", "fit", "thin"),
             )),
-            Panel(TIME, LEFT, (Curve(whole.time, whole.residuals, "", "measured", "thin"),)),
+            Panel(TIME, LEFT, (
+                Curve(*apart(whole.time, whole.residuals), "", "measured", "thin"),
+            )),
         ),
     )  # fmt: skip
 
@@ -141,7 +138,7 @@ def models_figure(found: InverseDynamics) -> Figure:
     for title, each in told:
         own = together(each.predictions)
         share = 100.0 * own.relative
-        curve = Curve(own.time, own.residuals, "", "measured", "thin")
+        curve = Curve(*apart(own.time, own.residuals), "", "measured", "thin")
         panels.append(Panel(TIME, LEFT, (curve,), f"{title}: {share:.2f} %"))
     return Figure(
         key="models",
@@ -186,6 +183,12 @@ def autocorrelation(residuals: Sequence[Array]) -> tuple[Array, Array, float]:
     return lags.astype(float), np.array(found), 1.96 / float(np.sqrt(count))
 
 
+def apart(time: Array, values: Array) -> tuple[Array, Array]:
+    """With a gap wherever time begins anew: no line leads from one recording to the next."""
+    anew = np.flatnonzero(np.diff(time) < 0.0) + 1
+    return np.insert(time, anew, np.nan), np.insert(values, anew, np.nan)
+
+
 def _motion_columns(found: InverseDynamics) -> Array:
     """Angle and rate of each row, shape (n, 2)."""
     own = (
@@ -196,6 +199,12 @@ def _motion_columns(found: InverseDynamics) -> Array:
     return np.concatenate(parts)
 
 
+def _moving(found: InverseDynamics) -> NDArray[np.bool_]:
+    """Which rows move, and were fitted; standstill is held by whatever friction it takes."""
+    parts = [moving(each.motion, found.filtering) for each in found.pieces]
+    return np.concatenate(parts) > 0.0
+
+
 def _binned(rate: Array, rest: Array, model: Array) -> tuple[Array, Array, Array]:
     """Means over bins of rate, each of one direction; a gap between the directions."""
     means: list[tuple[float, float, float]] = []
@@ -203,7 +212,7 @@ def _binned(rate: Array, rest: Array, model: Array) -> tuple[Array, Array, Array
         if not own.any():
             continue
         edges = np.unique(np.quantile(rate[own], np.linspace(0.0, 1.0, BINS // 2 + 1)))
-        which = np.where(own, np.searchsorted(edges, rate, side="right"), -1)
+        which = np.where(own, np.searchsorted(edges[1:-1], rate, side="right"), -1)
         means += [(math.nan,) * 3] if means else []
         for each in np.unique(which[own]):
             here = which == each

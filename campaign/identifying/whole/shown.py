@@ -6,18 +6,20 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from campaign.identification.inverse.motion import Array
+from campaign.identification.inverse.motion import Array, Motion
 from campaign.identification.inverse.rows import all_rows, moving, rows
 from campaign.identification.inverse.terms import Term
+from campaign.identification.inverse.terms import columns as columns_of
 from campaign.identification.inverse.validation import Prediction
-from campaign.identifying.inverse.figures import FORCE, LEFT, PLACE, RATE, TIME
-from campaign.identifying.inverse.found import InverseDynamics, together
+from campaign.identifying.inverse.figures import FORCE, LEFT, PLACE, RATE, TIME, apart
+from campaign.identifying.inverse.found import InverseDynamics, Tried, together
 from campaign.identifying.inverse.motions import Moved
 from campaign.identifying.whole.found import Fit, Whole
 from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
 
 FINE = 200
+PLAIN = "plain regression"
 OVER_ALL = "a sum over all rows: what it would be of other rows, blocks say"
 
 
@@ -72,12 +74,12 @@ def figures(
     found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]
 ) -> Iterator[Figure]:
     """Friction over rate, and what models leave over."""
-    yield _curve_figure(found)
+    yield _curve_figure(found, plain)
     if unseen:
         yield _left_figure(found, plain, unseen)
 
 
-def _curve_figure(found: Whole) -> Figure:
+def _curve_figure(found: Whole, plain: InverseDynamics | None) -> Figure:
     """Measured force less inertia and linear terms, with each model's steady friction."""
     best = found.fits[found.best]
     rate, rest = _measured(found, best)
@@ -85,6 +87,8 @@ def _curve_figure(found: Whole) -> Figure:
     near = top * np.geomspace(1e-3, 1.0, FINE)
     sweep = np.concatenate([-near[::-1], [np.nan], near])
     curves = [Curve(rate, rest, "rows", "measured", "points")]
+    if plain is not None:
+        curves.append(Curve(sweep, _regressed(_plainest(plain), sweep), PLAIN, PLAIN))
     curves += [
         Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in found.fits
     ]
@@ -92,7 +96,8 @@ def _curve_figure(found: Whole) -> Figure:
         key="steady-friction",
         title="Friction of the fitted models",
         caption="Torque less what accelerates the inertia (dots: rows), and the friction of steady "
-        "sliding of each fitted model. Rows beside the lines were not steady.",
+        "sliding of each fitted model; the plain regression is least squares without any delay. "
+        "Rows beside the lines were not steady.",
         alt="Friction torque over rate with the curves of the fitted models.",
         panels=(Panel(RATE, FORCE, tuple(curves), marks=(Mark("", y=0.0),)),),
         trials=tuple(dict.fromkeys(piece.trial for piece in found.pieces)),
@@ -124,13 +129,25 @@ def _steady(fit: Fit, rate: Array) -> Array:
     return found
 
 
+def _plainest(plain: InverseDynamics) -> Tried:
+    """Both directions of their own, without delay, as anybody would fit them."""
+    return plain.tried[min(1, len(plain.tried) - 1)]
+
+
+def _regressed(fitted: Tried, rate: Array) -> Array:
+    """Friction of a regression at steady rates."""
+    still = np.zeros(len(rate))
+    steady = Motion(time=still, position=still, rate=rate, acceleration=still, force=still)
+    return columns_of(steady, fitted.structure.terms) @ fitted.structure.fit.values
+
+
 def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]) -> Figure:
     """Validation residuals of up to four models over time, rate and angle."""
     told: list[tuple[str, Prediction]] = []
     if plain is not None:
-        reference = plain.tried[min(1, len(plain.tried) - 1)]
+        reference = _plainest(plain)
         if reference.predictions:
-            told.append(("plain regression", together(reference.predictions)))
+            told.append((PLAIN, together(reference.predictions)))
     told += [(each.model.name, together(each.predictions)) for each in found.fits]
     place = _places(found, unseen)
     panels = []
@@ -138,10 +155,12 @@ def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[M
         left = prediction.residuals
         title = f"{name}: {100 * prediction.relative:.2f} %"
         panels += [
-            Panel(TIME, LEFT, (Curve(prediction.time, left, "", "measured", "thin"),), title),
+            Panel(TIME, LEFT, (
+                Curve(*apart(prediction.time, left), "", "measured", "thin"),
+            ), title),
             Panel(RATE, LEFT, (Curve(place[:, 1], left, "", "measured", "points"),)),
             Panel(PLACE, LEFT, (Curve(place[:, 0], left, "", "measured", "points"),)),
-        ]
+        ]  # fmt: skip
     return Figure(
         key="left-over",
         title="What each model leaves over of the validation",
