@@ -140,6 +140,10 @@ class Column:
         display: unit of the page, "" for the same.
         exact: what it holds was set, or counted: it has no interval because it is not uncertain.
         reason: why the numbers of this column have no interval.
+        quantity: which finding each number is, where it is one, under the conditions that its row
+            has by their names; published values of it then stand beside it.
+        decimals: digits after the point that the page shows at least, of numbers that were printed
+            with so many.
     """
 
     name: str
@@ -148,6 +152,8 @@ class Column:
     display: str = ""
     exact: bool = False
     reason: str = ""
+    quantity: str = ""
+    decimals: int = 0
 
 
 @dataclass(frozen=True)

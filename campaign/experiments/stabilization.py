@@ -218,7 +218,7 @@ def _analyse(data: TestData) -> Result:
     tables = [_table(rows, extra, _seen_through(high_pass))]
     beside = beside_rows(rows)
     if beside:
-        tables.append(beside_table(beside, extra))
+        tables.insert(0, beside_table(beside, extra))  # what such a test is about
     return Result(
         tuple(tables),
         tuple(figures),

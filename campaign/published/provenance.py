@@ -19,7 +19,10 @@ from campaign.trial import Role, Tree, Trial, canonical_json
 
 BENCH = "bench."
 """How a swept path of the bench begins, in the point of a trial."""
-OF_A_TRUTH = "its samples are of another bench, the truth"
+OF_A_TRUTH = (
+    "the samples are of a truth, which was simulated in place of the bench that is stated; what the"
+    " stated one was made from and fitted to says nothing of them"
+)
 """Why a trial that simulated a truth is of no described bench, whatever its stated bench is."""
 DESCRIBED_TWICE = "its trials state different descriptions of their bench"
 """Why a test has no one bench, whatever each of them is."""

@@ -12,6 +12,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.published.attempts import in_vain
 from campaign.published.draws import SEED, but_for_seed, place_in, together
 from campaign.published.evidence import Evidence, same, speaks_to, with_cells
+from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.status import Status, status_of
 from campaign.published.values import Cell, Published
 from campaign.published.verdicts import (
@@ -105,9 +106,18 @@ class Scoreboard:
 
     @property
     def altered(self) -> tuple[str, ...]:
-        """Why lines are `altered`, each reason once, with the test."""
-        found = (line for line in self.lines if line.status is Status.ALTERED)
-        return tuple(dict.fromkeys(f"{line.test}: {line.why}" for line in found))
+        """Why lines are `altered`, each reason once, with the tests."""
+        tests: dict[str, dict[str, None]] = {}
+        for line in self.lines:
+            if line.status is Status.ALTERED:
+                tests.setdefault(line.why, {})[line.test] = None
+        return tuple(f"{', '.join(of)}: {why}" for why, of in tests.items())
+
+    @property
+    def misdescribed(self) -> bool:
+        """Whether a bench file that describes its bench anew would change a status."""
+        altered = (line.why for line in self.lines if line.status is Status.ALTERED)
+        return any(why != OF_A_TRUTH for why in altered)
 
 
 def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:

@@ -12,7 +12,7 @@ import pytest
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import fingerprint
 from campaign.physics.known import KnownOptions
-from campaign.published.provenance import provenance_of
+from campaign.published.provenance import OF_A_TRUTH, provenance_of
 from campaign.trial import Role, Task, Tree, Trial
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
@@ -103,7 +103,7 @@ def test_a_truth_is_another_bench_whatever_is_stated(
 ) -> None:
     trials = [trial(bench, case="stated"), trial(bench, truth="0" * 64, case="true")]
     found = provenance_of(trials, perturbs_bench=perturbs, described=described() if kept else None)
-    assert found.why_altered({"case": "true"}) == "its samples are of another bench, the truth"
+    assert found.why_altered({"case": "true"}) == OF_A_TRUTH
     assert found.why_altered({"case": "stated"}) == ""
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.published.evidence import Evidence
-from campaign.published.provenance import Place, Provenance
+from campaign.published.provenance import OF_A_TRUTH, Place, Provenance
 from campaign.published.scoreboard import COLUMNS, Line, Scoreboard, score, to_csv
 from campaign.published.values import read_published
 from campaign.result import Finding
@@ -279,3 +279,19 @@ def test_the_file_of_further_runs_says_who_found_them() -> None:
 def test_an_altered_bench_is_told_with_the_reason() -> None:
     found = board(ERROR, provenance=ALTERED)
     assert found.altered == ("test: somebody changed it",)
+    assert found.misdescribed
+
+
+def test_a_reason_that_several_tests_share_is_told_once() -> None:
+    """And nobody is advised to describe a bench anew which was not simulated."""
+    truth = Provenance((Place({}, "none", OF_A_TRUTH),))
+    claim = Finding("rise_time", 0.03, "s", {})
+    evidence = [
+        Evidence("first", ("1.1",), [ERROR], provenance=truth),
+        Evidence("other", ("text 1.2",), [claim], provenance=truth),
+    ]
+    found = score(PUBLISHED, evidence)
+    assert found.altered == (f"first, other: {OF_A_TRUTH}",)
+    assert not found.misdescribed
+    changed = Evidence("third", ("1.1",), [ERROR], provenance=ALTERED)
+    assert score(PUBLISHED, [evidence[1], changed]).misdescribed

@@ -19,6 +19,7 @@ from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment
 from campaign.identification.stabilization_error import OF_ONE_TRIAL
+from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.scoreboard import Line, score
 from campaign.published.verdicts import reproduced
 from campaign.recording import Outcome, SafeState
@@ -71,6 +72,24 @@ def test_an_altered_bench_and_what_was_found_twice_are_told(
     assert f"{why} campaign fingerprint BENCH states anew" in text
     assert text.count("not found") >= 12
     assert "Samples from simulation" in text
+
+
+def test_of_a_truth_no_fingerprint_is_asked_for(made_up: ModuleType, tmp_path: Path) -> None:
+    run = made_up.made_up_run(tmp_path, tests=TESTS)
+    trials = tuple(
+        dataclasses.replace(each, trial=each.trial.model_copy(update={"truth": "0" * 64}))
+        for each in run.trials
+    )
+    build_report(
+        dataclasses.replace(run, trials=trials),
+        tmp_path / "out",
+        experiments=made_up.EXPERIMENTS,
+        packaged_templates=made_up.TEMPLATES,
+    )
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    text = " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page)).split())
+    assert f"Altered: stabilization: {OF_A_TRUTH}." in text
+    assert "campaign fingerprint" not in text
 
 
 def test_a_study_of_perturbations_is_judged_by_the_protocol_s_bench(

@@ -13,6 +13,7 @@ from campaign.result import Cell, Column, Conclusion, Factor, Table
 
 Row = Mapping[str, Cell]
 RATIO = "ratio"
+ERROR = "stabilization_error"
 OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
 """What of a row of errors is not the place it is of."""
 PRELOAD_PATH = "bench.gear.preload.torque"
@@ -56,7 +57,7 @@ def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
         columns.append(Column("average_friction", "Preload", "N m", "N m", exact=True))
     columns += [Column(p, p, exact=True) for p in extra if p != PRELOAD_PATH]
     columns += [
-        Column("stated", "Error (1σ), as stated", "rad", "mrad"),
+        Column("stated", "Error (1σ), as stated", "rad", "mrad", quantity=ERROR),
         Column("identified", "Error (1σ), as identified", "rad", "mrad"),
         Column(RATIO, "Identified over stated"),
     ]

@@ -22,6 +22,7 @@ from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import Published
 from campaign.recording import Outcome
+from campaign.report.content.held_values import held_tables
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.opening import Opening, opening_of
 from campaign.report.content.predicted import Predicted, predicted
@@ -39,7 +40,8 @@ class Document:
     Attributes:
         tests: in the protocol's order.
         published: the values that the run's protocol compares with, by table.
-        truths: by test, what is true beside what it found, where that is known.
+        truths: by test, what is true beside what it found, or what its compensations hold, where
+            that is known.
         predictions: by test, what its bench file states of what it found, where that is tested.
         damaged: what of the run is damaged, as far as the report looked at it.
         measured_by: whose code found what each recording says by itself.
@@ -122,7 +124,7 @@ def document_of(
     of_tests = (damage for test in tests for damage in test.damaged)
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
     scoreboard = score(published, [test.evidence() for test in tests])
-    truths = truth_tables(run, tests)
+    truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
     predictions = predicted(run, tests)
     return Document(
         run,

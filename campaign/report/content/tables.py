@@ -25,6 +25,8 @@ REASONS = 6
 """Most reasons for a missing interval that stand below a table."""
 UNIT = "unit"
 """Name of a column that says the unit of its row."""
+PUBLISHED = "published"
+"""Name of a column that the report puts beside those of an analysis: the last of the file."""
 NARROW, SHORT = 1e-5, 5
 """Half-width, as a share of its number, below which the page leaves an interval out, and the digits
 that the number then has: a simulation without noise has nine, which mean nothing to a reader."""
@@ -67,17 +69,23 @@ def show(table: Table) -> ShownTable:
 def table_csv(table: Table) -> str:
     """All rows, unrounded, in display units that the header names (`error_mrad`).
 
-    Behind them the ends of each interval, systematic parts included: `error_mrad_low`, `_high`.
+    Behind them the ends of each interval, systematic parts included: `error_mrad_low`, `_high`;
+    last what is published beside them.
     """
     ends = [
         c for c in table.columns if any(isinstance(r.get(c.name), Estimate) for r in table.rows)
     ]
-    headers = [_csv_name(column) for column in table.columns]
+    first, last = (
+        [c for c in table.columns if (c.name == PUBLISHED) is own] for own in (False, True)
+    )
+    headers = [_csv_name(column) for column in first]
     headers += [f"{_csv_name(column)}_{end}" for column in ends for end in ("low", "high")]
+    headers += [_csv_name(column) for column in last]
     rows = (
         [
-            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in table.columns),
+            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in first),
             *(_exact(_displayed(end, c)) for c in ends for end in _ends(row.get(c.name))),
+            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in last),
         ]
         for row in table.rows
     )
@@ -320,7 +328,7 @@ def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[Sh
             return _with_interval(cell, column)
         if column.name == UNIT and isinstance(value, str):
             return pretty_unit(value)
-        return _text(value, ROUNDING * largest)
+        return _text(value, ROUNDING * largest, column.decimals)
 
     return [ShownCell(text(cell, value), right) for cell, value in zip(cells, values, strict=True)]
 
@@ -346,13 +354,13 @@ def _is_narrow(cell: Cell) -> bool:
     return ROUNDING * abs(cell.value) < cell.half_width < NARROW * abs(cell.value)
 
 
-def _text(value: Value, negligible: float) -> str:
+def _text(value: Value, negligible: float, decimals: int = 0) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):
         return minus(str(value))
     if isinstance(value, float):
-        return "0" if abs(value) < negligible else number(value)
+        return "0" if abs(value) < negligible else number(value, decimals=decimals)
     return "–" if value is None else str(value)
 
 

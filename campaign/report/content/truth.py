@@ -61,7 +61,7 @@ def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Tab
 
 
 @dataclass
-class _Benches:
+class Benches:
     """The bench that each trial was simulated on, made once for each that is different."""
 
     plants: Mapping[str, Tree]
@@ -92,7 +92,7 @@ class _Benches:
 
 
 def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> Table | None:
-    benches = _Benches(plants)
+    benches = Benches(plants)
     trials = [archived.trial for archived in test.trials]
     known = [
         finding
@@ -218,7 +218,7 @@ def _capital(text: str) -> str:
 
 
 def _row(
-    finding: Finding, trials: Sequence[Trial], benches: _Benches, units: TestUnits
+    finding: Finding, trials: Sequence[Trial], benches: Benches, units: TestUnits
 ) -> Mapping[str, Cell] | None:
     """Quantity, true value and estimate; None where the bench has no such number, or several."""
     own = list(_benches_of(finding, trials, benches))
@@ -237,12 +237,12 @@ def _row(
         "true": value,
         "of": "; ".join(dict.fromkeys(true_of(b, finding.quantity) for b in own if b is not None)),
         "found": estimate,
-        "inside": _inside(estimate, value),
+        "inside": inside(estimate, value),
     }
 
 
 def _benches_of(
-    finding: Finding, trials: Sequence[Trial], benches: _Benches
+    finding: Finding, trials: Sequence[Trial], benches: Benches
 ) -> Iterator[Bench | None]:
     """Each bench that a trial of the finding was executed on, on its day.
 
@@ -272,7 +272,7 @@ def conditions_text(conditions: Mapping[str, Value], units: TestUnits) -> str:
     return ", ".join(shown)
 
 
-def _inside(estimate: Estimate, true: float | None) -> str:
+def inside(estimate: Estimate, true: float | None) -> str:
     """Whether the combined interval holds the true value; empty where there is none."""
     if not estimate.has_interval or true is None:
         return ""

@@ -12,11 +12,12 @@ from typing import Any
 from campaign.access.analysis import AnalysedTest, one_line
 from campaign.axis_kind import speaking_of
 from campaign.published.scoreboard import Scoreboard, to_csv
-from campaign.published.values import PublishedTable
+from campaign.published.values import Published, PublishedTable
 from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
+from campaign.report.content.published_beside import as_compared, with_published
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawn import Drawn
@@ -169,7 +170,10 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
 def _makers(document: Document, folder: Folder, command: str, made: _Made) -> Mapping[str, _Maker]:
     """By test, who makes its figures and tables."""
     units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
-    return {t.name: _Maker(t, units[t.name], folder, again, made) for t in document.tests}
+    return {
+        t.name: _Maker(t, units[t.name], folder, again, made, document.published)
+        for t in document.tests
+    }
 
 
 def _make_first(document: Document, makers: Mapping[str, _Maker]) -> None:
@@ -315,6 +319,7 @@ class _Maker:
 
     Attributes:
         command: what draws one of its figures again.
+        published: what the run is compared with, by table.
         shown: its figures that are made already, by their keys.
     """
 
@@ -323,6 +328,7 @@ class _Maker:
     folder: Folder
     command: str
     made: _Made
+    published: Published
     shown: dict[str, ShownFigure] = field(default_factory=dict)
 
     def figure(self, figure: Figure) -> ShownFigure:
@@ -346,7 +352,9 @@ class _Maker:
 
     def table(self, table: Table) -> ShownTable:
         numbers = stood_for(table.thesis, self.test.reproduces, "")
-        page = self.units.table(table)
+        reproduced = [self.published[n] for n in self.test.reproduces if n in self.published]
+        table = with_published(table, reproduced, self.test.evidence().known)
+        page = self.units.table(as_compared(table))
         return self.folder.shown_table(table, numbers, f"{self.test.name}-{table.key}", page=page)
 
 
