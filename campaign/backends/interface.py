@@ -38,7 +38,9 @@ class Backend(Protocol):
     def refuses(self, trial: Trial) -> str | None:
         """Why this backend cannot execute `trial` (naming the field), or None when it can.
 
-        Asked of every trial of a plan, in order, before anything is connected.
+        Asked of every trial of a plan, in order, before anything is connected. A live backend is
+        asked again, in the same order, once it is, before anything moves: by then its bench may
+        have said more. Later trials of a stage are asked of the connected backend only.
         """
 
     def channels(self, trial: Trial) -> frozenset[str] | None:

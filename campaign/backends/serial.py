@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -29,12 +28,12 @@ from campaign.link.errors import (
 from campaign.link.identity import identity, new_session
 from campaign.link.refusal import Refusal
 from campaign.link.session import Session
+from campaign.link.settings import settings_of
 from campaign.options import Options
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome, PanicStop, Recorder, SafeState
 from campaign.trial import Trial
 from campaign.units import Time
 from campaign.wire.channel_features import named_channels
-from campaign.wire.configuration import REHEARSAL, configuration_of
 from campaign.wire.messages import Channel, Clear, Release, State, Value, WireError
 
 RETRY = 0.2
@@ -70,7 +69,7 @@ class SerialBackend:
     def __init__(self, options: SerialOptions) -> None:
         self._options = options
         self._motion: BaseMotion | None = EmulatedMotion() if options.motion != "none" else None
-        self._refusal = Refusal(base_motion=self._motion is not None)
+        self._refusal = self._new_refusal()
         self._number = new_session()
         self._host = identity("campaign")
         self._trials = new_session() // 2  # no other host's records can be taken for ours
@@ -94,7 +93,11 @@ class SerialBackend:
                 f"nobody speaks the protocol on {self._options.port}: {error}; is it the right "
                 "port and baud rate, and is the controller switched on?"
             ) from None
+        self._refusal = self._new_refusal()  # all trials are asked again, from the first on
         return self
+
+    def _new_refusal(self) -> Refusal:
+        return Refusal(base_motion=self._motion is not None)
 
     def __exit__(self, *exception: object) -> None:
         self._disconnect()
@@ -132,8 +135,22 @@ class SerialBackend:
                 raise BackendError(f"the stop was not cleared: {error}") from None
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why no controller could execute `trial`, or None; needs no port."""
-        return self._refusal(trial)
+        """Why no controller could execute `trial`, and once one has said hello, why it could not.
+
+        Needs no port.
+        """
+        return self._refusal(trial) or self._refused_by_it(trial)
+
+    def _refused_by_it(self, trial: Trial) -> str | None:
+        """What the controller says of itself rules out; None while there is none to ask."""
+        session = self._session
+        if session is None or session.capabilities is None:
+            return None
+        try:
+            self._settings(session, trial)
+        except RefusedError as error:
+            return str(error)
+        return None
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
         """What the controller's features name; None before it is connected, or if they do not."""
@@ -188,9 +205,8 @@ class SerialBackend:
     ) -> Ending:
         task = trial.task
         try:
-            parameters = self._parameters(session, trial)
-            _refuse_long(session, parameters)
-            rate, channels = session.configure(parameters)
+            settings = self._settings(session, trial)
+            rate, channels = session.configure(settings)
             if rate != task.sample_rate:
                 raise RefusedError(
                     f"the controller records at {rate:g} Hz instead of task.sample_rate = "
@@ -220,20 +236,9 @@ class SerialBackend:
             ending = self._broken_off(session, error)
         return replace(ending, telemetry=collector.telemetry())
 
-    def _parameters(self, session: Session, trial: Trial) -> dict[str, Value]:
-        parameters = configuration_of(trial)
-        capabilities = session.capabilities
-        if capabilities is not None and REHEARSAL in capabilities.features:
-            return parameters
-        if trial.task.base_acceleration.shape != "zero" and self._options.motion == "emulated":
-            raise RefusedError(
-                "task.base_acceleration: only a rehearsal controller can emulate the hull"
-            )
-        return {
-            name: value
-            for name, value in parameters.items()
-            if not name.startswith(f"{REHEARSAL}.")
-        }
+    def _settings(self, session: Session, trial: Trial) -> dict[str, Value]:
+        emulated = self._options.motion == "emulated"
+        return settings_of(trial, session.capabilities, emulated=emulated)
 
     def _released(self, session: Session, number: int, ending: Ending) -> Ending:
         """Let the controller forget the trial; see it at rest where its END did not say so."""
@@ -358,19 +363,6 @@ def _info(channel: Channel, mode: str, sides: Sides) -> ChannelInfo:
 
 def _state(safe: bool) -> SafeState:
     return SafeState.CONFIRMED if safe else SafeState.NOT_CONFIRMED
-
-
-def _refuse_long(session: Session, parameters: Mapping[str, Value]) -> None:
-    """Raise RefusedError, with both lengths, for an array that the controller does not take."""
-    if session.capabilities is None:
-        return
-    most = session.capabilities.longest_array
-    for name, value in parameters.items():
-        if isinstance(value, tuple) and len(value) > most:
-            raise RefusedError(
-                f"{name} has {len(value)} values, and the controller takes {most} at most: ask for "
-                "a shorter command, or for one of lower frequencies"
-            )
 
 
 def _fault(fault: Fault, reason: str, safe_state: SafeState) -> Ending:

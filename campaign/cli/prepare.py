@@ -147,13 +147,30 @@ def open_backend(
     source = archive_of(backend)
     refusal = ArchiveError if source is not None and source.damaged else UsageError
     for trial in trials:
-        why = backend.refuses(trial)
-        if why:
-            raise refusal(
-                f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label}): {why}"
-            )
+        if why := _refused(kind, backend, trial):
+            raise refusal(why)
     check_channels(kind, backend, trials)
     return backend
+
+
+def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:
+    """Ask a connected backend again what it could not know before, while nothing has moved.
+
+    Raises UsageError when it refuses one of `trials` now, by what its bench has said of itself, or
+    does not record what one requires. Only who moves something is asked for refusals again: for
+    the others a trial that is refused later costs nothing but time.
+    """
+    trials = tuple(trials)
+    for trial in trials if kind.live else ():
+        if why := _refused(kind, backend, trial):
+            raise UsageError(f"{why}; nothing was moved")
+    check_channels(kind, backend, trials)
+
+
+def _refused(kind: BackendKind, backend: Backend, trial: Trial) -> str:
+    why = backend.refuses(trial)
+    named = f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label})"
+    return f"{named}: {why}" if why else ""
 
 
 def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:

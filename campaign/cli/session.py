@@ -18,7 +18,7 @@ from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note
-from campaign.cli.prepare import check_channels
+from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
@@ -123,7 +123,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     """Connect, execute, seal and let go; also the exit code that follows from all of it.
 
     Raises UsageError, before anything moves and before there is an archive, when the connected
-    bench turns out not to record what a trial requires.
+    bench turns out to refuse a trial, or not to record what one requires.
     """
     outcome: RunOutcome | None = None
     source = session.source
@@ -142,7 +142,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             note = partial(_what_is_kept, session.folder)
             stop.kept(note, moves=session.kind.live)  # there may be a folder before it is opened
             with safe_when_broken_off(backend):
-                check_channels(session.kind, backend, session.left)
+                check_connected(session.kind, backend, session.left)
                 cleared = clear_stop(backend, session.clear_stop, stop)
                 writer = open_archive()
                 writer.timing = session.timing

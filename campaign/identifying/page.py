@@ -34,7 +34,7 @@ CURES = {
     "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",
     "what the model misses": "the model lacks something; look at what is left over",
     "friction, at this excitation": "excite with more torque, of which friction is less, "
-    "and with a second amplitude near it",
+    "and with a second amplitude, half of it",
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
 """What makes a systematic part smaller, by its source."""

@@ -61,9 +61,13 @@ def backend_checks() -> dict[str, Check]:
 
 
 def accepts_a_possible_trial(under_test: BackendUnderTest) -> None:
-    """`refuses` is None for what can be executed, though nothing is connected yet."""
-    reason = under_test.open().refuses(under_test.possible)
+    """`refuses` is None for what can be executed, before anything is connected and after."""
+    backend = under_test.open()
+    reason = backend.refuses(under_test.possible)
     require(reason is None, f"refuses() said {reason!r} of the possible trial")
+    with backend as connected:
+        reason = connected.refuses(under_test.possible)
+    require(reason is None, f"refuses() said {reason!r} of the possible trial, once connected")
 
 
 def refuses_an_impossible_trial_naming_the_field(under_test: BackendUnderTest) -> None:

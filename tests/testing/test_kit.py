@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -54,9 +55,25 @@ def test_a_backend_with_a_slower_channel_that_it_does_not_name_passes(name: str)
     CHECKS[name](under_test(channels=slower, block=held, names=lambda names: None))
 
 
+def refuses_when_asked_again() -> Callable[[object], str | None]:
+    """As one does that thinks the first trial comes after the last one."""
+    asked: list[object] = []
+
+    def refuses(trial: object) -> str | None:
+        asked.append(trial)
+        return None if len(asked) % 2 else "it was asked before"
+
+    return refuses
+
+
 NOT_SAFE = SafeState.NOT_CONFIRMED
 BROKEN: list[tuple[str, dict[str, Any], str]] = [
     ("accepts_a_possible_trial", {"refuses": lambda t: "no"}, "'no' of the possible trial"),
+    (
+        "accepts_a_possible_trial",
+        {"refuses": refuses_when_asked_again()},
+        "'it was asked before' of the possible trial, once connected",
+    ),
     (
         "refuses_an_impossible_trial_naming_the_field",
         {"refuses": lambda t: None},

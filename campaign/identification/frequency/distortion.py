@@ -139,18 +139,39 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     scatter = float(np.std(ratio, ddof=1)) / math.sqrt(count)
     # The noise that is taken off is the same in all realisations.
     unsure = math.sqrt(float(np.sum(level.noise**2)) * 2.0 * level.shared / level.noise_freedom)
-    noise = unsure / (max(level.share, 1e-300) * float(np.mean(distortion.output)))
+    whole = max(level.share, 1e-300) * float(np.mean(distortion.output))
+    noise = unsure / whole
     half = student(count - 1) * math.hypot(scatter, noise)
     if mean - half <= 0 or np.any(ratio <= 0):
         most = math.sqrt(max(mean, 0.0) + half)
         reason = "not more than the noise shows; a bound"
         return Estimate(name, most, "", method=method, kind="at most", reason=reason)
-    ends = _ends(ratio, mean, math.hypot(scatter, noise) / mean)
+    lines = student(math.inf) * _by_lines(level) / whole / mean
+    ends = _ends(ratio, mean, math.hypot(scatter, noise) / mean, lines)
     return Estimate(name, math.sqrt(mean), "", *ends, LEVEL, method, freedom=count - 1)
 
 
-def _ends(ratio: Array, mean: float, error: float) -> tuple[float, float]:
+def _by_lines(level: Level) -> float:
+    """What another draw of detection lines would change of their power together (1 sigma).
+
+    Of every few lines one was drawn: strata of one draw each, whose variance neighbours tell, as
+    far as their means are alike, and with what the means differ by otherwise (collapsed strata:
+    Cochran, "Sampling Techniques" (1977), 5A.12). None is left where all lines are detection lines.
+    """
+    power = np.mean(level.power, axis=0) - level.noise
+    if level.share >= 1.0 or len(power) < 2:
+        return 0.0
+    pairs = power[: len(power) // 2 * 2].reshape(-1, 2)
+    apart = float(np.sum((pairs[:, 0] - pairs[:, 1]) ** 2))
+    if len(power) % 2:
+        apart += 0.5 * float((power[-1] - power[-2]) ** 2)
+    return math.sqrt((1.0 - level.share) * apart)
+
+
+def _ends(ratio: Array, mean: float, error: float, lines: float) -> tuple[float, float]:
     """Of the root of the mean of positive powers, shape (m,), with its relative error.
+
+    `lines`: what another draw of lines may change besides, as a half-width.
 
     Powers of few realisations are skewed: their mean lies low more often than high. So beside the
     mean there is Cox's estimate of that of a log-normal distribution, and the hull of both
@@ -160,7 +181,7 @@ def _ends(ratio: Array, mean: float, error: float) -> tuple[float, float]:
     spread = float(np.var(logarithm, ddof=1))
     centre = float(np.mean(logarithm)) + 0.5 * spread
     own = math.sqrt(spread / count + 0.5 * spread**2 / (count - 1))
-    half = student(count - 1) * max(own, error)
+    half = math.hypot(student(count - 1) * max(own, error), lines)
     low = min(centre, math.log(mean)) - half
     high = max(centre, math.log(mean)) + half
     return math.exp(0.5 * low), math.exp(0.5 * high)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from campaign.identification.elastic_mode import ElasticMode, elastic_mode
 from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
-from campaign.identification.frequency.distortion import total
 from campaign.identification.frequency.drive import TwoMass
 from campaign.identification.frequency.margins import chosen_margins, measured_margins
 from campaign.identification.frequency.measured import MeasuredResponse
@@ -20,8 +17,13 @@ from campaign.identification.frequency.modes import Mode, chosen_modes
 from campaign.identification.frequency.orders import Chosen, chosen_order
 from campaign.identification.frequency.two_mass import two_mass
 from campaign.identification.frequency.two_mass_model import Side
-from campaign.identification.intervals import judged, shifted_by
 from campaign.identification.servo import ServoCharacteristics
+from campaign.identifying.frequency.axis_numbers import (
+    UNKNOWN,
+    Weaker,
+    odd_distortion,
+    of_axis,
+)
 from campaign.identifying.frequency.sources import Source, fitted_part
 from campaign.physics.bench import Bench
 
@@ -33,25 +35,10 @@ AMBIGUOUS = (
 )
 
 
-BENT = 0.03
-"""Odd distortion over the output from which on friction is taken to bend a response."""
 NARROWER = (2.0, 4.0, 8.0)
 """times the first frequency: from there on two inertias are tried where friction bends the rest."""
 WEAKER = 0.8
 """Share of the strongest excitation below which another one is weaker."""
-SHIFTED = (
-    "motor_inertia",
-    "load_inertia",
-    "total_inertia",
-    "stiffness",
-    "damping",
-    "resonance",
-    "resonance_damping",
-    "antiresonance",
-    "antiresonance_damping",
-    "inertia_ratio",
-)
-"""Numbers of a drive that friction shifts."""
 
 
 @dataclass(frozen=True)
@@ -89,20 +76,27 @@ class Masses:
     """The two-mass drive, and where the sensors are taken to be.
 
     Attributes:
-        drive: None where the responses are not those of one, and `reason` says why.
+        drive: with the response's numbers; None where it is not that of one, and `reason` says why.
+        axis: the same with numbers of the axis: their intervals hold friction's part, too.
         places: `motor` for a sensor at the driven inertia, `load` behind the spring, by side.
         how: how the places are known, in words.
         lowest: frequency from which on it was fitted (Hz), where it is no model of the whole band.
-        bent: where friction bends the response by an amount that nobody knows, a sentence.
+        bent: where numbers of the axis cannot be told from the response's, why: a sentence.
     """
 
     drive: TwoMass | None
     source: Source | None
     reason: str = ""
+    axis: TwoMass | None = None
     places: Mapping[Side, Side] = field(default_factory=dict)
     how: str = ""
     bent: str = ""
     lowest: float = 0.0
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether numbers of the axis are others than the response's."""
+        return self.axis is not self.drive
 
 
 def found_in(source: Source, band: Band) -> Found:
@@ -208,8 +202,8 @@ def masses(
             if other is not None and other.drive is not None and not other.drive.misfit:
                 told, band = replace(other, lowest=higher.lowest), higher
         if told.drive is None or told.drive.misfit:
-            return told
-        return _bent(told, source, [each.source for each in others], band)
+            return replace(told, axis=told.drive)
+        return _with_axis(told, source, [each.source for each in others], band)
     except (ValueError, np.linalg.LinAlgError) as error:
         return Masses(None, source, str(error))
 
@@ -256,29 +250,27 @@ def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float 
     return Masses(tried[place], source, places={"load": side}, how=how)
 
 
-def _bent(told: Masses, source: Source, others: Sequence[Source], band: Band) -> Masses:
-    """With what friction does to the drive's numbers, which scatter does not show.
-
-    Its share of a response falls as fast as the excitation rises, or faster: a response to less
-    tells how much is left of it.
-    """
-    odd = [total(each.distortion, "odd") for each in source.best.values() if each.distortion]
-    if told.drive is None or not any(
-        level.kind == "number" and level.value > BENT for level in odd
-    ):
+def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Band) -> Masses:
+    """With numbers of the axis: a response to less excitation tells friction's part in them."""
+    if told.drive is None:
         return told
+    odd = odd_distortion(source)
     weaker = [each for each in others if each.best and 0 < each.rms < WEAKER * source.rms]
-    weaker = [each for each in weaker if set(each.responses) == set(source.responses)]
-    if not weaker:
+    weaker = [each for each in weaker if odd and set(each.responses) == set(source.responses)]
+    tried = []
+    for each in weaker:
+        with suppress(ValueError):  # too little of the band is left
+            tried.append(Weaker(_weaker_drive(told, each, band), source.rms / each.rms))
+    axis = of_axis(told.drive, odd, tried)
+    bent = ""
+    if UNKNOWN in (axis.total_inertia.reason, axis.resonance.reason):
         bent = (
-            f"Odd distortion is {100 * max(level.value for level in odd):.0f} % of the output: "
-            "friction bends the response, by how much one amplitude does not tell. Repeat it at "
-            "half the amplitude; until then none of its numbers goes to the bench."
+            f"Odd distortion is {100 * odd:.0f} % of the output: friction bends the response, by "
+            "how much one amplitude does not tell. Repeat it at half the amplitude or at twice of "
+            "it; until then its numbers are those of this response, not of the axis, and none of "
+            "them goes to the bench."
         )
-        return replace(told, drive=_shifted(told.drive, None, 1.0), bent=bent)
-    other = max(weaker, key=lambda each: each.rms)
-    share = other.rms / (source.rms - other.rms)
-    return replace(told, drive=_shifted(told.drive, _weaker_drive(told, other, band), share))
+    return replace(told, axis=axis, bent=bent)
 
 
 def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
@@ -295,18 +287,3 @@ def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
     if not tried:
         raise ValueError("the weaker excitation has too few frequencies")
     return min(tried, key=lambda each: (bool(each.misfit), each.excess))
-
-
-def _shifted(drive: TwoMass, other: TwoMass | None, share: float) -> TwoMass:
-    """Each number with the part that friction has in it, as far as it is known."""
-    changed: dict[str, Any] = {}
-    for name in SHIFTED:
-        one = getattr(drive, name)
-        if not one.has_interval:
-            continue
-        left = None
-        if other is not None:
-            left = share * abs(getattr(other, name).value - one.value)
-        if left is None or math.isfinite(left):
-            changed[name] = judged(shifted_by(one, "friction, at this excitation", left))
-    return replace(drive, **changed)

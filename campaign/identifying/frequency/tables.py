@@ -7,6 +7,7 @@ from typing import Any
 
 from campaign.estimate import Estimate
 from campaign.identification.frequency.drive import TwoMass
+from campaign.identification.frequency.one_inertia import METHOD as RIGID_METHOD
 from campaign.identification.frequency.orders import order_of
 from campaign.identification.frequency.two_mass import METHOD
 from campaign.identifying.frequency.found import Found, Masses
@@ -173,11 +174,14 @@ def margins_table(found: Sequence[Found]) -> Table | None:
 
 
 def masses_table(masses: Masses) -> Table | None:
-    """The two-mass drive, in one row; None where it is no model of the response."""
-    drive = masses.drive
-    if drive is None or drive.misfit or drive.rigid:
+    """The drive of the response, and that of the axis where friction makes it another.
+
+    None where it is no model of the response, and for one inertia, unless friction is in it.
+    """
+    drive, axis = masses.drive, masses.axis
+    if drive is None or axis is None or drive.misfit or (drive.rigid and not masses.is_bent):
         return None
-    columns = (
+    columns: tuple[Column, ...] = (
         Column("motor_inertia", "Driven inertia", "kg m^2", "kg m^2"),
         Column("load_inertia", "Inertia behind the spring", "kg m^2", "kg m^2"),
         Column("total_inertia", "Sum", "kg m^2", "kg m^2"),
@@ -193,12 +197,24 @@ def masses_table(masses: Masses) -> Table | None:
         if drive.grounded
         else ""
     )
+    if drive.rigid:
+        columns = tuple(each for each in columns if each.name == "total_inertia")
+    rows = {"the axis": axis}
+    if masses.is_bent:
+        rows = {"the response": drive, **rows}
+        spring += (
+            " Of the response: at this excitation, by scatter alone. Of the axis: with what "
+            "friction may have in it, as other excitations or the odd distortion tell."
+        )
     return Table(
-        "two-masses",
-        "Two inertias on a spring",
-        columns,
-        ({column.name: getattr(drive, column.name) for column in columns},),
-        note=f"{METHOD}.{spring}",
+        "one-inertia" if drive.rigid else "two-masses",
+        "One inertia" if drive.rigid else "Two inertias on a spring",
+        (Column("of", "Of", exact=True), *columns),
+        tuple(
+            {"of": whose, **{column.name: getattr(each, column.name) for column in columns}}
+            for whose, each in rows.items()
+        ),
+        note=f"{RIGID_METHOD if drive.rigid else METHOD}.{spring}",
     )
 
 

@@ -18,6 +18,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.frequency.one_inertia import RIGID
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
+from campaign.identifying.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identifying.frequency.distortion_tables import distortion_tables
 from campaign.identifying.frequency.figures import figures
 from campaign.identifying.frequency.found import Band, Found, Masses, best_source, found_in, masses
@@ -46,6 +47,7 @@ from campaign.units import Frequency, Time
 
 TORQUE_CONSTANT = "motor.torque_constant"
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
+AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
 LOWER = "excite further below the antiresonance, above what friction holds"
 SURELY = 3.0
 """Standard deviations by which a delay lies below zero where it is told."""
@@ -167,7 +169,7 @@ def _torque_uncertainty(bench: Bench) -> float | None:
 
 def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
     if told.drive is None:
-        local = _local(told, best)
+        local = _local_of_axis(told, best)
         for name, meaning, unit, advice in MEANINGS:
             if name in local:
                 yield Parameter(local[name], meaning, unit, "", advice)
@@ -175,7 +177,7 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
     hangs_on_load = dict(told.places) == {"load": "motor"}
     if told.drive.misfit:
         reason = f"misfit: {told.drive.misfit}"
-        local = _local(told, best)
+        local = _local_of_axis(told, best)
         for name, meaning, unit, advice in MEANINGS:
             nothing = Estimate.without_interval(name, math.nan, unit, reason)
             estimate = local.get(name, nothing)
@@ -184,13 +186,12 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
         return
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
     for name, meaning, unit, advice in MEANINGS:
-        estimate = getattr(told.drive, name)
+        estimate = getattr(told.axis, name)
         usable_ = estimate.origin is Origin.MEASURED and estimate.has_interval
         usable_ = usable_ and estimate.value > 0
-        key = keys.get(name, "") if usable_ else ""
-        if told.bent:  # by an amount that nobody knows
-            key = ""
-        yield Parameter(estimate, meaning, unit, key, advice)
+        # A damping that friction adds to may be left open alone: then the others are told.
+        key = keys.get(name, "") if usable_ and not told.bent else ""
+        yield Parameter(estimate, meaning, unit, key, AMPLITUDES if told.bent else advice)
 
 
 def _local(told: Masses, best: Found) -> dict[str, Estimate]:
@@ -206,6 +207,12 @@ def _local(told: Masses, best: Found) -> dict[str, Estimate]:
     if side == "motor" or told.places.get(side) == "motor":
         found["antiresonance"] = mode.antiresonance
     return {name: replace(each, name=name) for name, each in found.items()}
+
+
+def _local_of_axis(told: Masses, best: Found) -> dict[str, Estimate]:
+    """The same, with friction's part."""
+    odd = odd_distortion(best.source)
+    return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
 
 
 def _findings(found: Sequence[Found], parameters: Sequence[Parameter]) -> Iterator[Finding]:
@@ -259,23 +266,25 @@ def _early(found: Sequence[Found]) -> Iterator[str]:
                 continue
             yield (
                 f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
-                "the torque. Either the torque is recorded late, or a controller holds it and it "
-                "is sampled at points: then gain and inertia are off by up to a few percent at the "
-                "highest frequencies, and no scatter shows that. A lower highest line, or a faster "
-                "controller, makes it small."
+                "the torque. Either friction turns its phase (a second amplitude tells), or the "
+                "torque is recorded late, or a controller holds it and it is sampled at points: "
+                "then gain and inertia are off by up to a few percent at the highest frequencies, "
+                "and no scatter shows that. A lower highest line, or a faster controller, makes it "
+                "small."
             )
 
 
 def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
-    drive = told.drive
+    drive = told.drive if told.bent else told.axis
     local = _local(told, best)
     if (drive is None or drive.misfit) and "resonance" in local:
         mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
         if "antiresonance" in local:
             mode += [", with an antiresonance at ", Amount(local["antiresonance"], "Hz")]
         yield Conclusion((*mode, "; no two inertias on a spring were found."))
+    whose = "At this excitation the response is that of a drive that" if told.bent else "The drive"
     if drive is not None and drive.resonance.has_interval:
-        parts: list[str | Amount] = ["The drive resonates at ", Amount(drive.resonance, "Hz")]
+        parts: list[str | Amount] = [f"{whose} resonates at ", Amount(drive.resonance, "Hz")]
         if drive.antiresonance.has_interval:
             parts += [", with an antiresonance at ", Amount(drive.antiresonance, "Hz")]
         if drive.total_inertia.has_interval:
@@ -283,7 +292,9 @@ def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
         yield Conclusion((*parts, "."))
     elif drive is not None and drive.total_inertia.has_interval:
         inertia = Amount(drive.total_inertia, "kg m^2")
-        yield Conclusion(("The drive moves as one inertia of ", inertia, "."))
+        yield Conclusion((f"{whose} moves as one inertia of ", inertia, "."))
+    if told.bent:
+        yield Conclusion(("What of that is friction's, a second amplitude would tell.",))
     if best.margins is None:
         return
     margins = best.margins
