@@ -55,10 +55,10 @@ from campaign.backends.handover.returned import (
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ProtocolError, UsageError
 from campaign.importing.described import file_used
-from campaign.importing.describing import DefectError, MappingError
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import sufficient
 from campaign.importing.mapping import Layout
+from campaign.importing.mapping_errors import DefectError, MappingError
 from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED

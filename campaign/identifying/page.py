@@ -17,6 +17,7 @@ from campaign.access.sentences import remarks, sentence
 from campaign.axis_kind import speaking_of
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
+from campaign.identifying.agreement import disagreements
 from campaign.identifying.identification import Identification, Section, widest
 from campaign.identifying.method import Identified, Parameter
 from campaign.identifying.tables import changes_table, parameters_table, words
@@ -30,6 +31,7 @@ from campaign.report.palette import Look, looks_of_page, variables
 from campaign.result import Figure
 
 CURES = {
+    "angle": "slide over all of a turn, at several speeds in both directions",
     "band": "half the band finds otherwise, so that either the model lacks something (look at what "
     "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",
     "what the model misses": "the model lacks something; look at what is left over",
@@ -124,11 +126,10 @@ def refuse_foreign(output: Path) -> None:
 
 
 def next_measurement(found: Identification) -> str:
-    """What to measure next to halve the widest interval; "" where nothing has one."""
+    """About what methods disagree, and what to measure next to halve the widest interval."""
     widest_one = widest(found.parameters)
-    if widest_one is None:
-        return ""
-    return _advice(widest_one)
+    advice = [] if widest_one is None else [_advice(widest_one)]
+    return " ".join([*disagreements(found.sections), *advice])
 
 
 def _advice(parameter: Parameter) -> str:

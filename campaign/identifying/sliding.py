@@ -12,8 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.archive import ArchivedTrial
-from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_RATE
+from campaign.channels import (
+    DRIVE_TORQUE,
+    JOINT_TORQUE,
+    NORMAL_LOAD,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
 from campaign.estimate import Estimate
+from campaign.identification.over_a_turn import OverATurn, over_a_turn
 from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.identification.steady_stretches import steady_stretches
 from campaign.physics.bench import Bench
@@ -35,11 +42,21 @@ class Point:
     Attributes:
         load: normal load times its arm (N m; N of a linear axis); NaN where nobody recorded it, or
             a rotary axis has no radius.
+        doubts: what was taken off may be off by (N m, 1 sigma), one part after the other, each
+            shared by all points.
     """
 
     trial: int
     own: SteadySliding
     load: float = math.nan
+    doubts: tuple[float, ...] = ()
+
+    def off_by(self, part: int) -> Point:
+        """As it would be if one of `doubts` were so."""
+        torque, off = self.own.torque, self.doubts[part]
+        low, high = (None if end is None else end - off for end in (torque.low, torque.high))
+        moved = replace(torque, value=torque.value - off, low=low, high=high)
+        return replace(self, own=replace(self.own, torque=moved))
 
     @property
     def sign(self) -> float:
@@ -72,17 +89,73 @@ def force_of(trial: ArchivedTrial) -> str:
     return JOINT_TORQUE if JOINT_TORQUE in trial.channel_names() else DRIVE_TORQUE
 
 
-def points_of(
-    trial: ArchivedTrial, bench: Bench, shortest: float, slowest: float | None = None
-) -> Iterator[Point]:
-    """Of the windows that somebody named, or of what is steady for `shortest` (s).
+@dataclass(frozen=True)
+class Stretch:
+    """Samples of a steady stretch, shape (n,) each; `angle` (rad) None where nobody recorded it."""
 
-    slowest: rate (SI) up to which the axis stands still; None: 3 % of its fastest.
+    trial: int
+    time: Array
+    rate: Array
+    torque: Array
+    angle: Array | None
+    load: float
+    inertia: float | None
+
+    def point(self, held: OverATurn | None) -> Point:
+        """What it comes to, without what follows from the angle."""
+        if held is None or self.angle is None:
+            own = steady_sliding(self.time, self.rate, self.torque, None, self.inertia)
+            return Point(self.trial, own, self.load)
+        left = self.torque - held.at(self.angle)
+        own = steady_sliding(self.time, self.rate, left, None, self.inertia)
+        return Point(self.trial, own, self.load, tuple(held.doubts(self.angle)))
+
+
+def points_of(
+    trials: Sequence[ArchivedTrial], bench: Bench, shortest: float, slowest: float | None = None
+) -> tuple[list[Point], OverATurn | None]:
+    """Of all steady stretches, and what of their torque follows from the angle, and is not in them.
+
+    Args:
+        shortest: stretch (s) that is looked for, where a trial names no windows.
+        slowest: rate (SI) up to which the axis stands still; None: 3 % of its fastest.
     """
+    found, held = _found(trials, bench, shortest, slowest, None)
+    if held is not None:  # without it the torque is steady for longer
+        found, held = _found(trials, bench, shortest, slowest, held)
+    points = [each.point(held) for each in found]
+    return [each for each in points if each.own.rate.value != 0.0], held
+
+
+def _found(
+    trials: Sequence[ArchivedTrial],
+    bench: Bench,
+    shortest: float,
+    slowest: float | None,
+    held: OverATurn | None,
+) -> tuple[list[Stretch], OverATurn | None]:
+    """Stretches in which what `held` leaves is steady, and what follows from the angle there."""
+    found = [
+        stretch for trial in trials for stretch in _stretches(trial, bench, shortest, slowest, held)
+    ]
+    placed = [(each.angle, each.torque) for each in found if each.angle is not None]
+    whole = len(placed) == len(found) and not bench.is_linear
+    return found, over_a_turn(placed) if whole else None
+
+
+def _stretches(
+    trial: ArchivedTrial,
+    bench: Bench,
+    shortest: float,
+    slowest: float | None,
+    held: OverATurn | None,
+) -> Iterator[Stretch]:
+    """Of the windows that somebody named, or of what is steady."""
     recording = trial.recording()
     force = force_of(trial)
     torque, rate = recording[force], recording[RELATIVE_RATE]
     load = recording[NORMAL_LOAD] if NORMAL_LOAD in recording.channels else None
+    angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
     radius = trial.trial.options.get("radius")
     arm = 1.0 if bench.is_linear else radius if isinstance(radius, float | int) else None
     # A sensor in the joint is not told what accelerates the load.
@@ -91,18 +164,28 @@ def points_of(
     named = [w for w in trial.trial.windows if w.name in DIRECTIONS]
     stretches = [(round(w.start * per_second), round(w.stop * per_second)) for w in named]
     if not stretches:
-        steady = steady_stretches(rate, per_second, torque, shortest, driven=False, slowest=slowest)
+        left = torque if held is None or angle is None else torque - held.at(angle)
+        steady = steady_stretches(rate, per_second, left, shortest, driven=False, slowest=slowest)
         stretches = [(each.first, each.stop) for each in steady]
     for first, stop in stretches:
-        there = np.flatnonzero(np.isfinite(rate[first:stop] + torque[first:stop])) + first
+        good = np.isfinite(rate[first:stop] + torque[first:stop])
+        if angle is not None:
+            good &= np.isfinite(angle[first:stop])
+        there = np.flatnonzero(good) + first
         if len(there) < FEWEST:
             continue
-        own = steady_sliding(recording.time[there], rate[there], torque[there], None, inertia)
         pressed = math.nan
         if load is not None and arm is not None:
             pressed = abs(float(np.nanmean(load[there]))) * arm
-        if own.rate.value != 0.0:
-            yield Point(trial.trial.number, own, pressed if pressed > 0 else math.nan)
+        yield Stretch(
+            trial.trial.number,
+            recording.time[there],
+            rate[there],
+            torque[there],
+            None if angle is None else angle[there],
+            pressed if pressed > 0 else math.nan,
+            inertia,
+        )
 
 
 def loaded(points: Sequence[Point]) -> bool:

@@ -1,4 +1,4 @@
-"""Which rows of a table are which trial, by a column that tells trials apart."""
+"""Which rows of a table are which trial, by a column that tells trials apart, or by their times."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class CutError(ValueError):
     """A column that tells no trials apart.
 
     Attributes:
-        key: of `[[test.recording]]`: `where`, `each` or `trigger`.
+        key: of `[[test.recording]]`: `where`, `each`, `restarts` or `trigger`.
     """
 
     def __init__(self, message: str, key: str) -> None:
@@ -76,8 +76,7 @@ def by_value(
     remarks = []
     if short := len(found) - len(long):
         remarks.append(
-            f"{_stretches(short)} of column {name!r} with fewer than {SHORTEST} rows "
-            f"{'is' if short == 1 else 'are'} no trial{'' if short == 1 else 's'}"
+            f"{_stretches(short)} of column {name!r} with fewer than {SHORTEST} rows {_are(short)}"
         )
     if blank:
         remarks.append(f"{blank}, which {'is' if empty == 1 else 'are'} in no trial")
@@ -85,6 +84,45 @@ def by_value(
     cut = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
     cut[0] = replace(cut[0], remarks=tuple(remarks))
     return numbered(cut)
+
+
+def restarts(times: Array) -> list[int]:
+    """Rows at which times, shape (n,), begin anew: they fall back past half of what went before.
+
+    A clock that is set back, and rows that were exchanged, fall back by less.
+    """
+    steps = np.diff(times)
+    forward = steps[steps > 0]
+    if not len(forward):
+        return []
+    found, begin = [], 0
+    for fall in np.flatnonzero(steps < -SHORTEST * float(np.median(forward))):
+        if times[fall] - times[fall + 1] > 0.5 * (times[fall] - times[begin]):
+            begin = int(fall) + 1
+            found.append(begin)
+    return found
+
+
+def by_restart(times: Array, first: int) -> list[Stretch]:
+    """A trial for each stretch in which time (s), shape (n,), goes on; raises CutError for one.
+
+    Stretches that are too short for a trial are left out, and the first trial says so.
+    """
+    bounds = [0, *restarts(times), len(times)]
+    if len(bounds) < 3:
+        raise CutError("its time begins once", "restarts")
+    long = [(a, b) for a, b in pairwise(bounds) if b - a >= SHORTEST]
+    if not long:
+        raise CutError(f"{_stretches(len(bounds) - 1)}, all too short; {NEEDED}", "restarts")
+    cut = numbered([Stretch(first + a, b - a, {}) for a, b in long])
+    if short := len(bounds) - 1 - len(long):
+        what = f"{_stretches(short)} of time with fewer than {SHORTEST} rows {_are(short)}"
+        cut[0] = replace(cut[0], remarks=(what,))
+    return cut
+
+
+def _are(count: int) -> str:
+    return "is no trial" if count == 1 else "are no trials"
 
 
 def by_trigger(

@@ -15,6 +15,7 @@ from campaign.importing.cutting import (
     SHORTEST,
     CutError,
     Stretch,
+    by_restart,
     by_trigger,
     by_value,
 )
@@ -31,11 +32,11 @@ from campaign.importing.mapping import (
     RecordingEntry,
     TimeColumn,
 )
+from campaign.importing.mapping_errors import DefectError, Key, MappingError
 from campaign.importing.opened import AmbiguousError, OpenedFiles
 from campaign.importing.reader import clock_times
 from campaign.unit_grammar import parse_unit
 
-Key = tuple[str | int, ...]
 TIMELESS = (
     "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
     'sample_rate = "1 kHz"'
@@ -47,34 +48,6 @@ DRIFTS = (
     "'offset' of its column takes that out"
 )
 """What is to be known of a channel that adds another one up."""
-
-
-class MappingError(ValueError):
-    """What of a mapping does not go with its files.
-
-    Attributes:
-        keys: of `[[test.recording]]` or of `[columns.NAME]`, where it stands.
-        of_columns: which of the two.
-        others: what is wrong besides, told together with it.
-    """
-
-    def __init__(self, message: str, keys: Key = (), *, of_columns: bool = False) -> None:
-        self.keys = keys
-        self.of_columns = of_columns
-        self.others: tuple[MappingError, ...] = ()
-        super().__init__(message)
-
-
-class DefectError(MappingError):
-    """A defect of a recording that nobody has accepted.
-
-    Attributes:
-        kind: of the defect, as in `clipping`.
-    """
-
-    def __init__(self, message: str, keys: Key, kind: str, *, of_columns: bool) -> None:
-        super().__init__(message, keys, of_columns=of_columns)
-        self.kind = kind
 
 
 def describe(
@@ -154,8 +127,9 @@ class _Finding:
         except AmbiguousError as error:
             raise MappingError(f"{self._names()}: {error}", keys, of_columns=of_columns) from None
 
-    def _names(self) -> str:
-        return " and ".join(each.name for each in self.used)
+    def _names(self, first: int = 0) -> str:
+        names = " and ".join(each.name for each in self.used)
+        return f"{names} from row {first + 1}" if first else names
 
     def _choosing(self) -> Iterator[tuple[Key, ColumnPlace]]:
         """The columns that tell trials apart."""
@@ -230,11 +204,13 @@ class _Finding:
             message = f"it has {counted(total, 'row')}, and {NEEDED}"
             raise MappingError(f"{self._names()}: {message}", ("file",))
         first, stop = self._bounds(clock, total)
-        if not chosen:
+        entry = self.entry
+        if not chosen and not entry.restarts:
             return [Stretch(first, stop - first, {})]
-        entry, name = self.entry, chosen[0].name
-        values = self.opened.part(chosen[0], first, stop)
         try:
+            if entry.restarts:
+                return by_restart(self._times(clock)(first, stop), first)
+            name, values = chosen[0].name, self.opened.part(chosen[0], first, stop)
             if entry.trigger is not None:
                 ends = partial(self._after, clock, entry.trigger.duration, stop)
                 return by_trigger(values, first, name, entry.trigger.level, ends, stop)
@@ -283,7 +259,7 @@ class _Finding:
         try:
             even = even_clock(self._times(clock), stretch.first, stretch.rows, repairs)
         except UnevenError as error:
-            raise MappingError(f"{self._names()}: {error}", ("file",)) from None
+            raise MappingError(f"{self._names(stretch.first)}: {error}", ("file",)) from None
         remarks = [*stretch.remarks, *even.remarks]
         made = self._made(main, cells, clocks, even, remarks)
         shifts = [each.shift for each in made if each.clock is None]
@@ -324,7 +300,7 @@ class _Finding:
             if defect.severity is Severity.NOTED or accepted:
                 remarks.append(defect.what)
                 continue
-            what = f"{self._names()}: {defect.what}; {remedy(defect)}"
+            what = f"{self._names(described.first)}: {defect.what}; {remedy(defect)}"
             keys = (name,) if name else ()
             raise DefectError(what, keys, defect.kind, of_columns=bool(name))
         channels = tuple(

@@ -148,13 +148,14 @@ def _read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, 
     if columns > 1 and all(cells[-1] == "" for _, cells in body if len(cells) == width):
         columns -= 1  # every row ends with a separator
     names, units, used = heading([cells for _, cells in above], columns)
-    said = _said(lines[place] for place, _ in above[: len(above) - used])
+    said = said_above(lines[place] for place, _ in above[: len(above) - used])
     kept = tuple(numeric[:columns])
     found = Dialect(separator, decimal, first + 1, width, names, units, kept, said)
     return _Fit(sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
 
 
-def _said(lines: Iterable[str]) -> dict[str, str]:
+def said_above(lines: Iterable[str]) -> dict[str, str]:
+    """What lines above a heading say as `key: value`."""
     said: dict[str, str] = {}
     for line in lines:
         text = plain(line).lstrip("#%*/").lstrip()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.importing.cutting import restarts
 from campaign.importing.defects.clock import ticks
 from campaign.importing.defects.defect import counted
 from campaign.importing.interface import Array
@@ -144,6 +145,12 @@ def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> 
     if seen.undefined:
         raise UnevenError(f"row {_told(seen.undefined)} {_has(seen.undefined)} no time")
     if seen.back:
+        if anew := restarts(clock):
+            raise UnevenError(
+                f"time begins anew in row {_told([first + k for k in anew])}: {len(anew) + 1} "
+                "recordings in one file; 'restarts = true' under its [[test.recording]] makes a "
+                "trial of each, and so does 'each' with a column that numbers them"
+            )
         if not repairs and (coarse := _coarse(clock)):
             raise UnevenError(coarse)
         if "drop repeated" not in repairs:
@@ -163,11 +170,16 @@ def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> 
         raise UnevenError("its times do not go on")
     if "resample" in repairs:
         return _resampled(clock, rows, seen.step, remarks)
-    return _marked(clock, rows, seen, repairs, remarks)
+    return _marked(clock, rows, first, seen, repairs, remarks)
 
 
 def _marked(
-    clock: Array, rows: Array, seen: _Seen, repairs: Sequence[str], remarks: list[str]
+    clock: Array,
+    rows: Array,
+    first: int,
+    seen: _Seen,
+    repairs: Sequence[str],
+    remarks: list[str],
 ) -> EvenClock:
     """Each row on the sample it belongs to, and nothing where there is no row."""
     number = np.concatenate(
@@ -195,9 +207,11 @@ def _marked(
     if coarse := _coarse(clock):
         raise UnevenError(coarse)
     spread = float(np.std(np.diff(clock)) / seen.step)
+    worst = int(np.argmax(np.abs(np.diff(clock) - seen.step))) + 1
     raise UnevenError(
         f"its times are no even clock: steps vary by {100 * spread:.3g} % about {seen.step:.6g} s, "
-        f"up to {float(np.diff(clock).max()):.6g} s; "
+        f"most by that of {clock[worst] - clock[worst - 1]:.6g} s before row "
+        f"{first + int(rows[worst]) + 1}; "
         'repair = ["resample"] puts lines through the samples'
     )
 

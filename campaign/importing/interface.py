@@ -100,6 +100,7 @@ class Table:
         rows: how many, where that is known without reading all of them.
         said: what else the file says of it, as written, e.g. `Operator`.
         doubts: how else the file could be read, in words.
+        below: whether it is one of several below each other, alike in their headings.
         read: blocks of at most `ROWS` rows of the columns at the given places (from 0), in order:
             shape (k, len(places)), NaN where a cell is empty. Raises RecordingError.
     """
@@ -111,6 +112,7 @@ class Table:
     rows: int | None = None
     said: Mapping[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
+    below: bool = False
 
     def whole(self, places: Sequence[int] | None = None) -> Array:
         """All rows of some columns, or of every numeric one: shape (n, columns)."""

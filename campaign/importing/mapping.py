@@ -114,6 +114,8 @@ class RecordingEntry(Options):
     """Only the rows in which a column has a value; each stretch of them is a trial."""
     each: str | int | None = None
     """A column that tells trials apart: a trial for each stretch in which it does not change."""
+    restarts: bool = False
+    """A trial for each stretch of the file in which its time goes on."""
     trigger: Trigger | None = None
     """A trial begins wherever a column rises through a level."""
     trial: int | None = Field(default=None, ge=1)
@@ -206,6 +208,12 @@ def recordings_of(
             problems.append(at.problem(("windows", unknown[0]), "key", message))
             continue
         several = [k for k in ("where", "each", "trigger") if getattr(valid, k) is not None]
+        several += ["restarts"] * valid.restarts
+        bounded = [key for key in ("start", "stop") if getattr(valid, key) is not None]
+        if valid.restarts and bounded:
+            message = f"{bounded[0]!r} is a time, and with 'restarts' there are several of it"
+            problems.append(at.problem((bounded[0],), "key", message))
+            continue
         if len(several) > 1:
             message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
             problems.append(at.problem((several[1],), "key", message))

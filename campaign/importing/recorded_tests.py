@@ -16,10 +16,11 @@ from campaign.errors import Problem, ProtocolError
 from campaign.estimate import Window
 from campaign.importing.cutting import Stretch
 from campaign.importing.described import Described
-from campaign.importing.describing import MappingError, describe
+from campaign.importing.describing import describe
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import RigFacts, sufficient
 from campaign.importing.mapping import Layout, RecordingEntry, layouts, recordings_of
+from campaign.importing.mapping_errors import MappingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.importing.rig_facts import rig_facts

@@ -278,9 +278,21 @@ def _within(each: Followed) -> bool:
     return max(sizes) < float(np.median(halves))
 
 
+def _imported(members: Sequence[Member], covariate: Covariate) -> Iterator[str]:
+    """A note where times are not those of the recordings."""
+    imported = sum(each.run.header.source == "recording" for each in members)
+    if covariate.name == TIME and imported:
+        yield (
+            f"{imported} of the runs were imported: their times are those of the import. "
+            'Write when they were recorded into their mappings, as in `tags = ["day = 3"]`, and '
+            "follow that (`--over day`), or their order (`--over order`)."
+        )
+
+
 def _notes(
     members: Sequence[Member], covariate: Covariate, series: Sequence[Series]
 ) -> Iterator[str]:
+    yield from _imported(members, covariate)
     if covariate.of is not None:
         yield (
             f"Numbers of one test share its errors, so that another of {covariate.of.test} may "

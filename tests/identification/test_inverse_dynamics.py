@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -217,6 +218,18 @@ def test_pieces_do_not_know_of_each_other() -> None:
     one, two = np.array([[1.0], [2.0]]), np.array([[3.0], [1.0]])
     apart = long_run([one, two], 2.0)[0, 0]
     assert apart == pytest.approx(1 + 4 + 9 + 1 + 2 * 0.5 * (2 + 3))
+
+
+@pytest.mark.parametrize("lags", [0.5, 1.0, 1.4, 2.0, 7.3, 60.0, 133.7])
+def test_sums_over_windows_are_bartletts_weights(lags: float) -> None:
+    random = np.random.default_rng(2)
+    scores = [random.standard_normal((count, 3)).cumsum(axis=0) for count in (500, 90, 300)]
+    expected = sum((each.T @ each for each in scores), np.zeros((3, 3)))
+    for lag in range(1, math.ceil(lags)):
+        for each in scores:
+            across = each[lag:].T @ each[:-lag]
+            expected = expected + (1.0 - lag / lags) * (across + across.T)
+    np.testing.assert_allclose(long_run(scores, lags), expected, rtol=1e-9)
 
 
 def test_white_values_are_worth_their_number() -> None:

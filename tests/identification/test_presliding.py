@@ -17,6 +17,7 @@ from campaign.identification.presliding_curve import (
     presliding_angle,
     presliding_torque,
 )
+from campaign.identification.presliding_dynamics.simulation import Motion
 from campaign.identification.torque_ramp import ramp_of
 from tests.identification.test_ramp_coverage import INERTIA, bending, letting_go
 
@@ -209,3 +210,11 @@ def test_errors_of_a_mean_of_ar1_noise() -> None:
     assert found.covariance[0, 0] == pytest.approx(1.0 / count, rel=0.2)
     assert misfit(white, 1) == pytest.approx(1.0, abs=0.05)
     assert misfit(np.sin(np.linspace(0, 6, count)), 1) > 1000
+
+
+def test_a_motion_that_diverges_is_read_without_a_word() -> None:
+    """The search leaves it by itself; a person at a terminal has nothing to do with it."""
+    grown = np.array([0.0, 1.0, np.inf, np.nan, np.inf])
+    motion = Motion(1e-3, 1, grown, grown, grown, grown[:, None])
+    with np.errstate(all="raise"):
+        assert len(motion.rate_at(3e-4)) == 5

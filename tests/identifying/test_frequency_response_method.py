@@ -14,6 +14,7 @@ from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, 
 from campaign.estimate import Origin
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
+from campaign.identifying.frequency.repeating import unused
 from campaign.identifying.frequency.signals import base_frequency
 from campaign.identifying.frequency.sources import _lines
 from campaign.identifying.material import choose
@@ -235,7 +236,16 @@ def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> N
     }
     assert not any(each.bench for each in found.parameters)
     assert any("7 are the fewest" in note for note in found.result.notes)
+    assert all("record 7 realisations" in each.advice for each in found.parameters)
     assert "distortion" in {table.key for table in found.result.tables}
+
+
+def test_a_motor_sensor_that_nobody_can_use_is_told() -> None:
+    trial = SimpleNamespace(channel_names=lambda: {"motor_rate", "relative_rate", "drive_torque"})
+    (told,) = unused([trial], SimpleNamespace(gear=None))  # type: ignore[list-item,arg-type]
+    assert "motor_rate" in told
+    assert "[gear] ratio" in told
+    assert not list(unused([trial], SimpleNamespace(gear=object())))  # type: ignore[list-item,arg-type]
 
 
 def test_lines_that_no_command_names_stand_out_by_a_gap() -> None:

@@ -14,7 +14,7 @@ from campaign.identification.unknowns import Unknown
 from campaign.identification.whole_model import ModelFit, fit_model, moved_with
 from campaign.identifying.inverse.motions import Moved, with_slowest
 from campaign.identifying.whole.along import Along
-from campaign.identifying.whole.found import find, product, resolved
+from campaign.identifying.whole.found import _with_band, find, product, resolved
 from campaign.identifying.whole.models import Sizes, models
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from tests.identification.coverage import holds, rejected
@@ -133,6 +133,31 @@ def test_what_is_passed_faster_than_rows_show_is_refused(
     fit = ModelFit(found, sure, tuple(told.values()), (), None, np.ones(len(told), dtype=bool))
     kept = resolved(fit, model, [motion], Filtering(100.0, 10)).estimates
     assert {name for name, each in kept.items() if not each.has_interval} == refused
+
+
+def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
+    """As where the force has the wrong sign: friction goes to nothing; twice that is nothing."""
+
+    def told(name: str, value: float) -> Estimate:
+        return Estimate(name, value, "", 0.8 * value, 1.2 * value, 0.95, "m", freedom=20.0)
+
+    bound = Estimate.without_interval("coulomb_positive", 0.01, "N m", "it went to its lower bound",
+                                      origin=Origin.AT_BOUND)  # fmt: skip
+    estimates = {"coulomb_positive": bound, "delay": told("delay", 1e-3)}
+    names = ("coulomb_negative", "static_over_coulomb_positive", "static_over_coulomb_negative",
+             "stribeck_velocity")  # fmt: skip
+    estimates |= {name: told(name, 2.0) for name in names}
+    fit = ModelFit(None, estimates, (), (), None, np.zeros(0, bool))  # type: ignore[arg-type]
+    found = _with_band(fit, {name: one.value for name, one in estimates.items()}).estimates
+    assert found["static_over_coulomb_positive"].origin is Origin.NOT_DETERMINED
+    assert "went to its bound" in found["static_over_coulomb_positive"].reason
+    # The other direction has friction, and tells both.
+    assert found["static_over_coulomb_negative"].has_interval
+    assert found["stribeck_velocity"].has_interval
+    both = {**estimates, "coulomb_negative": replace(bound, name="coulomb_negative")}
+    fit = replace(fit, estimates=both)
+    found = _with_band(fit, {name: one.value for name, one in both.items()}).estimates
+    assert not any(one.has_interval for one in found.values())
 
 
 def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from campaign.importing.defects import Defect, Severity, find
 from campaign.importing.defects.between import candidates
+from campaign.importing.defects.late import of_drive_delay
 from campaign.importing.defects.samples import continuous
 from tests.importing import rig
 from tests.importing.rig import Motion, rounded
@@ -328,3 +329,18 @@ def test_a_rate_that_agrees_with_its_angle_is_not_late_for_what_its_rounding_is_
     q = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1])) / 1000])
     found = [d for d in find(t, {"relative_angle": q, "relative_rate": v}) if d.kind == "delay"]
     assert [each.what for each in found if each.severity is not Severity.NOTED] == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_stroke_in_one_direction_under_gravity_is_not_late(seed):
+    """Its sign is constant but for the last digits: that explains nothing, at whatever delay."""
+    random = np.random.default_rng(seed)
+    time = np.arange(334) / 66.8
+    rate = -0.7 * np.clip(np.minimum(time / 0.03, (4.4 - time) / 0.05), 0.0, 1.0)
+    rate += 0.015 * random.standard_normal(len(time)) * (rate != 0)
+    rate[3:6] *= 1.05  # it overshoots
+    angle = np.cumsum(rate) / 66.8
+    torque = 2.0 * np.sin(2 * angle) - 1.6 * np.sign(rate) * (np.abs(rate) > 0.1)
+    torque += 0.15 * random.standard_normal(len(time)) - 8.0 * (time < 0.01)
+    names = ("drive_torque", "relative_rate")
+    assert list(of_drive_delay(time, rate, torque, names)) == []

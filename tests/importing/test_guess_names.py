@@ -99,6 +99,46 @@ def test_what_a_name_says(name: str, role: str, unit: str, sure: bool):
     assert (says.role, says.unit, says.sure) == (role, unit, sure)
 
 
+@pytest.mark.parametrize(
+    ("name", "role", "axis"),
+    [
+        ("theta_mx", "motor_angle", "x"),
+        ("omega_my", "motor_rate", "y"),
+        ("posmz", "motor_angle", "z"),
+        ("iqx", "motor_current", "x"),
+        ("velz", "relative_rate", "z"),
+        ("torque_mx", "unknown", ""),  # a moment about x as well
+        ("iq_refx", "command", "x"),
+        ("theta_refz", "reference", "z"),
+        ("IqRefY", "command", "y"),
+        ("IQREFx", "command", "x"),
+        ("velSPx", "command", "x"),
+        ("tau_cmdy", "command", "y"),
+        ("torque_dx", "command", "x"),
+        ("isoll_x", "command", "x"),
+        ("wref2", "command", "2"),
+        ("refpos_1", "reference", "1"),
+        ("thetaDesX", "reference", "x"),
+        ("dmd_vel[1]", "command", "1"),
+        ("spd_stpt_x", "command", "x"),
+        ("iq*_x", "command", "x"),
+        ("q_star", "reference", ""),
+        ("jointcommandedtorquez", "command", "z"),
+        ("planned.position", "reference", ""),
+        ("traj_vel_y", "command", "y"),
+    ],
+)
+def test_a_target_is_no_measurement_whatever_axis_stands_behind_it(name: str, role: str, axis: str):
+    says = named(name)
+    assert says.role == role
+    assert not axis or axis in says.tag
+
+
+@pytest.mark.parametrize("name", ["offset_x", "preset", "dataset", "relay", "rst", "start", "step"])
+def test_words_that_only_look_like_targets_are_none(name: str):
+    assert named(name).role not in ("command", "reference", "motor_current", "relative_angle")
+
+
 @pytest.mark.parametrize("name", LISTS)
 def test_mutilated_files_lose_little_and_no_unit_is_wrong(tmp_path: Path, name: str):
     """An index, units in a row of their own, separators at the end, marks, quotes, holes."""

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from campaign.experiments import experiments
 from campaign.resources import templates_folder
 from campaign.trending.page import as_json, write_trends
 from campaign.trending.tables import beside_the_jump, headline
-from campaign.trending.trends import JUMP, TREND, Trends, Verdict, follow
+from campaign.trending.trends import JUMP, TREND, Trends, Verdict, _imported, follow
 from tests.trending.laboratory import START, STATIC, Wanted, archived
 
 
@@ -208,3 +209,12 @@ def test_the_page_is_whole_and_the_same_every_time(jump: Trends, tmp_path: Path,
     page.rename(tmp_path / "out" / "report.html")
     with pytest.raises(UsageError, match="shows no trends"):
         write_trends(jump, tmp_path / "out", templates_folder(), "")
+
+
+def test_times_of_imports_are_told_to_be_no_times_of_recordings():
+    run = SimpleNamespace(header=SimpleNamespace(source="recording"))
+    members = [SimpleNamespace(name=f"run-{n}", run=run) for n in range(3)]
+    for name, said in (("time", 1), ("order", 0)):
+        notes = list(_imported(members, SimpleNamespace(name=name)))  # type: ignore[arg-type]
+        assert len(notes) == said
+        assert all("3 of the runs were imported" in note for note in notes)

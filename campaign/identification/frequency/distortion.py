@@ -1,14 +1,15 @@
 """Even and odd distortion of the output, at lines where the excitation has none.
 
 What an amplifier or a loop puts at those lines itself is taken off through the response there
-(Pintelon and Schoukens (2012), 4.3.2). At odd lines left out the distortion is that of the excited
-ones beside them, as far as neither is special: one of every few was drawn at random.
+(Pintelon and Schoukens (2012), 4.3.2). Odd distortion is at the excited lines as well, where it
+scatters over realisations. A single realisation does not show that: what the lines left out have
+then stands for all, which is off by several dB where one mode has most of the power.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,6 +34,7 @@ class Level:
         noise_freedom: real degrees of freedom behind `noise` at each line.
         shared: how many lines share what tells their noise.
         share: detection lines over all lines of that parity in the band.
+        recorded: squared rms of the output as it is, the input's own part included, shape (n,).
     """
 
     frequency: Array
@@ -41,6 +43,7 @@ class Level:
     noise_freedom: float
     shared: float
     share: float
+    recorded: Array
 
     @property
     def rms(self) -> Array:
@@ -71,6 +74,9 @@ class Distortion:
     """Both parities, and the output beside them.
 
     Attributes:
+        between: odd distortion at the excited lines, as it scatters over realisations; None for a
+            single realisation.
+        mixed: whether even lines are excited, too: then parities share lines.
         output: squared rms of the output at all excited lines together, shape (m,).
         excited: mean squared rms of the output at each excited line, shape (k,).
     """
@@ -79,6 +85,8 @@ class Distortion:
     odd: Level
     output: Array
     excited: Array
+    between: Level | None = None
+    mixed: bool = False
 
 
 def detected(
@@ -97,33 +105,54 @@ def detected(
     all_odd = len(odd) + len(excited)
     answered = 0.5 * np.abs(found.lines[1][:, excited - 1]) ** 2
 
-    def level(lines: Lines, share: float) -> Level:
+    def level(lines: Lines, share: float, grown: float = 1.0) -> Level:
         there = np.interp(lines, excited, values.real) + 1j * np.interp(lines, excited, values.imag)
         left = found.lines[1][:, lines - 1] - there * found.lines[0][:, lines - 1]
         row = np.stack([-there, np.ones_like(there)], axis=1)
         noise = np.einsum("ka,kab,kb->k", row, covariance[lines - 1, :2, :2], np.conj(row)).real
-        power = 0.5 * np.abs(left) ** 2
+        power = 0.5 * grown * np.abs(left) ** 2
         known = found.freedom, found.shared
-        return Level(found.frequency[lines - 1], power, 0.5 * noise, *known, share)
+        recorded = np.mean(0.5 * np.abs(found.lines[1][:, lines - 1]) ** 2, axis=0)
+        return Level(found.frequency[lines - 1], power, 0.5 * noise, *known, share, recorded)
 
+    count = len(answered)
     return Distortion(
         level(even, 1.0),
         level(odd, len(odd) / max(all_odd, 1)),
         np.sum(answered, axis=1),
         np.mean(answered, axis=0),
+        # Their mean has gone into the response.
+        level(excited, 1.0, count / (count - 1)) if count > 1 else None,
+        bool(np.any(excited % 2 == 0)),
+    )
+
+
+def _all_odd(distortion: Distortion) -> Level:
+    """At the lines left out, and at the excited ones where realisations show it."""
+    odd, between = distortion.odd, distortion.between
+    if between is None:
+        return odd
+    return replace(
+        odd,
+        frequency=np.concatenate([odd.frequency, between.frequency]),
+        power=np.concatenate([odd.power, between.power], axis=1),
+        noise=np.concatenate([odd.noise, between.noise]),
+        share=1.0,
     )
 
 
 def total(distortion: Distortion, parity: Parity) -> Estimate:
     """Rms of all even or odd distortion in the band over that of the output, by its logarithm.
 
-    Odd distortion is measured at the lines left out and counts for all odd ones. Where the interval
-    of its power holds zero, it is a bound: at most that.
+    Where the interval of its power holds zero, it is a bound: at most that.
     """
-    level = distortion.even if parity == "even" else distortion.odd
+    level = distortion.even if parity == "even" else _all_odd(distortion)
     name = f"{parity}_distortion"
-    method = f"power at {parity} detection lines less noise, over that of the output"
+    where = "detection lines" if level.share < 1.0 or parity == "even" else "lines"
+    method = f"power at {parity} {where} less noise, over that of the output"
     count = len(level.power)
+    if distortion.mixed:
+        return _none(name, "even lines are excited, too: even and odd distortion share lines")
     if not len(level.frequency):
         return _none(name, f"there is no {parity} detection line")
     ratio = (np.sum(level.power, axis=1) - np.sum(level.noise)) / (
@@ -135,43 +164,24 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
         if mean <= 0:
             return _none(name, "not more than the noise shows, in a single realisation")
         reason = "a single realisation does not show how distortion scatters with the phases"
+        if parity == "odd":
+            reason += ", nor what of it is at the excited lines: those left out stand for all"
         return Estimate.without_interval(name, math.sqrt(mean), "", reason, method=method)
     scatter = float(np.std(ratio, ddof=1)) / math.sqrt(count)
     # The noise that is taken off is the same in all realisations.
     unsure = math.sqrt(float(np.sum(level.noise**2)) * 2.0 * level.shared / level.noise_freedom)
-    whole = max(level.share, 1e-300) * float(np.mean(distortion.output))
-    noise = unsure / whole
+    noise = unsure / (max(level.share, 1e-300) * float(np.mean(distortion.output)))
     half = student(count - 1) * math.hypot(scatter, noise)
     if mean - half <= 0 or np.any(ratio <= 0):
         most = math.sqrt(max(mean, 0.0) + half)
         reason = "not more than the noise shows; a bound"
         return Estimate(name, most, "", method=method, kind="at most", reason=reason)
-    lines = student(math.inf) * _by_lines(level) / whole / mean
-    ends = _ends(ratio, mean, math.hypot(scatter, noise) / mean, lines)
+    ends = _ends(ratio, mean, math.hypot(scatter, noise) / mean)
     return Estimate(name, math.sqrt(mean), "", *ends, LEVEL, method, freedom=count - 1)
 
 
-def _by_lines(level: Level) -> float:
-    """What another draw of detection lines would change of their power together (1 sigma).
-
-    Of every few lines one was drawn: strata of one draw each, whose variance neighbours tell, as
-    far as their means are alike, and with what the means differ by otherwise (collapsed strata:
-    Cochran, "Sampling Techniques" (1977), 5A.12). None is left where all lines are detection lines.
-    """
-    power = np.mean(level.power, axis=0) - level.noise
-    if level.share >= 1.0 or len(power) < 2:
-        return 0.0
-    pairs = power[: len(power) // 2 * 2].reshape(-1, 2)
-    apart = float(np.sum((pairs[:, 0] - pairs[:, 1]) ** 2))
-    if len(power) % 2:
-        apart += 0.5 * float((power[-1] - power[-2]) ** 2)
-    return math.sqrt((1.0 - level.share) * apart)
-
-
-def _ends(ratio: Array, mean: float, error: float, lines: float) -> tuple[float, float]:
+def _ends(ratio: Array, mean: float, error: float) -> tuple[float, float]:
     """Of the root of the mean of positive powers, shape (m,), with its relative error.
-
-    `lines`: what another draw of lines may change besides, as a half-width.
 
     Powers of few realisations are skewed: their mean lies low more often than high. So beside the
     mean there is Cox's estimate of that of a log-normal distribution, and the hull of both
@@ -181,7 +191,7 @@ def _ends(ratio: Array, mean: float, error: float, lines: float) -> tuple[float,
     spread = float(np.var(logarithm, ddof=1))
     centre = float(np.mean(logarithm)) + 0.5 * spread
     own = math.sqrt(spread / count + 0.5 * spread**2 / (count - 1))
-    half = math.hypot(student(count - 1) * max(own, error), lines)
+    half = student(count - 1) * max(own, error)
     low = min(centre, math.log(mean)) - half
     high = max(centre, math.log(mean)) + half
     return math.exp(0.5 * low), math.exp(0.5 * high)

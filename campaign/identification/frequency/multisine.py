@@ -108,3 +108,43 @@ def _crest(lines: Lines, amplitude: Array, phases: Array) -> float:
 def crest_factor(signal: Array) -> float:
     """Largest value over rms of one period, shape (n,)."""
     return float(np.max(np.abs(signal)) / np.sqrt(np.mean(np.square(signal))))
+
+
+ALIKE = 1e-3
+"""Mean square of the change from one period to the next, over twice the variance: a repetition."""
+UNLIKE = 0.5
+"""What it comes to between repetitions, at least."""
+LOOKED_AT = 1 << 21
+"""Samples at the end of a recording by which it is judged."""
+STRONG, MANY = 0.2, 10
+"""Share of the largest line in amplitude, and how many such lines a multisine has at least."""
+
+
+def repetition(signal: Array) -> int | None:
+    """Samples of the period of a multisine, shape (n,), seen twice or more; None for all else.
+
+    A sine, a triangle and trapezoids repeat as well, and have few strong lines.
+    """
+    signal = signal[-LOOKED_AT:]
+    moving = signal - np.mean(signal)
+    count = len(moving)
+    power = float(np.mean(moving**2))
+    if count < 4 * MANY or not power > 0:
+        return None
+    spectrum = np.fft.rfft(moving, 2 * count)
+    lags = np.arange(count // 2 + 1)
+    alike = np.fft.irfft(np.abs(spectrum) ** 2)[: len(lags)]
+    square = np.concatenate([[0.0], np.cumsum(moving**2)])
+    both = square[count - lags] + square[count] - square[lags]
+    change = (both - 2.0 * alike) / (2.0 * power * (count - lags))
+    apart = np.flatnonzero(change > UNLIKE)
+    if not len(apart):
+        return None
+    again = apart[0] + np.flatnonzero(change[apart[0] :] < ALIKE)
+    if not len(again):
+        return None
+    beyond = np.flatnonzero(change[again[0] :] >= ALIKE)
+    ends = again[0] + (int(beyond[0]) if len(beyond) else len(change) - again[0])
+    period = int(again[0] + np.argmin(change[again[0] : ends]))
+    size = np.abs(np.fft.rfft(moving[-period:]))
+    return period if np.count_nonzero(size > STRONG * np.max(size)) >= MANY else None

@@ -157,13 +157,23 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
 
 def long_run(scores: Sequence[Array], lags: float) -> Array:
     """Covariance of the sum of scores, each (n, k), by Bartlett's weights up to `lags`."""
-    total = sum((each.T @ each for each in scores), np.zeros((scores[0].shape[1],) * 2))
-    for lag in range(1, math.ceil(lags)):
-        weight = 1.0 - lag / lags
-        for each in scores:
-            across = each[lag:].T @ each[:-lag]
-            total = total + weight * (across + across.T)
-    return np.asarray(total)
+    # Whole numbers of lags are sums over a window; those between two are a mean of theirs.
+    below = max(math.floor(lags), 1)
+    above = max(math.ceil(lags), 1)
+    share = above * (lags - below) / lags if above > below else 0.0
+    found = (1.0 - share) * _windowed(scores, below)
+    return found if share == 0.0 else found + share * _windowed(scores, above)
+
+
+def _windowed(scores: Sequence[Array], length: int) -> Array:
+    """The same for a whole number: squares of sums over that many rows, at every place."""
+    total = np.zeros((scores[0].shape[1],) * 2)
+    for each in scores:
+        sums = np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
+        place = np.arange(1, len(each) + length)
+        window = sums[np.minimum(place, len(each))] - sums[np.maximum(place - length, 0)]
+        total += window.T @ window
+    return total / length
 
 
 def bandwidth(scores: Sequence[Array]) -> float:

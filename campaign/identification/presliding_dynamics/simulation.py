@@ -64,10 +64,11 @@ class Motion:
         place = np.clip(place, 0.0, len(values) - 1.0)
         left = np.minimum(place.astype(np.intp), len(values) - 2)
         x = place - left
-        rise = values[left + 1] - values[left]
-        m0, m1 = slopes[left] * self.step, slopes[left + 1] * self.step
-        turned = (1.0 - x) * x * ((1.0 - x) * (m0 - rise) - x * (m1 - rise))
-        return np.asarray(values[left] + x * rise + turned)
+        with np.errstate(invalid="ignore", over="ignore"):  # of a motion that diverged
+            rise = values[left + 1] - values[left]
+            m0, m1 = slopes[left] * self.step, slopes[left + 1] * self.step
+            turned = (1.0 - x) * x * ((1.0 - x) * (m0 - rise) - x * (m1 - rise))
+            return np.asarray(values[left] + x * rise + turned)
 
 
 def steps_per_sample(plant: Plant, sample_step: float, highest: float) -> int:

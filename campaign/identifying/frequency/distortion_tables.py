@@ -47,7 +47,8 @@ def distortion_tables(found: Sequence[Found]) -> Iterator[Table]:
         ),
         tuple(rows),
         note="Rms over the whole band over that of the output there, from lines that the "
-        "excitation left out, less the noise and the input's own part there. Coulomb friction and "
+        "excitation left out, less the noise and the input's own part there; of odd distortion "
+        "also what scatters over realisations at the excited lines. Coulomb friction and "
         "a bristle are odd; what differs by direction is even. Levels of other benches compare "
         "only at a like excitation: its rms, band and lines stand beside them.",
     )
@@ -62,12 +63,14 @@ def distortion_tables(found: Sequence[Found]) -> Iterator[Table]:
             Column("output", "Output, dB of its unit", reason="a level, not a number of the rig"),
             Column("level", "Distortion over output", "dB", "dB"),
             Column("noise", "Noise over output, dB", reason="a level, not a number of the rig"),
+            Column("recorded", "As recorded, dB", reason="a level, not a number of the rig"),
         ),
         tuple(lines),
         note="Over the linear output, that is the best linear approximation times the excitation, "
         "at the same frequency (between excited lines interpolated). At detection lines (even, "
         "odd) distortion is what the output has there; at excited lines it is the scatter of one "
-        "realisation less the noise. All are rms values of single lines of one realisation.",
+        "realisation less the noise. All are rms values of single lines of one realisation. "
+        "As recorded: the output there with what the input itself has at that line, and noise.",
     )
 
 
@@ -112,6 +115,7 @@ def _lines(best: BestLinear, distortion: Distortion) -> Iterator[dict[str, Any]]
                     "output": _db(float(beside[k])),
                     "level": _level(level, low, high, beside, k),
                     "noise": _db(math.sqrt(float(level.noise[k])) / float(beside[k])),
+                    "recorded": _db(math.sqrt(float(level.recorded[k])) / float(beside[k])),
                 }
             )
     rows.sort(key=lambda row: float(row["frequency"]))
@@ -167,6 +171,7 @@ def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
             "output": _db(float(output[k])),
             "level": level,
             "noise": _db(noise),
+            "recorded": 0.0,
         }
 
 

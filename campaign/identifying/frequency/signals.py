@@ -127,7 +127,9 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
             answers[side], channels[side] = samples, name
             break
     if not answers:
-        raise ValueError("nothing that answers its torque moves")
+        only = bench.gear is None and any(name in recording.channels for name in SENSORS["motor"])
+        why = ": a motor's angle says nothing of the load's without the bench's [gear] ratio"
+        raise ValueError(f"nothing that answers its torque moves{why if only else ''}")
     return answers, channels
 
 

@@ -19,6 +19,7 @@ from campaign.identification.frequency.welch import Excited as Excitation
 from campaign.identification.frequency_response import Array, make_response
 from campaign.identification.local_fit import FRICTION
 from campaign.identification.sine_point import SinePoint, sine_point
+from campaign.identifying.frequency.repeating import found_repeating, repeated, unused
 from campaign.identifying.frequency.signals import (
     Excited,
     Signals,
@@ -90,7 +91,7 @@ def sources(
     groups: dict[tuple[str, ...], list[ArchivedTrial]] = {}
     for trial in trials:
         groups.setdefault(_key(trial, how), []).append(trial)
-    found, remarks = [], []
+    found, remarks = [], list(unused(trials, bench))
     for (kind, *_), group in groups.items():
         make = {"sines": _of_sines, "multisine": _of_multisine, "records": _of_records}[kind]
         label = _label(group)
@@ -115,8 +116,9 @@ def _key(trial: ArchivedTrial, how: Reading) -> tuple[str, ...]:
         if period is not None:
             lines = ",".join(f"{each * period:.0f}" for each in command.frequencies)
             return ("multisine", *common, f"{rms:.3g}", lines, f"{period:.9g}")
-    if how.period is not None and trial.trial.task.duration >= how.period:
-        return ("multisine", *common, f"{how.period:.9g}")
+    found = how.period if how.period is not None else repeated(trial, how.excited)
+    if found is not None and task.duration >= found:
+        return ("multisine", *common, f"{found:.9g}")
     return ("records", *common)
 
 
@@ -216,6 +218,8 @@ def _of_multisine(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: 
     told, remarks = _all_signals(group, bench, how)
     rate = told[0][1].rate
     period = _period_of(told[0][0], how)
+    if how.period is None and not isinstance(told[0][0].trial.task.command, MultiSine):
+        remarks.append(found_repeating(period))
     samples = round(period * rate)
     if abs(samples - period * rate) > 1e-3:
         raise ValueError(f"its period of {period:.6g} s is no whole number of samples")
@@ -297,7 +301,7 @@ def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
 def _period_of(trial: ArchivedTrial, how: Reading) -> float:
     task = trial.trial.task
     found = _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
-    return found or how.period or task.duration
+    return found or how.period or repeated(trial, how.excited) or task.duration
 
 
 def _lines(trial: ArchivedTrial, period: float, leading: Array, periods: int) -> Lines:

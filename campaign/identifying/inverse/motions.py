@@ -41,6 +41,9 @@ FORCES = (DRIVE_TORQUE, JOINT_TORQUE)
 """What moves the axis, the better first: a sensor at the load knows nothing of motor and gear."""
 FEWEST_SAMPLES = 100
 FORCE = "force"
+RATES_ALIKE = 1.01
+"""Largest over smallest sample rate up to which trials have one: times of files are rounded, and
+what was resampled has the mean step of its own trial."""
 ONE_WAY = 0.02
 """Share of the moving samples up to which a direction counts as one that nothing moves in."""
 
@@ -90,9 +93,9 @@ def moved(trials: Sequence[ArchivedTrial], filtering: Filtering) -> tuple[Moved,
         if all(each.of_rate for each in found):
             raise ValueError("the rate is constant but for its sensor's noise")
         raise ValueError("the axis stands still: what it moves is no more than its sensor's noise")
-    rates = {round(each.motion.sample_rate, 6) for each in found}
-    if len(rates) > 1:
-        told = ", ".join(f"{rate:g} Hz" for rate in sorted(rates))
+    rates = [each.motion.sample_rate for each in found]
+    if max(rates) > RATES_ALIKE * min(rates):
+        told = ", ".join(dict.fromkeys(f"{rate:.3g} Hz" for rate in sorted(rates)))
         raise ValueError(f"the trials have several sample rates ({told}): name one test")
     return found
 

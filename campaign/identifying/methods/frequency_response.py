@@ -15,6 +15,7 @@ from pydantic import Field
 
 from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
+from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.one_inertia import RIGID
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
@@ -48,6 +49,10 @@ from campaign.units import Frequency, Time
 TORQUE_CONSTANT = "motor.torque_constant"
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
 AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
+MORE_PHASES = (
+    f"record {FEWEST_REALISATIONS} realisations with other phases, which tell inertias and "
+    "stiffness as well"
+)
 LOWER = "excite further below the antiresonance, above what friction holds"
 SURELY = 3.0
 """Standard deviations by which a delay lies below zero where it is told."""
@@ -83,7 +88,7 @@ class FrequencyResponseOptions(Options):
     resolution: Frequency | None = Field(default=None, gt=0)
     """Of averaged spectra; absent: a sixteenth of all that was recorded is one segment."""
     period: Time | None = Field(default=None, gt=0)
-    """Of a multisine in recordings of which no command says it."""
+    """Of a multisine in recordings of which no command says it; absent: as the command repeats."""
     lowest: Frequency = Field(default=0.0, ge=0)
     """Lowest frequency that is fitted: friction bends responses below."""
     highest: Frequency = Field(default=1e5, gt=0)
@@ -170,9 +175,11 @@ def _torque_uncertainty(bench: Bench) -> float | None:
 def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
     if told.drive is None:
         local = _local_of_axis(told, best)
+        counts = [each.excitation.realisations for each in best.source.best.values()]
+        few = bool(counts) and min(counts) < FEWEST_REALISATIONS
         for name, meaning, unit, advice in MEANINGS:
             if name in local:
-                yield Parameter(local[name], meaning, unit, "", advice)
+                yield Parameter(local[name], meaning, unit, "", MORE_PHASES if few else advice)
         return
     hangs_on_load = dict(told.places) == {"load": "motor"}
     if told.drive.misfit:

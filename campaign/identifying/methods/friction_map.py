@@ -8,8 +8,8 @@ the friction coefficient; of it alone where loads differ.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -19,10 +19,9 @@ from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.friction_line import friction_line, mean_of_stretches
+from campaign.identification.over_a_turn import OverATurn
 from campaign.identification.steady_stretches import SHORTEST_TIME
 from campaign.identification.stribeck import stribeck
-from campaign.identification.velocity_map import DirectionFit, direction_estimates, fit_direction
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.identifying.sliding import (
     DIRECTIONS,
@@ -31,8 +30,16 @@ from campaign.identifying.sliding import (
     goes_along,
     loaded,
     loads_alike,
-    places,
     points_of,
+)
+from campaign.identifying.sliding_map import (
+    COEFFICIENT,
+    FRICTION,
+    MEANINGS,
+    Mapped,
+    Quantity,
+    mapped_over_rate,
+    with_doubts,
 )
 from campaign.options import Options
 from campaign.result import (
@@ -48,9 +55,8 @@ from campaign.result import (
     Result,
     Table,
 )
-from campaign.units import AngularRate, Time, rate_here
+from campaign.units import AngularRate, Time
 
-FEWEST_SPEEDS = 6
 FINE = 100
 KEYS = {
     "coulomb_torque": "coulomb_torque",
@@ -58,14 +64,6 @@ KEYS = {
     "stribeck_velocity": "stribeck_velocity",
     "stribeck_exponent": "stribeck_exponent",
     "viscous_friction": "viscous_friction",
-}
-MEANINGS = {
-    "coulomb_torque": ("N m", "Dry friction of fast sliding"),
-    "static_torque": ("N m", "Friction at the onset of sliding"),
-    "stribeck_velocity": ("rad/s", "Rate over which friction goes from static to Coulomb"),
-    "stribeck_exponent": ("", "Shape of that"),
-    "viscous_friction": ("N m s/rad", "Friction that grows with the rate"),
-    "friction": ("N m", "Friction of sliding, at the speeds that there are"),
 }
 ADVICE = {
     "coulomb_torque": "slide at more speeds",
@@ -87,61 +85,6 @@ class FrictionMapOptions(Options):
     A sweep over decades of speed in one trial needs less."""
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """What is mapped: friction, or friction over normal load.
-
-    Attributes:
-        name: in the names of parameters: `coulomb_torque`, `coulomb_coefficient`.
-        read: of a point, signed.
-        meanings: unit and meaning of each parameter, by its name.
-        axis: of its figure: label, SI unit, display unit.
-    """
-
-    name: str
-    read: Callable[[Point], Estimate]
-    meanings: Mapping[str, tuple[str, str]]
-    axis: tuple[str, str, str]
-
-    def called(self, parameter: str) -> str:
-        """A parameter's name."""
-        if self.name == "torque":
-            return parameter
-        return parameter.replace("torque", self.name).replace(
-            "viscous_friction", f"viscous_{self.name}"
-        )
-
-
-FRICTION = Quantity("torque", lambda point: point.own.torque, MEANINGS, ("Torque", "N m", "N m"))
-COEFFICIENT = Quantity(
-    "coefficient",
-    lambda point: point.coefficient,
-    {
-        **MEANINGS,
-        "coulomb_torque": ("", "Friction coefficient of fast sliding"),
-        "static_torque": ("", "Friction coefficient at the onset of sliding"),
-        "viscous_friction": ("s/rad", "How the friction coefficient grows with the rate"),
-        "friction": ("", "Friction coefficient"),
-    },
-    ("Friction coefficient", "", ""),
-)
-
-
-@dataclass(frozen=True)
-class Mapped:
-    """One quantity over rate: what was fitted to each direction, by its name."""
-
-    quantity: Quantity
-    fits: dict[str, DirectionFit] = field(default_factory=dict)
-    lines: dict[str, dict[str, Estimate]] = field(default_factory=dict)
-
-    @property
-    def found(self) -> dict[str, dict[str, Estimate]]:
-        """Parameters by direction."""
-        told = {name: direction_estimates(fit, fit.preferred) for name, fit in self.fits.items()}
-        return {name: (told | self.lines)[name] for name in DIRECTIONS if name in told | self.lines}
-
-
 def _suits(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
     found = []
     for each in trials:
@@ -153,14 +96,10 @@ def _suits(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
 
 
 def _identify(material: Material, options: FrictionMapOptions) -> Identified:
-    points = [
-        point
-        for trial in material.trials
-        for point in points_of(trial, material.bench, options.shortest, options.slowest)
-    ]
+    points, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
     if not points:
         raise ValueError("nowhere does the axis slide steadily")
-    notes: list[str] = []
+    notes: list[str] = [] if held is None else [_over_a_turn(held)]
     quantities = [FRICTION] if loads_alike(points) else []
     quantities += [COEFFICIENT] if loaded(points) else []
     if not quantities:
@@ -169,7 +108,7 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
         notes.append(
             "Normal loads differ between stretches: friction over rate is told over the load only."
         )
-    maps = [_mapped(quantity, points, notes) for quantity in quantities]
+    maps = [with_doubts(mapped_over_rate(each, points, notes), points) for each in quantities]
     if not any(each.fits or each.lines for each in maps):
         raise ValueError("; ".join(note.rstrip(".") for note in notes))
     if goes_along(points):
@@ -192,55 +131,17 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
     )
 
 
-def _mapped(quantity: Quantity, points: Sequence[Point], notes: list[str]) -> Mapped:
-    """Stribeck curves, lines or means of each direction; what is not told goes to the notes."""
-    mapped = Mapped(quantity)
-    for name, sign in DIRECTIONS.items():
-        own = [point for point in points if point.sign == sign]
-        if not own:
-            notes.append(f"The axis never slides steadily in the {name} direction.")
-            continue
-        speed = np.array([point.speed for point in own])
-        read = [quantity.read(point) for point in own]
-        values = np.array([sign * each.value for each in read])
-        error = np.array([each.standard_error or 0.0 for each in read])
-        place = places(speed)
-        count = len(np.unique(place))
-        if count > FEWEST_SPEEDS:
-            fit = fit_direction(speed, values, error, place)
-            mapped.fits[name] = fit
-            notes.append(f"In the {name} direction {_stribeck_part(fit)}.")
-            continue
-        try:
-            line = friction_line(speed, values)
-        except ValueError as problem:
-            mean = mean_of_stretches("friction", values, quantity.meanings["friction"][0])
-            mapped.lines[name] = {"friction": mean}
-            at = f"{rate_here(float(speed.min()))} to {rate_here(float(speed.max()))}"
-            notes.append(
-                f"In the {name} direction {problem}: friction is that from {at}, and what of it is "
-                "dry or viscous is not known."
-            )
-            continue
-        mapped.lines[name] = {each.name: each for each in (line.coulomb, line.viscous)}
-        notes.append(
-            f"In the {name} direction {count} speeds show a straight line and no "
-            f"Stribeck curve; more than {FEWEST_SPEEDS} are needed."
-        )
-    return mapped
-
-
-def _stribeck_part(fit: DirectionFit) -> str:
-    """Whether friction falls or rises as sliding sets in, in words."""
-    if not fit.shows_stribeck_effect:
-        return (
-            "static friction is not told from Coulomb friction: there is no Stribeck part that "
-            "these speeds could identify"
-        )
-    values = fit.fits[fit.preferred].values
-    if values["static_torque"] < values["coulomb_torque"]:
-        return "static friction lies below Coulomb friction: friction rises as sliding sets in"
-    return "static friction lies above Coulomb friction, as of a Stribeck curve"
+def _over_a_turn(held: OverATurn) -> str:
+    """Of a torque that follows from the angle, in words."""
+    times = ("once", "twice")
+    told = " and ".join(
+        f"by {amplitude:.3g} N·m {times[k]} a turn" for k, amplitude in enumerate(held.amplitudes)
+    )
+    return (
+        f"Within steady stretches the torque changes with the angle, as gravity does: {told}, "
+        f"which is {100 * held.share:.3g} % of all that changes there. It is no friction and was "
+        "taken off; its uncertainty is the part `angle` of what was found."
+    )
 
 
 def _parameters(mapped: Mapped, first: Mapped, material: Material) -> Iterator[Parameter]:

@@ -6,7 +6,9 @@ the rate that the axis had, with its own state, and the force that drove it is w
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -59,11 +61,13 @@ class Along:
 
     def friction(self, options: Mapping[str, Any]) -> Array:
         """Friction force (N m, or N), shape (n,), of an interface with these options (SI)."""
-        lane = Lane.of(_bench(options), self._task, 1, self._step)
+        lane = Lane.of(_bench(json.dumps(options, sort_keys=True)), self._task, 1, self._step)
         parts = [found[OUT_FRICTION] for _, (found,) in simulate_together([lane])]
         return np.concatenate(parts)[: self._count]
 
 
-def _bench(options: Mapping[str, Any]) -> CompleteBench:
-    tree = {**_NOBODYS, "friction": {"load": dict(options)}}
+@lru_cache(maxsize=4)
+def _bench(options: str) -> CompleteBench:
+    """Of options as JSON: the pieces of a motion meet one friction, one after the other."""
+    tree = {**_NOBODYS, "friction": {"load": json.loads(options)}}
     return complete(Bench.model_validate(tree, context={"si": True}))

@@ -247,6 +247,13 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     found["delay"] = Estimate.without_interval(
         "delay", delay.value, "s", "it takes what a loop makes of noise as well", method=METHOD
     )
+    dry = [name for name in found if name.startswith("coulomb")]
+    lost = [name for name in dry if found[name].origin is Origin.AT_BOUND]
+    of_it = [name.replace("coulomb", "static_over_coulomb") for name in lost]
+    for name in (*of_it, *(["stribeck_velocity"] if lost == dry else [])):
+        if name in found:
+            why = "it says how a Coulomb friction changes that went to its bound"
+            found[name] = _open(found[name], why)
     stiffness = found.get("bristle_stiffness")
     if stiffness is not None and stiffness.origin is not Origin.MEASURED:
         found["bristle_damping"] = _open(

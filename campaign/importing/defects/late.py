@@ -28,6 +28,8 @@ MOST = 400_000
 """blocks of a recording that are looked at; of a longer one they are longer."""
 EXPLAINED = 0.95
 """Share of the torque that the motion explains at a delay that is believed."""
+CONSTANT = 1e-9
+"""of its size, below which a part does not change."""
 RISE = 0.05
 """of the largest rate, over which friction turns round."""
 
@@ -80,9 +82,12 @@ def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
     largest = float(np.abs(rate).max()) or 1.0
     parts = np.stack([rate, np.gradient(rate), np.tanh(rate / (RISE * largest))])
     parts = parts[:, most : most + width]
+    reach = np.abs(parts).max(axis=1)
     parts = parts - parts.mean(axis=1, keepdims=True)
     scale = np.sqrt(np.mean(parts**2, axis=1))
-    parts = parts / np.where(scale > 0, scale, 1.0)[:, None]
+    # What is constant but for its last digits, as the sign of one direction, explains nothing.
+    varies = scale > CONSTANT * reach
+    parts = parts * (varies / np.where(varies, scale, 1.0))[:, None]
     products = np.stack([correlation(torque, part) for part in parts])
     whole = parts @ parts.T
     about = torque - torque.mean()

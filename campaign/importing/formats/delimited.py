@@ -7,16 +7,17 @@ from functools import partial
 from pathlib import Path
 
 from campaign.errors import Problem
-from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
+from campaign.importing.dialect import SEPARATORS, Dialect, dialect_of, encoding_of
 from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import beginning, blocks, encoding_of_file
+from campaign.importing.stacked import stacked
 
 SAMPLE = 400
 """Lines by which the table is."""
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """The one table of a text file. Raises RecordingError."""
+    """The table of a text file, or those below each other. Raises RecordingError."""
     encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
         sample = beginning(file, path, SAMPLE)
@@ -25,17 +26,34 @@ def tables(path: Path) -> Sequence[Table]:
         separators = ", ".join(SEPARATORS.values())
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError([Problem(path, 0, 0, message)])
+    below = stacked(path, encoding, dialect, sample)
+    if not below:
+        read = partial(blocks, path, encoding, dialect)
+        return (Table("", _columns(dialect), read, said=dialect.said, doubts=dialect.doubts),)
+    return tuple(
+        Table(
+            f"block {number}",
+            _columns(each.dialect),
+            partial(blocks, path, encoding, each.dialect, rows=each.lines),
+            rows=each.rows,
+            said=each.dialect.said,
+            doubts=dialect.doubts,
+            below=True,
+        )
+        for number, each in enumerate(below, start=1)
+    )
+
+
+def _columns(dialect: Dialect) -> tuple[Column, ...]:
     count = len(dialect.numeric)
     names = dialect.names or ("",) * count
     names = tuple(name or f"column {k}" for k, name in enumerate(names, start=1))
-    columns = tuple(
+    return tuple(
         Column(name, unit, f"column {k}", numeric)
         for k, (name, unit, numeric) in enumerate(
             zip(names, dialect.units, dialect.numeric, strict=True), start=1
         )
     )
-    read = partial(blocks, path, encoding, dialect)
-    return (Table("", columns, read, said=dialect.said, doubts=dialect.doubts),)
 
 
 def _recognises(head: bytes) -> bool:

@@ -58,6 +58,8 @@ class TableGuess:
         step: s between samples, by a clock that the file states, or by times whose unit is
             stated or likely; None where that cannot be told.
         clock: whether the file states the clock, without a column of times.
+        restarts: how often its time begins anew.
+        below: whether it is one of several below each other in a text file.
         doubts: what is wrong with it as a whole.
     """
 
@@ -69,6 +71,8 @@ class TableGuess:
     more: bool = False
     step: float | None = None
     clock: bool = False
+    restarts: int = 0
+    below: bool = False
     doubts: tuple[str, ...] = ()
     said: dict[str, str] = field(default_factory=dict)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.importing.cutting import restarts
 from campaign.importing.defects.between import DEG, Slope, slope
 from campaign.importing.defects.clock import ticks
 from campaign.importing.defects.defect import Array
@@ -37,6 +38,12 @@ def increases(values: Array) -> bool:
         return False
     steps = np.diff(known)
     return bool(known[-1] > known[0] and (steps < 0).mean() < 0.01)
+
+
+def goes_on_anew(values: Array) -> bool:
+    """Whether it increases, begins anew, and increases again, as the times of several trials do."""
+    parts = np.split(values, restarts(values))
+    return len(parts) > 1 and all(increases(part) for part in parts if len(part) > 1)
 
 
 def evenly(values: Array) -> bool:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.channels import COMMAND, MOTOR_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.importing.cutting import restarts
 from campaign.importing.defects import Defect, Severity, find
 from campaign.importing.defects.clock import ticks
 from campaign.importing.guess.axes import axes
@@ -21,6 +22,7 @@ from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGue
 from campaign.importing.guess.evidence import (
     counts,
     evenly,
+    goes_on_anew,
     increases,
     seconds_of,
     stated_rate,
@@ -82,14 +84,17 @@ def _of_table(path: Path, format_name: str, looked: _Looked) -> TableGuess:
     table, columns, series = looked.table, looked.columns, looked.series
     time, step = _time(columns, series, table)
     doubts = list(table.doubts)
+    anew = 0 if time is None else len(restarts(time))
     if time is None:
         doubts.append("no time is known: state a rate, or which column holds times")
     else:
         columns = with_units(by_numbers(columns, series, time), series, time)
-        doubts += _defects(columns, series, time)
+        once = slice(0, next(iter(restarts(time)), None))
+        first = {place: values[once] for place, values in series.items()}
+        doubts += _defects(columns, first, time[once])
     return TableGuess(
         path, format_name, table.name, tuple(columns), looked.rows, looked.rows == SAMPLE, step,
-        table.clock is not None, tuple(doubts), dict(table.said),
+        table.clock is not None, anew, table.below, tuple(doubts), dict(table.said),
     )  # fmt: skip
 
 
@@ -100,7 +105,8 @@ def _by_name(table: Table, place: int, values: Array | None) -> ColumnGuess:
     unit, usable = stated_unit(column.unit)
     says = named(column.name, column.unit)
     role, why = says.role, says.why
-    if role == TIME and not increases(values[np.isfinite(values)]):
+    known = values[np.isfinite(values)]
+    if role == TIME and not (increases(known) or goes_on_anew(known)):
         role, why = UNKNOWN, "a name of times, but they do not increase"
     if role == INDEX and not (counts(values) or increases(values)):
         role, why = UNKNOWN, "a name of an index, but it does not count"
@@ -126,7 +132,6 @@ def _by_name(table: Table, place: int, values: Array | None) -> ColumnGuess:
     elif says.unit:
         basis = Basis.STATED if says.sure else Basis.LIKELY
         chosen, unit_why = says.unit, "its name ends with it"
-    known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     return ColumnGuess(
         column.name, column.place, role, why, chosen, basis, unit_why, tuple(doubts), low, high,
@@ -188,7 +193,8 @@ def _time(
             continue
         values = _without_holes(series[place])
         if each.basis is not Basis.STATED:
-            likely = unit_of_time(values, stated_rate(table.said))
+            once = np.split(values, restarts(values)[:1])[0]
+            likely = unit_of_time(once, stated_rate(table.said))
             if likely is None:
                 continue
             each = replace(each, unit=likely.unit, basis=Basis.LIKELY, unit_why=likely.why)
@@ -197,7 +203,7 @@ def _time(
         if seconds is None:
             continue
         time = (values - values[0]) * seconds
-        return time, ticks(time).step or None
+        return time, ticks(np.split(time, restarts(time)[:1])[0]).step or None
     return None, None
 
 

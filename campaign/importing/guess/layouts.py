@@ -77,10 +77,14 @@ def _slug(text: str) -> str:
 
 
 def _alike(one: LayoutGuess, other: LayoutGuess) -> bool:
-    """Whether the same columns are read in the same way; within a file each table is its own."""
+    """Whether the same columns are read in the same way.
+
+    Within a file each table is its own, but for those of a text file that lie below each other.
+    """
+    below = one.tables[0].below and other.tables[0].below
     return (
         not one.known
-        and one.tables[0].file != other.tables[0].file
+        and (below or one.tables[0].file != other.tables[0].file)
         and _what_is_read(one) == _what_is_read(other)
     )
 
@@ -89,7 +93,14 @@ def _what_is_read(layout: LayoutGuess) -> list[object]:
     found: list[object] = [layout.axis, *(table.clock for table in layout.tables)]
     for each in layout.columns:
         column = each.column
-        found += [each.table, each.place, column.name, column.role, column.unit, column.basis]
+        found += [
+            "" if layout.tables[0].below else each.table,
+            each.place,
+            column.name,
+            column.role,
+            column.unit,
+            column.basis,
+        ]
     return found
 
 

@@ -37,11 +37,14 @@ _THERMOMETER = re.compile(r"T_?\d{1,2}")
 _MOTOR_TORQUE = re.compile(r"T_?[mM]")
 _JOINT = frozenset(("joint", "j", "jnt", "axis", "achse", "axe"))
 """Words that say of which axis a column is, and nothing else."""
+_ALSO_A_PLACE = frozenset(
+    ["set", "tar", "traj", "trajectory", "profile", "action", "limited", "required"]
+)
 _BELONGS = CHANGES["hull"] | {
-    *("cmd", "cmds", "command", "commands", "target", "desired", "ref", "reference", "goal"),
-    *("setpoint", "motor", "imu", "gyro"),
+    *(word for word in CHANGES["target"] - _ALSO_A_PLACE if len(word) > 2),
+    *("motor", "imu", "gyro"),
 }
-"""What a part of a path adds to its last one."""
+"""What a part of a path adds to its last one; `set 1/position` is rather one of several."""
 _NOWHERE = frozenset(
     ["xyz", "tcp", "pose", "wrench", "twist", "orientation", "quaternion", "cartesian"]
 )

@@ -11,7 +11,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from campaign.importing.guess.stated import stated_unit
-from campaign.importing.guess.words import CHANGES, KNOWN, taken_apart
+from campaign.importing.guess.words import CHANGES, KNOWN, WORDS, taken_apart
 
 _SPELLED = {
     "deg": "deg",
@@ -81,9 +81,14 @@ _PER_SECOND = {
     "turns": "rev/s",
 }
 _THOUSANDTHS = {"milli": "ms", "micro": "us", "nano": "ns"}
+_MOVING = WORDS["angle"] | WORDS["rate"] | WORDS["current"]
+_LETTER_AND_AXIS = re.compile(r"[mld][xyz]")
+"""Behind a quantity that moves: of the motor, the load, or a target. Elsewhere `mx` is a moment."""
+_STARRED = re.compile(r"(?<=[^\W_])\*(?=$|[\s_.:/\[(])")
+"""As `iq*`: drives mark targets so."""
 _WHOLE = re.compile(r"(?:m|c|k)?N(?:c|m)?m|m?A|k?N|deg[CK]|(?:m|u)?rad|[un]s|ms|rpm|RPM")
 """What would fall apart at its capital letters."""
-_PIECE = re.compile(r"[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+")
+_PIECE = re.compile(r"[A-Z]{2,}(?=[xyz](?![a-zß-ÿ]))|[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+")
 _GREEK = {"θ": "theta", "ω": "omega", "τ": "tau", "φ": "phi", "ϕ": "phi", "µ": "mu", "μ": "mu"}
 _BRACKETED = re.compile(r"^(?P<name>.*\S)\s*[\[(<](?P<unit>[^\[\]()<>]*)[\])>]$")
 _ALONE = re.compile(r"^[\[(<](?P<unit>[^\[\]()<>]*)[\])>]$")
@@ -145,6 +150,7 @@ def _parts(text: str) -> list[tuple[str, ...]]:
     """Of a path, as pieces in the letters of the file."""
     for letter, word in _GREEK.items():
         text = text.replace(letter, word)
+    text = _STARRED.sub("_target", text)
     found = []
     for part in re.split(r"[./:]", text):
         own: list[str] = []
@@ -163,7 +169,10 @@ def _apart(part: tuple[str, ...]) -> tuple[str, ...]:
     """The words of a part: compounds as several, `set point` as one."""
     found: list[str] = []
     for piece in part:
-        for word in taken_apart(piece.lower()):
+        low = piece.lower()
+        of_axis = _LETTER_AND_AXIS.fullmatch(low)
+        said = (_MOVING | WORDS["torque"]) if low[0] == "d" else _MOVING
+        for word in low if of_axis and not said.isdisjoint(found) else taken_apart(low):
             if found and len(found[-1] + word) > 5 and found[-1] + word in KNOWN:
                 found[-1] += word
             else:

@@ -23,6 +23,7 @@ from campaign.channels import (
     AxisKind,
     Quantity,
 )
+from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
 from campaign.importing.guess.evidence import stated_rate
 from campaign.importing.guess.layouts import LayoutGuess, Placed, layouts
@@ -111,6 +112,9 @@ def _recording(layout: LayoutGuess, base: Path | None) -> Iterator[str]:
     if not layout.several and layout.tables[0].name:
         yield f"table = {_quoted(layout.tables[0].name)}"
     yield f"columns = {_quoted(layout.name)}"
+    if anew := max(table.restarts for table in layout.tables):
+        told = f"time begins anew {counted(anew, 'time')}: a trial for each stretch"
+        yield _doubt(f"restarts = true  # {told}")
     for table in layout.tables:
         of = f"{table.name}: " if layout.several else ""
         rows = f"{'more than ' if table.more else ''}{table.rows} rows"

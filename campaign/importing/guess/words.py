@@ -53,7 +53,7 @@ _ESTIMATE = "estimate estimated est hat kalman observer observed"
 _TARGET = (
     "target targets cmd cmds command commands commanded soll sollwert demand demanded setpoint "
     "set desired des ref reference goal d g sp tgt request requested req consigne vorgabe "
-    "action wanted required limited tar"
+    "action wanted required limited tar planned ideal programmed traj trajectory profile refs star"
 )
 _MOTOR = (
     "motor motors mot mtr moteur m servo shaft antrieb antriebs antriebsseite rotor wm wr "
@@ -119,12 +119,66 @@ _LINKS = ("", "s", "es", "n", "en")
 """What German puts between the words of a compound."""
 
 
+_QUANTITIES = WORDS["torque"] | WORDS["current"] | WORDS["rate"] | WORDS["angle"]
+_AXES = ("x", "y", "z")
+_SIDED = ("m", "l")
+"""Letters at the end of a quantity that say its side of the gear: `omegam`."""
+_MARKERS = sorted((word for word in CHANGES["target"] if len(word) >= 3), key=len, reverse=True)
+_UNMISTAKABLE = (*tuple(word for word in _MARKERS if len(word) >= 6), "soll")
+"""Markers that are part of no other word."""
+_WRITTEN_OUT = ("command", "demand", "desired", "reference", "setpoint", "target")
+_VOWELS = frozenset("aeiou")
+
+
 @cache
 def taken_apart(word: str) -> tuple[str, ...]:
-    """A compound as its words, where all are known: `motorstrom`; else the word alone."""
-    if word in KNOWN or len(word) < 6:
+    """A compound as its words, where all are known: `motorstrom`; else the word alone.
+
+    What ends with the letter of an axis is taken apart as well (`refx`), and so is what begins or
+    ends with the mark of a target (`iqref`, `refpos`): a target must not pass for a measurement.
+    """
+    if word in KNOWN:
         return (word,)
-    return _parts(word) or (word,)
+    if len(word) > 2 and word[-1] in _AXES and _telling(before := taken_apart(word[:-1])):
+        return (*before, word[-1])
+    if target := _target(word):
+        return target
+    if len(word) > 3 and word[-1] in _SIDED and word[:-1] in _QUANTITIES:
+        return word[:-1], word[-1]
+    return (_parts(word) or (word,)) if len(word) >= 6 else (word,)
+
+
+def _telling(words: tuple[str, ...]) -> bool:
+    """Whether words say more than `of` or `real`."""
+    return any(word in KNOWN and word not in CHANGES["neutral"] for word in words)
+
+
+def _target(word: str) -> tuple[str, ...]:
+    """A word with the mark of a target in it, taken apart; nothing where there is none."""
+    if _abbreviates(word):
+        return ("target",)
+    for mark in _MARKERS:
+        for rest in (word.removesuffix(mark), word.removeprefix(mark)):
+            if rest != word and (rest in _QUANTITIES or rest in (*_AXES, *_SIDED)):
+                return rest, mark
+    if len(word) > 4 and (rest := word.removesuffix("sp")) != word and rest in _QUANTITIES:
+        return rest, "sp"
+    mark = next((mark for mark in _UNMISTAKABLE if mark in word), "")
+    return (*_parts(word.replace(mark, "", 1)), mark) if mark else ()
+
+
+def _abbreviates(word: str) -> bool:
+    """Whether it is the mark of a target by its consonants: `dmd`, `stpt`, `trgt`."""
+    if len(word) < 3 or not _VOWELS.isdisjoint(word):
+        return False
+    for long in _WRITTEN_OUT:
+        letters = iter(long)
+        consonants = sum(letter not in _VOWELS for letter in long)
+        in_order = all(letter in letters for letter in word)
+        ends = word[0] == long[0] and word[-1] == long.rstrip("aeiou")[-1]
+        if ends and in_order and len(word) >= 0.6 * consonants:
+            return True
+    return False
 
 
 def _parts(word: str) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from campaign.identification.frequency.multisine import (
     crest_factor,
     odd_grid,
     random_phases,
+    repetition,
 )
 from tests.identification.coverage import holds, rejected
 from tests.identification.frequency.drives import Drive, loop_of, random_drive, simulated
@@ -69,6 +70,30 @@ def test_of_many_draws_the_lowest_crest_factor_is_kept() -> None:
     one = [crest_factor(random_phases(GRID, 1.0, k).sample(time)) for k in range(20)]
     best = [crest_factor(random_phases(GRID, 1.0, k, draws=30).sample(time)) for k in range(20)]
     assert max(best) < np.mean(one)
+
+
+def test_a_multisine_is_told_by_its_repetition() -> None:
+    time = np.arange(5 * SAMPLES // 2) / RATE
+    noise = np.random.default_rng(1).standard_normal(len(time))
+    multisine = random_phases(GRID, 1.0, 3).sample(time)
+    assert repetition(multisine) == SAMPLES
+    assert repetition(multisine + 0.01 * noise) == SAMPLES
+    assert repetition(multisine[: 3 * SAMPLES // 2]) is None  # seen once
+    sine = np.sin(2 * np.pi * 0.5 * time)
+    ramps = np.arcsin(sine)
+    for other in (noise, sine, ramps, np.clip(ramps, -1.0, 1.0), np.sign(sine), 0.0 * time):
+        assert repetition(other) is None
+
+
+def test_parities_are_not_told_where_even_lines_are_excited() -> None:
+    lines = np.arange(2, 100)
+    grid = OddGrid(PERIOD, lines, lines[:0], lines[:0])
+    found = best_linear(u := inputs(2, 2, grid=grid), distorted(u, 0.002, 1), RATE, 2, lines[::2])
+    assert found.distortion is not None
+    for parity in ("even", "odd"):
+        told = total(found.distortion, parity)  # type: ignore[arg-type]
+        assert np.isnan(told.value)
+        assert "share lines" in told.reason
 
 
 def test_static_nonlinearity_has_its_closed_form() -> None:
