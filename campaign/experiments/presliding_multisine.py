@@ -26,6 +26,7 @@ from campaign.experiments.results.presliding_dynamics import (
     record_of,
     remarks,
     table_of,
+    with_torques_known,
 )
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
@@ -126,7 +127,7 @@ def _fit(items: Sequence[TrialData]) -> PreslidingDynamics:
     options, bench = _options(items[0].trial), bench_of(items[0].trial)
     span = options.lowest, options.highest
     records = [record_of(item, 1.0 / options.lowest) for item in items]
-    return identify_presliding_dynamics(records, assumed_of(bench, span))
+    return identify_presliding_dynamics(with_torques_known(items, records), assumed_of(bench, span))
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:

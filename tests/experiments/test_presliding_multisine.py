@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.experiments.presliding_multisine import EXPERIMENT
 from campaign.experiments.shared.multisine import first_slip, odd_multisine
+from campaign.protocol.bench_file import load_bench
 from campaign.result import Result
 from tests.experiments.laboratory import analyse, execute, trials
 from tests.physics.benches import bench
@@ -122,3 +124,25 @@ def test_the_assumed_damping_stands_beside_the_measured_one() -> None:
     (figure,) = (each for each in found("0.3 N m", "0.6 N m").figures if each.key == "damping")
     (mark,) = figure.panels[0].marks
     assert mark.y == pytest.approx(1.6 * math.sqrt(AT_REST * 35.0), rel=2e-3)
+
+
+def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals() -> None:
+    """Noise of its current is as large as the torque, and its loop holds the command."""
+    axis, held = load_bench("linear"), 0
+    lead = 2.0 * math.pi / 0.01  # rad/m
+    truths = {
+        "stiffness_at_rest": 2e6 + 5.0 * lead**2,
+        "damping_at_rest": 3150.0 + 0.01 * lead**2,
+        "inertia": 27.9,
+    }
+    sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
+    for seed in range(1, 5):
+        options = {**sizes, "periods": 4, "seed": seed}
+        with speaking_of(axis.sides):
+            row = joint(analyse(KIND, execute(trials(KIND, axis, options))))
+        for name, truth in truths.items():
+            low, high = row[name].combined
+            held += low <= truth <= high
+            assert row[name].half_width < 0.08 * truth, name
+    # Of 12 intervals of 95 %, 9 or fewer would be a chance of 1 in 50.
+    assert held > 9

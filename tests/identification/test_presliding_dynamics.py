@@ -17,7 +17,7 @@ from campaign.identification.presliding_dynamics.found import (
     identify_presliding_dynamics,
 )
 from campaign.identification.presliding_dynamics.plant import Appendage, Bristles, Plant
-from campaign.identification.presliding_dynamics.record import Assumed, Record, of_lines
+from campaign.identification.presliding_dynamics.record import Assumed, Record
 from campaign.identification.presliding_dynamics.simulation import (
     simulate,
     steps_per_sample,
@@ -211,26 +211,6 @@ def test_lost_samples_cost_only_themselves() -> None:
     found = identify_presliding_dynamics([replace(whole, rate=rate)])
     for name, truth in true_values(SLOW).items():
         assert held(found.estimates[name], truth), name
-
-
-def test_noise_of_the_torque_stiffens_what_is_found_unless_only_its_lines_are_taken() -> None:
-    lines = 0.375 * np.arange(1, 40, 2)
-    time = STEP * np.arange(2400)
-    rng = np.random.default_rng(8)
-    phase = rng.uniform(0.0, 2.0 * np.pi, len(lines))
-
-    def torque(at: Array) -> Array:
-        turned = 2.0 * np.pi * np.multiply.outer(at, lines) + phase
-        return np.asarray(0.2 * (np.sin(turned) - np.sin(phase)).sum(axis=-1))
-
-    _, rate = SLOW.answer(torque, time)
-    seen = rate + 0.02 * np.std(rate) * rng.standard_normal(len(time))
-    noisy = torque(time) + 0.2 * rng.standard_normal(len(time))
-    plain = identify_presliding_dynamics([Record(STEP, noisy, rate=seen)])
-    assert plain.fit.plant.inertia > 1.05 * 2.0
-    own = identify_presliding_dynamics([Record(STEP, of_lines(time, noisy, lines), rate=seen)])
-    assert own.fit.plant.inertia == pytest.approx(2.0, rel=0.02)
-    assert own.fit.plant.stiffness == pytest.approx(2000.0, rel=0.02)
 
 
 # Intervals that hold -----------------------------------------------------------------------------

@@ -9,14 +9,16 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.interface import TrialData
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.results.held_current import between_samples
 from campaign.experiments.shared.captions import amount
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.intervals import shifted_by
 from campaign.identification.presliding import damping_by_ratio
+from campaign.identification.presliding_dynamics.driven_torque import Driven, driven_torques
 from campaign.identification.presliding_dynamics.found import PreslidingDynamics
 from campaign.identification.presliding_dynamics.plant import Appendage
-from campaign.identification.presliding_dynamics.record import Assumed, Record, of_lines
+from campaign.identification.presliding_dynamics.record import Assumed, Record
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.loop import at_load
@@ -42,8 +44,6 @@ TIME, RATE = Axis("Time", "s", "s"), Axis("Rate", "rad/s", "mrad/s")
 def record_of(data: TrialData, period: float | None = None) -> Record:
     """Torque and motion of a trial that begins at rest, by the best of its sensors.
 
-    Of a multisine's torque only the lines are taken: the rest is noise of the current's sensor.
-
     Raises ValueError where it has none, or where the record is too short.
     """
     recording = data.recording()
@@ -51,17 +51,43 @@ def record_of(data: TrialData, period: float | None = None) -> Record:
     angle = (
         recording[RELATIVE_ANGLE] if rate is None and RELATIVE_ANGLE in recording.channels else None
     )
-    torque, task = recording[DRIVE_TORQUE], data.trial.task
-    if task.mode == "torque" and isinstance(task.command, MultiSine) and np.all(torque == torque):
-        torque = of_lines(recording.time, torque, task.command.frequencies)
     return Record(
-        1.0 / task.sample_rate,
-        torque,
+        1.0 / data.trial.task.sample_rate,
+        recording[DRIVE_TORQUE],
         rate=None if rate is None else recording[rate],
         angle=angle,
         period=period,
         label=data.trial.label,
     )  # fmt: skip
+
+
+def with_torques_known(trials: Sequence[TrialData], records: Sequence[Record]) -> list[Record]:
+    """The records, with all that is known of the torque of those that a multisine shook.
+
+    That is their torque without its sensor's noise and with what it is between its samples, and
+    what it may be off by. All trials are of one bench.
+    """
+    commands = {number: _multisine(each) for number, each in enumerate(trials)}
+    shaken = {number: each for number, each in commands.items() if each is not None}
+    found, doubts = dict(enumerate(records)), 0
+    for step in sorted({found[number].step for number in shaken}):
+        alike = {number: each for number, each in shaken.items() if found[number].step == step}
+        driven = [Driven(found[n].torque, each.sample) for n, each in alike.items()]
+        highest = max(max(each.frequencies) for each in alike.values())
+        told = driven_torques(driven, step, highest)
+        for (number, command), (torque, doubt) in zip(alike.items(), told, strict=True):
+            record = found[number].until(len(torque))
+            missing, more = between_samples(record.time, command, bench_of(trials[number].trial))
+            doubt = np.column_stack([np.zeros((len(torque), doubts)), doubt, more])
+            found[number] = replace(record, torque=torque + missing, doubt=doubt)
+        doubts = doubt.shape[1]
+    return [each.with_doubts(doubts) for each in found.values()]
+
+
+def _multisine(data: TrialData) -> MultiSine | None:
+    """The torque that a trial was commanded, where it was a multisine."""
+    task = data.trial.task
+    return task.command if task.mode == "torque" and isinstance(task.command, MultiSine) else None
 
 
 def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumed:

@@ -10,11 +10,8 @@ import numpy as np
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.intervals import LEVEL, judged, shifted_by, student, with_error
-from campaign.identification.presliding_dynamics.fit import (
-    Fitted,
-    fit_presliding_dynamics,
-    whitened,
-)
+from campaign.identification.presliding_dynamics.fit import fit_presliding_dynamics, whitened
+from campaign.identification.presliding_dynamics.fitted import Fitted
 from campaign.identification.presliding_dynamics.parameters import FARTHEST, LOGARITHMIC
 from campaign.identification.presliding_dynamics.plant import Array, Plant
 from campaign.identification.presliding_dynamics.record import Assumed, Record

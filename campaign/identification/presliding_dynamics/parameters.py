@@ -1,5 +1,7 @@
 """The parameters of the joint fit as one vector, and back.
 
+What is asked for stands first, then what the torque of all records may be off by, then what is each
+record's own.
 Stiffness and inertia are logarithms, so that they stay positive and their intervals suit them.
 Damping, which may turn out to be nothing, is linear: it may leave its bound, and the fit then says
 so. Everything is scaled to be of order one.
@@ -37,6 +39,7 @@ class Parameters:
         first: the plant that scales are taken from.
         step: sampling step that delays are scaled by (s).
         torque: that yielding is scaled by (N m), the largest of all records.
+        doubts: how many factors of what the torque may be off by there are, of all records.
         own: how many parameters each record has: offset of the torque; and bristle torque and rate
             at the beginning of one that does not begin at rest.
     """
@@ -46,6 +49,7 @@ class Parameters:
     assumed: Assumed
     step: float
     torque: float
+    doubts: int
     own: tuple[int, ...]
 
     @classmethod
@@ -69,13 +73,24 @@ class Parameters:
             assumed,
             min(record.step for record in records),
             max(record.amplitude for record in records),
+            records[0].doubts.shape[1],
             tuple(1 if record.at_rest else 3 for record in records),
         )
 
     @property
     def size(self) -> int:
         """Of the whole vector."""
-        return len(self.names) + sum(self.own)
+        return self.common + sum(self.own)
+
+    @property
+    def common(self) -> int:
+        """How many stand before those of the records."""
+        return len(self.names) + self.doubts
+
+    @property
+    def doubted(self) -> slice:
+        """Where the factors of what the torque may be off by stand."""
+        return slice(len(self.names), self.common)
 
     def index(self, name: str) -> int | None:
         """Where a shared parameter stands; None: it is not free."""
@@ -83,7 +98,7 @@ class Parameters:
 
     def of_record(self, number: int) -> slice:
         """Where the parameters of a record stand."""
-        begin = len(self.names) + sum(self.own[:number])
+        begin = self.common + sum(self.own[:number])
         return slice(begin, begin + self.own[number])
 
     def start(self) -> Array:

@@ -6,12 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from campaign.identification.presliding_dynamics.fit import Channel, Fitted
+from campaign.identification.presliding_dynamics.channel import Channel
+from campaign.identification.presliding_dynamics.fitted import Fitted, Grid
 from campaign.identification.presliding_dynamics.record import Record, measured
-from campaign.identification.presliding_dynamics.simulation import (
-    steps_per_sample,
-    torque_on_grid,
-)
 
 
 def unexplained(fit: Fitted, record: Record) -> float:
@@ -19,8 +16,7 @@ def unexplained(fit: Fitted, record: Record) -> float:
 
     Of its first channel, offset and drift taken out of both. Nothing is fitted but those.
     """
-    count = steps_per_sample(fit.plant, record.step, record.highest_frequency())
-    between = fit.parameters.assumed.between
+    grid = Grid.of(record, fit.plant, fit.parameters.assumed.between)
     channels = tuple(
         Channel.of(name, samples, there, 1.0, np.ones(1))
         for name, samples, there in measured(record)
@@ -30,10 +26,12 @@ def unexplained(fit: Fitted, record: Record) -> float:
     other = replace(
         fit,
         records=(record,),
-        parameters=replace(fit.parameters, own=(own,)),
+        parameters=replace(fit.parameters, doubts=0, own=(own,)),
         vector=np.append(shared, np.zeros(own)),
         channels=(channels,),
-        grids=((torque_on_grid(record.torque, count, between), count),),
+        grids=(grid,),
+        taken=np.zeros(0),
+        doubts=(np.zeros((len(channels), len(record.torque), 0)),),
     )
     first, answer = channels[0], other.answers(0)[0]
     missed = first.left(first.samples - answer)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,8 @@ class Record:
         angle: of the load, by an encoder (rad), shape (n,), likewise.
         at_rest: whether it begins at rest, so that the bristles hold the first torque; else
             bristles and rate at the beginning are free.
+        doubt: columns that the torque may be off by (N m), shape (n, m), each times a factor that
+            has a standard normal distribution and is the same in all records; None: it is known.
         period: of the torque (s), where it repeats itself; None: that is looked for. A quantised
             channel then errs alike in each period.
         label: what to call it.
@@ -42,6 +43,7 @@ class Record:
     rate: Array | None = None
     angle: Array | None = None
     at_rest: bool = True
+    doubt: Array | None = None
     period: float | None = None
     label: str = ""
 
@@ -66,6 +68,16 @@ class Record:
         return self.label or "a record"
 
     @property
+    def doubts(self) -> Array:
+        """`doubt`, or no column, shape (n, m)."""
+        return np.zeros((len(self.torque), 0)) if self.doubt is None else self.doubt
+
+    def with_doubts(self, count: int) -> Record:
+        """Likewise, with columns of 0 up to that many."""
+        more = np.zeros((len(self.torque), count - self.doubts.shape[1]))
+        return replace(self, doubt=np.column_stack([self.doubts, more]))
+
+    @property
     def time(self) -> Array:
         """Of the samples (s), shape (n,)."""
         return np.asarray(self.step * np.arange(len(self.torque)))
@@ -74,6 +86,12 @@ class Record:
     def amplitude(self) -> float:
         """Largest torque (N m)."""
         return float(np.max(np.abs(self.torque)))
+
+    def until(self, count: int) -> Record:
+        """Its first samples."""
+        parts = (self.rate, self.angle, self.doubt)
+        rate, angle, doubt = (None if part is None else part[:count] for part in parts)
+        return replace(self, torque=self.torque[:count], rate=rate, angle=angle, doubt=doubt)
 
     def highest_frequency(self, share: float = 0.999) -> float:
         """Frequency (Hz) below which this share of the torque that the load answers to lies.
@@ -123,18 +141,6 @@ def measured(record: Record) -> list[tuple[str, Array, NDArray[np.bool_]]]:
 def _says_something(values: Array) -> bool:
     there = values[np.isfinite(values)]
     return len(there) >= FEWEST and bool(np.ptp(there) > 0)
-
-
-def of_lines(time: Array, values: Array, frequencies: Sequence[float]) -> Array:
-    """The part of a series (n,) that is a sum of sines of these frequencies (Hz), and its mean.
-
-    A measured torque has noise, and a simulation that is fed with it answers to that as well: what
-    is fitted then is a little too stiff, too damped and too heavy. Of a known multisine only the
-    lines are torque.
-    """
-    turns = 2.0 * np.pi * np.multiply.outer(time, np.asarray(frequencies))
-    design = np.column_stack([np.ones(len(time)), np.cos(turns), np.sin(turns)])
-    return np.asarray(design @ np.linalg.solve(design.T @ design, design.T @ values))
 
 
 @dataclass(frozen=True)

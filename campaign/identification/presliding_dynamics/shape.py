@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.identification.presliding_dynamics.fit import Fitted
+from campaign.identification.presliding_dynamics.fitted import Fitted, products, with_torque
 from campaign.identification.presliding_dynamics.long_run import at_bandwidths
 from campaign.identification.presliding_dynamics.plant import Array, Bristles
 
@@ -212,13 +212,9 @@ def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
 
 def _pushed(fit: Fitted, number: int, force: Array) -> Array:
     """The answer with a further force on the load, of shape (steps + 1,)."""
-    grid, count = fit.grids[number]
     middle = 0.5 * (force[:-1] + force[1:])
     more = PUSH * np.column_stack([force[:-1], middle, force[1:]])
-    pushed = replace(
-        fit, grids=(*fit.grids[:number], (grid - more, count), *fit.grids[number + 1 :])
-    )
-    return pushed.answers(number)
+    return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
 def _score_test(fit: Fitted, columns: list[Array]) -> tuple[Array, Array, float, float]:
@@ -230,27 +226,29 @@ def _score_test(fit: Fitted, columns: list[Array]) -> tuple[Array, Array, float,
     from scipy.special import chdtrc
 
     size, count = fit.parameters.size, columns[0].shape[-1]
-    information = np.diag(fit.priors**2)
+    information = fit.information
     across, square = np.zeros((size, count)), np.zeros((count, count))
     for slopes, more in zip(fit.jacobians, columns, strict=True):
-        information = information + np.einsum("cni,cnj->ij", slopes, slopes)
-        across += np.einsum("cni,cnj->ij", slopes, more)
-        square += np.einsum("cni,cnj->ij", more, more)
+        across += products(slopes, more)
+        square += products(more, more)
     onto = np.linalg.solve(information, across)
     own = square - across.T @ onto
     kept = np.diag(own) > ALIKE * np.maximum(np.diag(square), np.finfo(float).tiny)
     if not np.any(kept):
         return np.zeros(count), np.zeros(size), 1.0, 0.0
     apart = [
-        (more - np.einsum("cni,ik->cnk", slopes, onto))[:, :, kept]
+        (more - slopes @ onto)[:, :, kept]
         for slopes, more in zip(fit.jacobians, columns, strict=True)
     ]
     pairs = list(zip(fit.residuals, apart, strict=True))
-    total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=np.zeros(int(kept.sum())))
+    # What is known beforehand is measured, too: residuals of their own.
+    known = fit.priors[:, None] * onto[:, kept]
+    total = known.T @ (fit.priors * fit.vector)
+    total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=total)
     inverse = np.linalg.pinv(own[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
     # What the columns explain is no noise: it would hide itself behind its own size.
     scores = [(left - more @ (inverse @ total))[:, :, None] * more for left, more in pairs]
-    meat = at_bandwidths([np.sum(each, axis=0) for each in scores])[1]
+    meat = at_bandwidths([np.sum(each, axis=0) for each in scores])[1] + known.T @ known
     scale = np.sqrt(np.diag(meat))
     statistic = float(
         (total / scale)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.identification.presliding_dynamics.fit import Fitted, search
+from campaign.identification.presliding_dynamics.fit import search
+from campaign.identification.presliding_dynamics.fitted import Fitted
 from campaign.identification.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
 from campaign.identification.presliding_dynamics.plant import Array
 
@@ -60,11 +61,11 @@ def spread_of(fit: Fitted) -> Spread:
     Raises ValueError where the records cannot tell the parameters apart.
     """
     shared = len(fit.parameters.names)
-    information = np.diag(fit.priors**2)
-    scores = []
-    for left, slopes in zip(fit.residuals, fit.jacobians, strict=True):
-        information = information + np.einsum("cni,cnj->ij", slopes, slopes)
-        scores.append(np.einsum("cn,cni->ni", left, slopes))
+    information = fit.information
+    scores = [
+        np.sum(left[:, :, None] * slopes, axis=0)
+        for left, slopes in zip(fit.residuals, fit.jacobians, strict=True)
+    ]
     length = np.sqrt(np.diag(information))
     if not np.all(length > 0):
         raise ValueError("a parameter changes nothing in these records")
@@ -76,7 +77,9 @@ def spread_of(fit: Fitted) -> Spread:
     count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
     variance = fit.cost / max(count - fit.parameters.size, 1.0)
     ordinary = np.sqrt(variance * np.diag(inverse))[:shared]
-    meats = at_bandwidths(scores)
+    # What is known beforehand is known no better than it was said to be.
+    known = np.diag(fit.priors**2)
+    meats = [meat + known for meat in at_bandwidths(scores)]
     folded = [
         _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
     ]
@@ -88,7 +91,7 @@ def spread_of(fit: Fitted) -> Spread:
         widths[1],
     )
     # A quantised channel errs alike in each period of the torque: no period scatters then.
-    repeated = inverse @ at_bandwidths(folded)[1] @ inverse
+    repeated = inverse @ (at_bandwidths(folded)[1] + known) @ inverse
     chosen = np.maximum(chosen, np.sqrt(np.diag(repeated))[:shared])
     # Residuals that avoid their neighbours promise more than they can be trusted to keep.
     chosen = np.maximum(chosen, ordinary)
@@ -121,7 +124,7 @@ def _with_records(fit: Fitted, information: Array, covariance: Array) -> tuple[A
     """
     from scipy.special import chdtri
 
-    shared, groups = len(fit.parameters.names), len(fit.records)
+    shared, groups = fit.parameters.common, len(fit.records)
     reduced = information[:shared, :shared].copy()
     scores = []
     for number, (left, slopes) in enumerate(zip(fit.residuals, fit.jacobians, strict=True)):
@@ -130,9 +133,9 @@ def _with_records(fit: Fitted, information: Array, covariance: Array) -> tuple[A
         reduced -= across @ information[own, :shared]
         whole = np.einsum("cn,cni->i", left, slopes)
         scores.append(whole[:shared] - across @ whole[own])
-    scatter = np.cov(np.array(scores).T, bias=False) * groups
+    scatter = np.cov(np.array(scores).T, bias=False) * groups + np.diag(fit.priors[:shared] ** 2)
     inverse = np.linalg.inv(reduced)
-    between = np.sqrt(np.diag(inverse @ scatter @ inverse))
+    between = np.sqrt(np.diag(inverse @ scatter @ inverse))[: len(fit.parameters.names)]
     within = np.sqrt(np.diag(covariance))
     ratio = between / within
     limit = float(np.sqrt(chdtri(groups - 1, CHANCE) / (groups - 1)))
@@ -179,18 +182,12 @@ def profile_end(fit: Fitted, spread: Spread, index: int, quantile: float, way: f
 
 def _curvature(fit: Fitted, index: int) -> float:
     """Rise of the profiled sum of squares over the square of a small distance."""
-    information = np.diag(fit.priors**2)
-    for slopes in fit.jacobians:
-        information = information + np.einsum("cni,cnj->ij", slopes, slopes)
-    return 1.0 / float(np.linalg.inv(information)[index, index])
+    return 1.0 / float(np.linalg.inv(fit.information)[index, index])
 
 
 def _held(fit: Fitted, index: int, distance: float) -> Fitted:
     """The fit with one parameter held so far away, the others as good as they get."""
-    information = np.diag(fit.priors**2)
-    for slopes in fit.jacobians:
-        information = information + np.einsum("cni,cnj->ij", slopes, slopes)
-    column = np.linalg.inv(information)[:, index]
+    column = np.linalg.inv(fit.information)[:, index]
     vector = np.clip(fit.vector + distance * column / column[index], *fit.parameters.bounds())
     vector[index] = fit.vector[index] + distance
     return search(replace(fit, vector=vector), held=index)

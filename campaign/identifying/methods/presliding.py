@@ -26,6 +26,7 @@ from campaign.experiments.results.presliding_dynamics import (
     figures_of,
     remarks,
     viscous_of,
+    with_torques_known,
 )
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.identification.intervals import shifted_by
@@ -86,6 +87,7 @@ class PreslidingOptions(Options):
 
 def _identify(material: Material, options: PreslidingOptions) -> Identified:
     records = [small_motion(each) for each in material.trials]
+    records = with_torques_known(material.trials, records)
     unseen = _unseen(material.validation)
     found = identify_presliding_dynamics(
         records, assumed_of(material.bench, _span(material.trials, records))
@@ -122,7 +124,7 @@ def _unseen(trials: Sequence[ArchivedTrial]) -> list[Record]:
     chosen, why = usable(trials)
     if why:
         raise ValueError(f"of the validation {why}")
-    return [small_motion(each) for each in chosen]
+    return with_torques_known(chosen, [small_motion(each) for each in chosen])
 
 
 def _span(trials: Sequence[ArchivedTrial], records: Sequence[Record]) -> tuple[float, float]:

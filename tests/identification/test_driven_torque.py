@@ -1,0 +1,142 @@
+"""A torque that is measured with noise: what is known of it by its command, and what that is worth.
+
+Plant and drive are linear and written here; scipy advances them exactly.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from campaign.identification.presliding_dynamics.driven_torque import Driven, driven_torques
+from campaign.identification.presliding_dynamics.found import (
+    PreslidingDynamics,
+    identify_presliding_dynamics,
+)
+from campaign.identification.presliding_dynamics.record import Record
+from tests.identification.bristle_plants import Array
+
+STEP, COUNT, FINER = 0.005, 1200, 10
+INERTIA, DAMPING, STIFFNESS = 2.0, 40.0, 2000.0
+DRIVE, BACK_EMF = 0.01, 60.0
+"""Time constant of the current (s); torque that a rate takes from it (N m s/rad)."""
+LINES = 0.375 * np.arange(1, 40, 2)
+NOISE = 0.12
+"""of the torque's sensor (N m); the torque itself is of 0.5 N m rms."""
+TRUTH = {"bristle_stiffness": STIFFNESS, "bristle_damping": DAMPING, "inertia": INERTIA}
+
+
+class Command:
+    """A multisine that begins at nothing."""
+
+    def __init__(self, seed: int) -> None:
+        self.phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(LINES))
+
+    def __call__(self, time: Array) -> Array:
+        turned = 2.0 * np.pi * np.multiply.outer(time, LINES) + self.phases
+        return np.asarray(0.2 * (np.sin(turned) - np.sin(self.phases)).sum(axis=-1))
+
+
+@cache
+def driven(seed: int) -> tuple[Array, Array]:
+    """Torque and rate at the samples, by fine steps with a command that is straight in each."""
+    h = STEP / FINER
+    # States: angle, rate, torque; then the command and its slope.
+    system = np.zeros((5, 5))
+    system[0, 1] = 1.0
+    system[1, :3] = -STIFFNESS / INERTIA, -DAMPING / INERTIA, 1.0 / INERTIA
+    system[2, 1:4] = -BACK_EMF / DRIVE, -1.0 / DRIVE, 1.0 / DRIVE
+    system[3, 4] = 1.0
+    move = expm(system * h)
+    commands = Command(seed)(h * np.arange(COUNT * FINER + 1))
+    state, found = np.zeros(5), np.empty((COUNT, 2))
+    for index in range(COUNT * FINER):
+        state[3:] = commands[index], (commands[index + 1] - commands[index]) / h
+        if index % FINER == 0:
+            found[index // FINER] = state[2], state[1]
+        state = move @ state
+    return found[:, 0], found[:, 1]
+
+
+def measured(seed: int, noise: float = NOISE) -> list[tuple[Driven, Array]]:
+    """Two trials with noise of both sensors: what the drive did, and the rate."""
+    rng, found = np.random.default_rng(seed), []
+    for number in (1, 2):
+        torque, rate = driven(number)
+        seen = rate + 0.02 * np.std(rate) * rng.standard_normal(COUNT)
+        noisy = torque + noise * rng.standard_normal(COUNT)
+        found.append((Driven(noisy, Command(number)), seen))
+    return found
+
+
+def told(seed: int, noise: float = NOISE) -> list[tuple[Array, Array]]:
+    return driven_torques([each for each, _ in measured(seed, noise)], STEP, float(LINES[-1]))
+
+
+def identified(seed: int, doubt: bool) -> PreslidingDynamics:
+    records = [
+        Record(STEP, torque, rate=rate[: len(torque)], doubt=columns if doubt else None)
+        for (torque, columns), (_, rate) in zip(told(seed), measured(seed), strict=True)
+    ]
+    return identify_presliding_dynamics(records)
+
+
+def test_a_torque_loses_most_of_its_noise_and_nothing_else() -> None:
+    for number, (torque, _) in enumerate(told(0), start=1):
+        off = torque - driven(number)[0][: len(torque)]
+        assert np.std(off) < 0.3 * NOISE
+    # With half the noise half of that is left: it is not what the lags cannot tell.
+    for number, (torque, _) in enumerate(told(0, 0.5 * NOISE), start=1):
+        assert np.std(torque - driven(number)[0][: len(torque)]) < 0.15 * NOISE
+
+
+def test_what_a_torque_is_off_by_is_told_by_standard_normal_factors() -> None:
+    factors = []
+    for seed in range(30):
+        pairs = told(seed)
+        off = [driven(n)[0][: len(t)] - t for n, (t, _) in enumerate(pairs, start=1)]
+        level = [each - np.mean(each) for each in off]
+        columns = np.concatenate([doubt - np.mean(doubt, axis=0) for _, doubt in pairs])
+        factors.append(np.linalg.lstsq(columns, np.concatenate(level), rcond=None)[0])
+    # Some 25 factors in each of 30 draws: their mean square has a deviation of 5 %.
+    assert np.mean(np.concatenate(factors) ** 2) == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_clean_torque_is_taken_as_it_was_measured() -> None:
+    trials = [each for each, _ in measured(0, 1e-3)]
+    for trial, (torque, doubt) in zip(trials, told(0, 1e-3), strict=True):
+        assert np.array_equal(torque, trial.torque)
+        assert doubt.shape == (COUNT, 0)
+
+
+def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque() -> None:
+    records = [Record(STEP, drive.torque, rate=rate) for drive, rate in measured(0, 0.3)]
+    assert identify_presliding_dynamics(records).plant.inertia > 1.05 * INERTIA
+
+
+def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
+    hits = {doubt: dict.fromkeys(TRUTH, 0) for doubt in (True, False)}
+    for seed in range(16):
+        for doubt, counted in hits.items():
+            found = identified(seed, doubt)
+            for name, truth in TRUTH.items():
+                low, high = found.estimates[name].combined
+                counted[name] += low is not None and high is not None and low <= truth <= high
+    # Of 16 intervals of 95 %, 12 or fewer would be a chance of 1 in 100.
+    assert min(hits[True].values()) > 12, hits
+    assert min(hits[False].values()) < 10, hits
+
+
+def test_records_that_doubt_other_things_are_not_fitted_together() -> None:
+    first, second = (
+        Record(STEP, torque, rate=rate[: len(torque)], doubt=columns)
+        for (torque, columns), (_, rate) in zip(told(0), measured(0), strict=True)
+    )
+    with pytest.raises(ValueError, match="doubt"):
+        identify_presliding_dynamics([first, Record(STEP, second.torque, rate=second.rate)])
+    padded = Record(STEP, second.torque, rate=second.rate).with_doubts(first.doubts.shape[1])
+    assert padded.doubts.shape[1] == first.doubts.shape[1]
+    assert not np.any(padded.doubts)
