@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from campaign.errors import ProtocolError, UsageError
+from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, IncompleteBenchError, complete
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
@@ -45,6 +45,9 @@ def bench_source(written: str) -> Source:
 
 def checked(source: Source) -> Bench:
     """The bench in a file. Raises ProtocolError with everything that is wrong with it."""
+    if "test" in source.tree and "axis" not in source.tree:
+        told = "this is a protocol, and a bench is asked for; `campaign plan` takes protocols"
+        raise ProtocolError([Problem(source.file, 0, 0, told)])
     bench = validate(Bench, source.tree, Within(source))
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)

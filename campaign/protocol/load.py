@@ -78,6 +78,9 @@ def load_protocol(
     source = collect(path, collected)
     if source is None:
         raise _failed(collected)
+    if "axis" in source.tree and "test" not in source.tree:
+        told = "this is a bench, and a protocol is asked for; `campaign check` takes benches"
+        raise ProtocolError([Problem(path, 0, 0, told)])
     apply_overrides(settings, collected)
     loader = _Loader(collected, experiments, Truths(shipped, collected.problems, truth))
     tests = loader.tests()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -37,8 +39,10 @@ def line_of(values: np.ndarray, step: float) -> complex:
     return complex(2.0 * np.mean(values * np.exp(-2j * np.pi * LINE * time)))
 
 
-@pytest.mark.parametrize("late", [0, 15])
-def test_the_line_between_samples_is_that_of_a_current_loop_advanced_finely(late: int) -> None:
+@pytest.mark.parametrize(("late", "every"), [(0, 50), (15, 50), (0, 100), (0, 25)])
+def test_the_line_between_samples_is_that_of_a_current_loop_advanced_finely(
+    late: int, every: int
+) -> None:
     """L di/dt = P (c - i) + P Ki integral of (c - i) - R i of a motor at rest; c is held."""
     gain, integral, resistance, inductance = 10.0, 300.0, 1.2, 4e-3
     step = 1.0 / RATE / FINER
@@ -55,13 +59,13 @@ def test_the_line_between_samples_is_that_of_a_current_loop_advanced_finely(late
         state = move @ state
     # The last periods, when it has settled.
     fine = fine[-int(RATE / LINE) * PERIODS * FINER :]
-    missing = line_of(fine, step) - line_of(fine[::FINER], 1.0 / RATE)
+    missing = line_of(fine, step) - line_of(fine[::every], every * step)
     current = {"form": "ideal", "proportional": "10 V/A", "integral": "300 1/s"}
     drive = held(current, late * step)
-    time = np.arange(int(RATE / LINE) * PERIODS) / RATE
+    time = every * step * np.arange(len(fine) // every)
     told, doubt = between_samples(time, COMMAND, drive)
     assert abs(missing) > 4e-3 * AMPLITUDE
-    assert abs(line_of(told, 1.0 / RATE) - missing) < 0.01 * abs(missing)
+    assert abs(line_of(told, every * step) - missing) < 0.01 * abs(missing)
     assert doubt == pytest.approx(UNKNOWN * told)
 
 
@@ -69,6 +73,13 @@ def test_a_current_loop_that_nobody_tells_may_lag_behind() -> None:
     time = np.linspace(0.0, 0.1, 101)
     told, doubt = between_samples(time, COMMAND, held(None))
     assert not np.any(told)
+    for name in ("resistance", "inductance"):
+        current = {"form": "ideal", "proportional": "10 V/A", "integral": "300 1/s"}
+        told_all = held(current)
+        assert told_all.motor is not None
+        motor = told_all.motor.model_copy(update={name: None})
+        unsaid = told_all.model_copy(update={"motor": motor})
+        assert between_samples(time, COMMAND, unsaid)[1] == pytest.approx(doubt)
     slope = AMPLITUDE * 2.0 * np.pi * LINE * np.cos(2.0 * np.pi * LINE * time + 0.3)
     assert doubt == pytest.approx(LATE / RATE * slope)
 
@@ -92,3 +103,26 @@ def test_a_record_has_what_its_torque_is_between_samples() -> None:
     assert np.max(np.abs(missing)) > 1e-3
     assert known.torque - measured.torque == pytest.approx(missing, abs=1e-12)
     assert known.doubts[:, -1] == pytest.approx(doubt)
+
+
+def test_trials_at_other_rates_and_unshaken_ones_doubt_nothing_of_each_other() -> None:
+    def edit(tree: Tree) -> None:
+        tree["controller"] |= {"sample_rate": "1 kHz", "delay": "0 s"}
+        tree.setdefault("sensors", {})["current"] = {"noise": "20 mA"}
+
+    sizes = {"amplitudes": ["0.5 N m"], "lowest": "2 Hz", "highest": "40 Hz", "periods": 3}
+    kind = "presliding_multisine"
+    one = execute(trials(kind, bench(edit), sizes))
+    other = execute(trials(kind, bench(edit), {**sizes, "sample_rate": "500 Hz"}))
+    items = [*one, *other, *one]
+    records = [record_of(each) for each in items]
+    records[2] = replace(records[2], at_rest=False)
+    known = with_torques_known(items, records)
+    widths = {each.doubts.shape[1] for each in known}
+    assert len(widths) == 1
+    first, second = (np.any(each.doubts[:, :-1], axis=0) for each in known[:2])
+    assert np.any(first)
+    assert np.any(second)
+    assert not np.any(first & second)
+    assert np.array_equal(known[2].torque, records[2].torque)
+    assert not np.any(known[2].doubts)

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from campaign.identification.presliding_dynamics.driven_torque import Driven, driven_torques
 from campaign.identification.presliding_dynamics.found import (
@@ -78,7 +79,7 @@ def told(seed: int, noise: float = NOISE) -> list[tuple[Array, Array]]:
 
 def identified(seed: int, doubt: bool) -> PreslidingDynamics:
     records = [
-        Record(STEP, torque, rate=rate[: len(torque)], doubt=columns if doubt else None)
+        Record(STEP, torque, rate=rate, doubt=columns if doubt else None)
         for (torque, columns), (_, rate) in zip(told(seed), measured(seed), strict=True)
     ]
     return identify_presliding_dynamics(records)
@@ -86,18 +87,18 @@ def identified(seed: int, doubt: bool) -> PreslidingDynamics:
 
 def test_a_torque_loses_most_of_its_noise_and_nothing_else() -> None:
     for number, (torque, _) in enumerate(told(0), start=1):
-        off = torque - driven(number)[0][: len(torque)]
-        assert np.std(off) < 0.3 * NOISE
+        off = torque - driven(number)[0]
+        assert np.std(off) < 0.2 * NOISE
     # With half the noise half of that is left: it is not what the lags cannot tell.
     for number, (torque, _) in enumerate(told(0, 0.5 * NOISE), start=1):
-        assert np.std(torque - driven(number)[0][: len(torque)]) < 0.15 * NOISE
+        assert np.std(torque - driven(number)[0]) < 0.15 * NOISE
 
 
 def test_what_a_torque_is_off_by_is_told_by_standard_normal_factors() -> None:
     factors = []
     for seed in range(30):
         pairs = told(seed)
-        off = [driven(n)[0][: len(t)] - t for n, (t, _) in enumerate(pairs, start=1)]
+        off = [driven(n)[0] - t for n, (t, _) in enumerate(pairs, start=1)]
         level = [each - np.mean(each) for each in off]
         columns = np.concatenate([doubt - np.mean(doubt, axis=0) for _, doubt in pairs])
         factors.append(np.linalg.lstsq(columns, np.concatenate(level), rcond=None)[0])
@@ -110,6 +111,48 @@ def test_a_clean_torque_is_taken_as_it_was_measured() -> None:
     for trial, (torque, doubt) in zip(trials, told(0, 1e-3), strict=True):
         assert np.array_equal(torque, trial.torque)
         assert doubt.shape == (COUNT, 0)
+
+
+def test_a_torque_with_little_noise_is_regressed_where_the_rate_has_less() -> None:
+    held = dict.fromkeys(TRUTH, 0)
+    for seed in range(8):
+        rng, records = np.random.default_rng(seed), []
+        trials = [each for each, _ in measured(seed, 0.036)]
+        pairs = driven_torques(trials, STEP, float(LINES[-1]))
+        for number, (torque, columns) in enumerate(pairs, start=1):
+            rate = driven(number)[1]
+            seen = rate + 0.002 * np.std(rate) * rng.standard_normal(COUNT)
+            records.append(Record(STEP, torque, rate=seen, doubt=columns))
+        found = identify_presliding_dynamics(records)
+        for name, truth in TRUTH.items():
+            low, high = found.estimates[name].combined
+            held[name] += low is not None and high is not None and low <= truth <= high
+    assert min(held.values()) > 5, held
+
+
+def test_noise_that_is_coloured_is_counted_where_the_torque_matters() -> None:
+    factors = []
+    for seed in range(20):
+        rng, trials = np.random.default_rng(seed), []
+        for number in (1, 2):
+            white = rng.standard_normal(COUNT + 100)
+            coloured = lfilter([NOISE * np.sqrt(0.75)], [1.0, -0.5], white)[100:]
+            trials.append(Driven(driven(number)[0] + coloured, Command(number)))
+        pairs = driven_torques(trials, STEP, float(LINES[-1]))
+        off = [driven(n)[0] - t for n, (t, _) in enumerate(pairs, start=1)]
+        level = np.concatenate([each - np.mean(each) for each in off])
+        columns = np.concatenate([doubt for _, doubt in pairs])
+        factors.append(np.linalg.lstsq(columns, level, rcond=None)[0])
+    assert np.mean(np.concatenate(factors) ** 2) == pytest.approx(1.0, abs=0.25)
+
+
+def test_short_trials_are_regressed_on_fewer_commands_or_refused() -> None:
+    torque, _ = driven(1)
+    short = Driven(torque[:150] + NOISE * np.ones(150), Command(1))
+    ((found, doubt),) = driven_torques([short], STEP, float(LINES[-1]))
+    assert len(found) == len(doubt) == 150
+    with pytest.raises(ValueError, match="record longer"):
+        driven_torques([Driven(torque[:100], Command(1))], STEP, 0.5)
 
 
 def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque() -> None:
@@ -127,12 +170,12 @@ def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
                 counted[name] += low is not None and high is not None and low <= truth <= high
     # Of 16 intervals of 95 %, 12 or fewer would be a chance of 1 in 100.
     assert min(hits[True].values()) > 12, hits
-    assert min(hits[False].values()) < 10, hits
+    assert max(hits[False].values()) < 14, hits
 
 
 def test_records_that_doubt_other_things_are_not_fitted_together() -> None:
     first, second = (
-        Record(STEP, torque, rate=rate[: len(torque)], doubt=columns)
+        Record(STEP, torque, rate=rate, doubt=columns)
         for (torque, columns), (_, rate) in zip(told(0), measured(0), strict=True)
     )
     with pytest.raises(ValueError, match="doubt"):

@@ -109,3 +109,21 @@ def test_plan_tells_the_worst_loop_and_warns_of_a_low_margin(
     low = capsys.readouterr()
     assert json.loads(low.out)["tests"][0]["loops"][0]["low_margin"] is True
     assert low.err.startswith("low margin: stabilization-hardware: ")
+
+
+def test_a_protocol_in_place_of_a_bench_and_the_other_way_round_are_told_in_one_line(
+    tmp_path: Path,
+) -> None:
+    protocol = PLATFORM.parent.parent / "quickstart.toml"
+    with pytest.raises(ProtocolError) as met:
+        check_bench(str(protocol), None, as_json=False)
+    assert [each.message for each in met.value.problems] == [
+        "this is a protocol, and a bench is asked for; `campaign plan` takes protocols"
+    ]
+    bench = tmp_path / "rig.toml"
+    bench.write_text(PLATFORM.read_text())
+    with pytest.raises(ProtocolError) as met:
+        show_plan(Request(bench), tmp_path, as_json=False)
+    assert [each.message for each in met.value.problems] == [
+        "this is a bench, and a protocol is asked for; `campaign check` takes benches"
+    ]

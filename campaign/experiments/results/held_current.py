@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.physics.bench import Bench, CurrentController, MotorOptions
+from campaign.physics.bench import Bench, CurrentController
 from campaign.result import Array
 from campaign.signals import MultiSine
 
@@ -23,20 +23,27 @@ UNKNOWN = 0.3
 """Share by which that may be off: gains and inductances are seldom known better."""
 LATE = 0.2
 """Share of a controller's period that the current may lag behind where nobody tells its loop."""
+ALIKE = 1e-6
+"""Share of a turn by which an image may miss a line and still lie on it."""
 
 
 def between_samples(time: Array, command: MultiSine, bench: Bench) -> tuple[Array, Array]:
     """What to add to a torque measured at `time` (s), and what that may be off by, shape (n,).
 
-    command: torque (N m) that the controller holds. Both are 0 of a bench without a period.
+    command: torque (N m) that the controller holds. Both are 0 of a bench without a period. `time`
+    is even; a recording faster than the controller shows itself what is between its commands.
     """
     controller = bench.controller
     if controller is None or controller.sample_rate is None:
         return np.zeros(len(time)), np.zeros(len(time))
-    if bench.motor is None or controller.current is None:
-        return np.zeros(len(time)), LATE / controller.sample_rate * command.integral(time, -1)
-    late = controller.delay + bench.sensors.current.delay
-    missing = -_images(time, command, controller.current, bench.motor, controller.sample_rate, late)
+    rate, motor, gains = controller.sample_rate, bench.motor, controller.current
+    if motor is None or gains is None or motor.resistance is None or motor.inductance is None:
+        lag = LATE / rate if _step(time) * rate > 0.99 else 0.0
+        return np.zeros(len(time)), lag * command.integral(time, -1)
+    # A sensor is late by whole samples of its controller.
+    late = controller.delay + round(bench.sensors.current.delay * rate) / rate
+    impedance = motor.inductance, motor.resistance
+    missing = -_images(time, command, gains, impedance, rate, late)
     return missing, UNKNOWN * missing
 
 
@@ -44,17 +51,24 @@ def _images(
     time: Array,
     command: MultiSine,
     gains: CurrentController,
-    motor: MotorOptions,
+    impedance: tuple[float, float],
     rate: float,
     late: float,
 ) -> Array:
     frequency = np.asarray(command.frequencies)
     numbers = np.arange(-IMAGES, IMAGES + 1)
-    s = 2j * np.pi * np.add.outer(frequency, numbers[numbers != 0] * rate)
+    turns = numbers * rate * _step(time)
+    onto = (numbers != 0) & (np.abs(turns - np.rint(turns)) < ALIKE)
+    s = 2j * np.pi * np.add.outer(frequency, numbers[onto] * rate)
     held = -np.expm1(-s / rate) * rate / s
     forward = gains.proportional * s + gains.integral_gain
-    follows = forward / (motor.inductance * s**2 + motor.resistance * s + forward)
+    inductance, resistance = impedance
+    follows = forward / (inductance * s**2 + resistance * s + forward)
     images = np.sum(held * follows * np.exp(-s * late), axis=1)
-    turns = 2.0 * np.pi * np.multiply.outer(time, frequency) + np.asarray(command.phases)
+    at = 2.0 * np.pi * np.multiply.outer(time, frequency) + np.asarray(command.phases)
     shown = np.asarray(command.amplitudes) * images
-    return np.asarray(np.sin(turns) @ shown.real + np.cos(turns) @ shown.imag)
+    return np.asarray(np.sin(at) @ shown.real + np.cos(at) @ shown.imag)
+
+
+def _step(time: Array) -> float:
+    return float(time[-1] - time[0]) / (len(time) - 1)

@@ -67,21 +67,33 @@ def with_torques_known(trials: Sequence[TrialData], records: Sequence[Record]) -
     That is their torque without its sensor's noise and with what it is between its samples, and
     what it may be off by. All trials are of one bench.
     """
-    commands = {number: _multisine(each) for number, each in enumerate(trials)}
-    shaken = {number: each for number, each in commands.items() if each is not None}
-    found, doubts = dict(enumerate(records)), 0
-    for step in sorted({found[number].step for number in shaken}):
-        alike = {number: each for number, each in shaken.items() if found[number].step == step}
-        driven = [Driven(found[n].torque, each.sample) for n, each in alike.items()]
-        highest = max(max(each.frequencies) for each in alike.values())
+    commands = {
+        number: command
+        for number, (trial, record) in enumerate(zip(trials, records, strict=True))
+        if (command := _multisine(trial)) is not None and record.at_rest
+    }
+    found, doubts = list(records), 0
+    for step in sorted({records[number].step for number in commands}):
+        alike = [number for number in commands if records[number].step == step]
+        driven = [Driven(records[n].torque, commands[n].sample) for n in alike]
+        highest = max(max(commands[n].frequencies) for n in alike)
         told = driven_torques(driven, step, highest)
-        for (number, command), (torque, doubt) in zip(alike.items(), told, strict=True):
-            record = found[number].until(len(torque))
-            missing, more = between_samples(record.time, command, bench_of(trials[number].trial))
-            doubt = np.column_stack([np.zeros((len(torque), doubts)), doubt, more])
-            found[number] = replace(record, torque=torque + missing, doubt=doubt)
-        doubts = doubt.shape[1]
-    return [each.with_doubts(doubts) for each in found.values()]
+        for number, (torque, doubt) in zip(alike, told, strict=True):
+            columns = np.column_stack([np.zeros((len(torque), doubts)), doubt])
+            found[number] = replace(records[number], torque=torque, doubt=columns)
+        doubts = max(doubts, *(found[number].doubts.shape[1] for number in alike))
+    found = [each.with_doubts(doubts) for each in found]
+    if not commands:
+        return found
+    for number, each in enumerate(found):
+        missing, more = np.zeros(len(each.torque)), np.zeros(len(each.torque))
+        if number in commands:
+            bench = bench_of(trials[number].trial)
+            missing, more = between_samples(each.time, commands[number], bench)
+        # By how much that is off is the same in all trials.
+        columns = np.column_stack([each.doubts, more])
+        found[number] = replace(each, torque=each.torque + missing, doubt=columns)
+    return found
 
 
 def _multisine(data: TrialData) -> MultiSine | None:

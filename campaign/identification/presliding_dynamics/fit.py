@@ -73,7 +73,7 @@ def fit_presliding_dynamics(
             "no start of the fit can be simulated: the load breaks away, or is too fast"
         )
     for _ in range(ROUNDS):
-        best = search(centred(search(_reweighted(with_doubts(best)))))
+        best = search(_reweighted(centred(search(_reweighted(with_doubts(best))))))
     return with_slopes(best)
 
 

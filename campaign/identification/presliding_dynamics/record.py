@@ -87,12 +87,6 @@ class Record:
         """Largest torque (N m)."""
         return float(np.max(np.abs(self.torque)))
 
-    def until(self, count: int) -> Record:
-        """Its first samples."""
-        parts = (self.rate, self.angle, self.doubt)
-        rate, angle, doubt = (None if part is None else part[:count] for part in parts)
-        return replace(self, torque=self.torque[:count], rate=rate, angle=angle, doubt=doubt)
-
     def highest_frequency(self, share: float = 0.999) -> float:
         """Frequency (Hz) below which this share of the torque that the load answers to lies.
 

@@ -209,9 +209,9 @@ def masses_table(masses: Masses) -> Table | None:
     return Table(
         "one-inertia" if drive.rigid else "two-masses",
         "One inertia" if drive.rigid else "Two inertias on a spring",
-        (Column("of", "Of", exact=True), *columns),
+        (*columns, Column("of", "Of", exact=True)),
         tuple(
-            {"of": whose, **{column.name: getattr(each, column.name) for column in columns}}
+            {**{column.name: getattr(each, column.name) for column in columns}, "of": whose}
             for whose, each in rows.items()
         ),
         note=f"{RIGID_METHOD if drive.rigid else METHOD}.{spring}",
