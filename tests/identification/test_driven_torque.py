@@ -173,6 +173,12 @@ def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
     assert max(hits[False].values()) < 14, hits
 
 
+def test_deviations_by_scores_know_what_is_left_to_doubt_of_the_torque() -> None:
+    """Of white noise they are those of independent residuals and of what is known beforehand."""
+    spread = identified(3, doubt=True).spread
+    assert spread.by_bandwidth[1] == pytest.approx(spread.ordinary, rel=0.1)
+
+
 def test_records_that_doubt_other_things_are_not_fitted_together() -> None:
     first, second = (
         Record(STEP, torque, rate=rate, doubt=columns)
