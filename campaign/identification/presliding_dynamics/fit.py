@@ -100,7 +100,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumed) -> Fitt
         for record in records
     )
     # A first search has the torque as it was told: what that may be off by would fit a wrong plant.
-    doubts = tuple(
+    answers = tuple(
         np.zeros((len(each), *record.doubts.shape))
         for each, record in zip(channels, records, strict=True)
     )
@@ -111,8 +111,8 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumed) -> Fitt
         vector=start,
         channels=channels,
         grids=grids,
-        doubts=doubts,
-        taken=np.zeros(parameters.doubts),
+        doubt_answers=answers,
+        taken=np.zeros(parameters.factors),
         residuals=(),
         jacobians=(),
         priors=priors,
@@ -130,12 +130,12 @@ def search(fit: Fitted, held: int | None = None) -> Fitted:
 
     everything = range(len(fit.records))
     doubted = fit.parameters.doubted
-    left = [doubted.start + index for index in range(fit.parameters.doubts)]
+    left = [doubted.start + index for index in range(fit.parameters.factors)]
     priors = np.setdiff1d(np.flatnonzero(fit.priors), left)
     free = np.delete(np.arange(fit.parameters.size), left + ([] if held is None else [held]))
     low, high = fit.parameters.bounds()
     # What the torque is off by is linear: the best of it follows from the rest of the vector.
-    pairs = [zip(c, d, strict=True) for c, d in zip(fit.channels, fit.doubts, strict=True)]
+    pairs = [zip(c, d, strict=True) for c, d in zip(fit.channels, fit.doubt_answers, strict=True)]
     columns = np.concatenate([c.left(each) for pair in pairs for c, each in pair])
     solved = np.linalg.inv(columns.T @ columns + np.eye(len(left)))
 

@@ -53,8 +53,8 @@ class Fitted:
         vector: where the sum of squares is least.
         channels: of each record.
         grids: torque of each record, on its grid.
-        doubts: what the channels of each record answer to the columns that its torque may be off
-            by, shape (channels, n, m).
+        doubt_answers: what the channels of each record answer to the columns that its torque may
+            be off by, shape (channels, n, m).
         taken: the factors of those columns that `grids` have in them, shape (m,).
         residuals: of each record: measured less simulated, without offset and drift, in
             deviations, shape (channels, n).
@@ -69,7 +69,7 @@ class Fitted:
     vector: Array
     channels: tuple[tuple[Channel, ...], ...]
     grids: tuple[Grid, ...]
-    doubts: tuple[Array, ...]
+    doubt_answers: tuple[Array, ...]
     taken: Array
     residuals: tuple[Array, ...]
     jacobians: tuple[Array, ...]
@@ -130,7 +130,7 @@ def with_doubts(fit: Fitted) -> Fitted:
             )
             answers[:, :, index] = _answers(pushed, number, fit.vector) - here
         found.append(answers)
-    return replace(fit, doubts=tuple(found))
+    return replace(fit, doubt_answers=tuple(found))
 
 
 def centred(fit: Fitted) -> Fitted:
@@ -183,7 +183,7 @@ def _seen(fit: Fitted, number: int, motion: Motion, vector: Array) -> Array:
     for channel in fit.channels[number]:
         at = motion.rate_at if channel.name == "rate" else motion.angle_at
         told.append(at(fit.parameters.delay(vector, channel.name)))
-    return np.array(told) + fit.doubts[number] @ (vector[fit.parameters.doubted] - fit.taken)
+    return np.array(told) + fit.doubt_answers[number] @ (vector[fit.parameters.doubted] - fit.taken)
 
 
 def residuals_of(fit: Fitted, number: int, vector: Array) -> Array:
@@ -200,7 +200,7 @@ def slopes_of(fit: Fitted, number: int, vector: Array) -> Array:
     here = _motion(fit, number, vector, None)
     answers = _seen(fit, number, here, vector)
     found = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
-    doubts = zip(channels, fit.doubts[number], strict=True)
+    doubts = zip(channels, fit.doubt_answers[number], strict=True)
     found[:, :, parameters.doubted] = [c.left(each) for c, each in doubts]
     for index in (*range(len(parameters.names)), *range(own.start, own.stop)):
         moved = vector.copy()

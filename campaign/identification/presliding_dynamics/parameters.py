@@ -39,7 +39,7 @@ class Parameters:
         first: the plant that scales are taken from.
         step: sampling step that delays are scaled by (s).
         torque: that yielding is scaled by (N m), the largest of all records.
-        doubts: how many factors of what the torque may be off by there are, of all records.
+        factors: how many factors of what the torque may be off by there are, of all records.
         own: how many parameters each record has: offset of the torque; and bristle torque and rate
             at the beginning of one that does not begin at rest.
     """
@@ -49,7 +49,7 @@ class Parameters:
     assumed: Assumed
     step: float
     torque: float
-    doubts: int
+    factors: int
     own: tuple[int, ...]
 
     @classmethod
@@ -85,7 +85,7 @@ class Parameters:
     @property
     def common(self) -> int:
         """How many stand before those of the records."""
-        return len(self.names) + self.doubts
+        return len(self.names) + self.factors
 
     @property
     def doubted(self) -> slice:

@@ -26,12 +26,12 @@ def unexplained(fit: Fitted, record: Record) -> float:
     other = replace(
         fit,
         records=(record,),
-        parameters=replace(fit.parameters, doubts=0, own=(own,)),
+        parameters=replace(fit.parameters, factors=0, own=(own,)),
         vector=np.append(shared, np.zeros(own)),
         channels=(channels,),
         grids=(grid,),
         taken=np.zeros(0),
-        doubts=(np.zeros((len(channels), len(record.torque), 0)),),
+        doubt_answers=(np.zeros((len(channels), len(record.torque), 0)),),
     )
     first, answer = channels[0], other.answers(0)[0]
     missed = first.left(first.samples - answer)
