@@ -16,13 +16,17 @@ not held back by that: its trial is recorded at its rate, and the others are hel
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
 from campaign.axis_kind import Sides
 from campaign.recording import ChannelInfo
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
 
 COMMAND = "command"
 REFERENCE = "reference"
@@ -298,6 +302,17 @@ def info(
     unit, display_unit = UNITS[axis][quantity]
     measured = what.known_by is not KnownBy.SIMULATOR
     return ChannelInfo(name, unit, label, display_unit, measured, own_rate)
+
+
+def wrong_names(names: Sequence[object]) -> str:
+    """Why `names` cannot be those of the channels of a recording; empty when they can."""
+    if not names:
+        return "no channel was announced"
+    for name in names:
+        if not isinstance(name, str) or not _NAME.fullmatch(name) or name == "time":
+            return f"{name!r} cannot name a channel: letters, digits and '_', not 'time'"
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    return f"two channels are called {twice!r}" if twice else ""
 
 
 def axis_of(name: str, sides: Sides) -> AxisKind:

@@ -13,6 +13,7 @@ from functools import cache
 from importlib import metadata
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import PurePosixPath
+from traceback import walk_tb
 
 _MODULES = (".py", *EXTENSION_SUFFIXES)
 _GROUP = re.compile(r"^\s*\[\s*campaign\.", re.MULTILINE)
@@ -84,6 +85,19 @@ def packages_of(module: str) -> tuple[str, ...]:
     top = module.partition(".")[0]
     beside = (each.packages for each in installed().plug_ins if top in each.packages)
     return tuple(dict.fromkeys((top, *(name for names in beside for name in names))))
+
+
+def provider(module: str) -> PlugIn | None:
+    """The plug-in whose package a module belongs to; None for this program and for libraries."""
+    top = module.partition(".")[0]
+    return next((each for each in installed().plug_ins if top in each.packages), None)
+
+
+def blamed(error: BaseException) -> PlugIn | None:
+    """The plug-in whose code was being executed when `error` was raised; None when none was."""
+    modules = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
+    found = (provider(module) for module in reversed(modules) if not module.startswith("campaign."))
+    return next(filter(None, found), None)
 
 
 def one_line(error: BaseException) -> str:

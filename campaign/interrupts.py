@@ -23,12 +23,20 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 _unwinds = False
+_listens = False
 
 
 def listen() -> None:
     """Leave at Ctrl-C, from now on. Main thread only."""
+    global _listens
+    _listens = True
     signal.signal(signal.SIGINT, _handle)
     sys.unraisablehook = _unraisable
+
+
+def is_program() -> bool:
+    """Whether this process is the command line, and no other program that uses its modules."""
+    return _listens
 
 
 @contextmanager

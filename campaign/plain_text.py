@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import unicodedata
+from collections.abc import Mapping
 from typing import Any
 
 REPLACEMENT = "?"
+LONGEST = 2000
+"""letters of a text that other code hands to the archive."""
+DEEPEST = 8
+"""levels of a tree, likewise."""
 
 
 def printable(text: str, keep: str = "") -> str:
@@ -30,6 +36,25 @@ def on_a_page(text: str) -> str:
         return text
     spaces = {letter for letter in set(text) if unicodedata.category(letter) == "Zs"}
     return printable(text, keep="\n\t" + "".join(spaces))
+
+
+def storable(text: object) -> str:
+    """Text from other code as an archive keeps it: on a page, and of bounded length."""
+    plain = on_a_page(text if isinstance(text, str) else f"({type(text).__name__}, no text)")
+    return plain if len(plain) <= LONGEST else f"{plain[:LONGEST]}..."
+
+
+def storable_tree(value: object, depth: int = 0) -> Any:
+    """`value` as JSON: other types, and what is too deep, by the name of the type."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if value is None or isinstance(value, bool | int):
+        return value
+    if depth < DEEPEST and isinstance(value, Mapping):
+        return {storable(key): storable_tree(each, depth + 1) for key, each in value.items()}
+    if depth < DEEPEST and isinstance(value, list | tuple):
+        return [storable_tree(each, depth + 1) for each in value]
+    return storable(value)
 
 
 def json_text(tree: Any) -> str:

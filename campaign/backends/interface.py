@@ -28,6 +28,7 @@ class StopFlag(Protocol):
     def __call__(self) -> bool: ...
 
 
+@runtime_checkable
 class Backend(Protocol):
     """Executes trials. Used as a context manager: entering connects, leaving lets go."""
 
@@ -91,6 +92,15 @@ class StoppedOutside(Introduced, Protocol):
 
         Raises BackendError when there is none, or a later one.
         """
+
+
+@runtime_checkable
+class StoppedByCommand(Protocol):
+    """What a backend has besides when another process can stop its bench, should this one die."""
+
+    @property
+    def stop_command(self) -> tuple[str, ...]:
+        """The program and its arguments. It ends within some seconds and says what it saw."""
 
 
 @runtime_checkable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -57,9 +58,9 @@ class SerialOptions(Options):
     """Bits per second of a serial port."""
     motion: Literal["none", "emulated"] = "none"
     """What moves the hull: nothing, or a rehearsal controller that emulates it."""
-    silence: Time = Field(default=3.0, gt=0, le=60)
+    silence: Time = Field(default=3.0, gt=0, le=10)
     """Without a word or an answer for so long, the connection is lost."""
-    safe_time: Time = Field(default=10.0, gt=0, le=600)
+    safe_time: Time = Field(default=8.0, gt=0, le=9)
     """How long the bench may take to be seen at rest with its drive off."""
 
 
@@ -101,6 +102,14 @@ class SerialBackend:
 
     def __exit__(self, *exception: object) -> None:
         self._disconnect()
+
+    @property
+    def stop_command(self) -> tuple[str, ...]:
+        """`campaign stop`, which needs no session."""
+        baud = str(self._options.baud)
+        program = (sys.executable, "-P", "-m", "campaign")
+        line = ("--port", self._options.port, "--baud", baud)
+        return (*program, "stop", *line, "--patience", "5")
 
     def introduce(self, run: str) -> None:
         """The controller tells others that this run holds it."""

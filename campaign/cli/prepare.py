@@ -18,6 +18,7 @@ from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, So
 from campaign.channels import explained, missing
 from campaign.cli.damage import archive_of
 from campaign.errors import ArchiveError, ProtocolError, UsageError
+from campaign.execution import foreign
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
@@ -131,7 +132,7 @@ def open_backend(
     Raises UsageError when it does not, or is known not to record what one of them requires;
     ArchiveError when it does not and the run that it serves is damaged.
     """
-    backend = kind.open(options)
+    backend = foreign.opened(foreign.called(kind, "open", options), kind.name)
     if isinstance(backend, SimulatesTruth):
         backend.simulate_instead(truths or {})
     elif kind.source is not Source.RECORDING and (named := [t for t in trials if t.truth]):
@@ -168,7 +169,7 @@ def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]
 
 
 def _refused(kind: BackendKind, backend: Backend, trial: Trial) -> str:
-    why = backend.refuses(trial)
+    why = foreign.refusal(backend, trial)
     named = f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label})"
     return f"{named}: {why}" if why else ""
 
@@ -181,7 +182,7 @@ def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial])
     for trial in trials:
         if not trial.requires:
             continue
-        known = backend.channels(trial)
+        known = foreign.channels(backend, trial)
         if known is not None and (names := missing(trial.requires, known)):
             raise UsageError(_not_recorded(kind, trial, names))
 
@@ -215,7 +216,7 @@ def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, .
     """By test, the channels that its analysis can use and that are known not to be recorded."""
     found: dict[str, dict[str, None]] = {}
     for trial in trials:
-        known = backend.channels(trial) if trial.can_use else None
+        known = foreign.channels(backend, trial) if trial.can_use else None
         if known is not None and (names := missing(trial.can_use, known)):
             found.setdefault(trial.test, {}).update(dict.fromkeys(names))
     return {test: tuple(names) for test, names in found.items()}

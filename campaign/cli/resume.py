@@ -23,6 +23,7 @@ from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
+from campaign.execution.guarded import under_guardian
 from campaign.execution.resume import (
     Conditions,
     archived_conditions,
@@ -78,6 +79,7 @@ def resume_run(
     """
     path = find_run(results, name)
     run = open_run(path)
+    guardian = under_guardian(find_backend(run.header.backend))
     read = say_damaged(path, run.damaged)
     check_resumable(run)
     with compiling_meanwhile(run.header.backend) as compiling:
@@ -124,6 +126,7 @@ def resume_run(
         checks_step=is_checked(remade.options),
         stages=remade.stages,
         asked=run.stages,
+        guardian=guardian,
     )
     code = conduct(session, open_archive, report=report, sign=sign)
     return worst_exit_code([code, read])

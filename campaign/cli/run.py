@@ -11,13 +11,14 @@ from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
-from campaign.cli.prepare import Prepared, Request, prepare
+from campaign.cli.prepare import Prepared, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
 from campaign.cli.session import Session, choose_workers, conduct
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
 from campaign.execution import provenance
+from campaign.execution.guarded import under_guardian
 from campaign.protocol import as_tree, check_limits, check_loops
 from campaign.protocol.bench_file import names_file
 from campaign.stopwatch import UNTIMED, Stopwatch, Work
@@ -54,6 +55,7 @@ def run_protocol(
     With a key to `sign` the run with: that it can sign is known before anything moves. With a
     `stopwatch`, what took how long is told at the end.
     """
+    guardian = under_guardian(find_backend(request.backend))
     timing = stopwatch or UNTIMED
     with compiling_meanwhile(request.backend) as compiling:
         with timing.span(Work.PREPARING):
@@ -91,6 +93,7 @@ def run_protocol(
             checks_step=is_checked(prepared.options),
             timing=timing,
             stages=plan.stages,
+            guardian=guardian,
         )
         code = conduct(session, open_archive, report=report, sign=sign)
     if stopwatch is not None:

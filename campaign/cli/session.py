@@ -13,7 +13,13 @@ from pathlib import Path
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialsFollowed
-from campaign.backends.interface import Backend, BackendKind, Introduced, Timed
+from campaign.backends.interface import (
+    Backend,
+    BackendKind,
+    Introduced,
+    StoppedByCommand,
+    Timed,
+)
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
@@ -23,6 +29,7 @@ from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
+from campaign.execution.guarded import GuardianPipes
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
@@ -62,6 +69,7 @@ class Session:
         timing: told what takes how long.
         stages: what may follow from the trials.
         asked: those of the stages that were asked before, as the journal tells.
+        guardian: of a program that moves a bench.
     """
 
     kind: BackendKind
@@ -78,6 +86,7 @@ class Session:
     timing: Timing = UNTIMED
     stages: tuple[PlannedStage, ...] = ()
     asked: tuple[TrialsFollowed, ...] = ()
+    guardian: GuardianPipes | None = None
 
     @property
     def source(self) -> RunReader | None:
@@ -135,12 +144,18 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
-            StopSwitch().on_signals() as stop,
+            StopSwitch(session.guardian).on_signals() as stop,
             connected(session.backend, print_warning) as backend,
         ):
             stop.make_safe = partial(safe_at_once, backend)
-            note = partial(_what_is_kept, session.folder)
-            stop.kept(note, moves=session.kind.live)  # there may be a folder before it is opened
+            stopper = backend.stop_command if isinstance(backend, StoppedByCommand) else ()
+            keep = partial(
+                stop.kept,
+                partial(_what_is_kept, session.folder),
+                moves=session.kind.live,
+                stopper=stopper,
+            )
+            keep()  # there may be a folder before it is opened
             with safe_when_broken_off(backend):
                 check_connected(session.kind, backend, session.left)
                 cleared = clear_stop(backend, session.clear_stop, stop)
@@ -150,7 +165,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
                     writer.decision("stop cleared", cleared)
                 if source:
                     note_damaged(writer, source)
-            stop.kept(note, moves=session.kind.live)
+            keep()
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
     except BackendError as error:

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, ExecutesTogether
-from campaign.errors import BackendError, CampaignError
+from campaign.errors import ArchiveError, CampaignError
+from campaign.execution import foreign
+from campaign.execution.heartbeat import HEARTBEAT
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
@@ -26,14 +28,14 @@ class Executed:
     Attributes:
         bug: an exception that no backend should raise.
         gave_up: whether the backend cannot execute any other trial.
-        unwatched: limits of the bench that no recorded channel tells of.
+        remarks: what somebody at the screen should know of its channels.
         unmeasured: why nothing was measured in its recording, where something should have been.
     """
 
     ending: Ending
-    bug: Exception | None = None
+    bug: BaseException | None = None
     gave_up: bool = False
-    unwatched: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     unmeasured: str = ""
 
 
@@ -59,7 +61,9 @@ def execute_once(trial: Trial, conditions: Conditions) -> Executed:
     with supervision.timing.span(Work.SAMPLES):  # less what is told to be something else
         attempt = _Attempt.begin(trial, conditions)
         if supervision.live:
-            return attempt.archive(_attended(attempt, supervision))
+            with HEARTBEAT.expected():
+                executed = _attended(attempt, supervision)
+            return attempt.archive(executed)
         attempt.run()
         return attempt.archive(attempt.concluded())
 
@@ -97,20 +101,14 @@ def _execute_together(
     untold = Ending(Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED)
     left = Executed(untold, gave_up=True)
     try:
-        endings = iter(backend.execute_together(trials, recorders, stops))
-    except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
-        endings, left = iter(()), _failed(error)
-    while attempts:
-        try:
-            place, ending = next(endings)
+        for place, ending in foreign.called(backend, "execute_together", trials, recorders, stops):
             if place not in attempts:
                 raise LookupError(f"no trial is at place {place!r}, or it has ended")
-        except StopIteration:
-            break
-        except Exception as error:  # noqa: BLE001 - likewise
-            left = _failed(error)
-            break
-        end(place, Executed(ending))
+            end(place, Executed(foreign.checked_ending(ending, backend)))
+            if not attempts:
+                break
+    except BaseException as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
+        left = _failed(foreign.as_fault(error, backend, "execute_together"))
     for place in tuple(attempts):
         end(place, left)
 
@@ -166,7 +164,7 @@ class _Attempt:
 
     def archive(self, executed: Executed) -> Executed:
         """Keep the trial, then what its recording says. Raises what the archive raises."""
-        executed = replace(executed, unwatched=self.recorder.unwatched)
+        executed = replace(executed, remarks=self.recorder.remarks)
         self._file.finish(executed.ending, self._started, utc_now())
         if self._measure is None:
             return executed
@@ -179,16 +177,16 @@ class _Attempt:
 
     def _execute(self) -> Executed:
         try:
-            return Executed(self.backend.execute(self.trial, self.recorder, self.stop))
-        except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
+            return Executed(foreign.execute(self.backend, self.trial, self.recorder, self.stop))
+        except Exception as error:  # noqa: BLE001 - likewise
             return _failed(error)
 
 
-def _failed(error: Exception) -> Executed:
+def _failed(error: BaseException) -> Executed:
     """A backend that cannot go on, or has a bug. Raises what the recorder raised."""
-    if isinstance(error, CampaignError) and not isinstance(error, BackendError):
+    if isinstance(error, ArchiveError):
         raise error  # from the recorder: the archive cannot be written
-    bug = None if isinstance(error, BackendError) else error
+    bug = None if isinstance(error, CampaignError) else error
     reason = str(error) if bug is None else f"internal error: {describe(error)}"
     ending = Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED)
     return Executed(ending, bug=bug, gave_up=True)
@@ -209,6 +207,7 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
     forced: float | None = None  # when the bench had been made safe over the backend's head
     safe_state = SafeState.NOT_CONFIRMED
     while not attempt.over.wait(patience.tick):
+        HEARTBEAT.beat()
         silent = silence.look(clock(), recorder.heard)
         if recorder.verdict is None and silent > _allowed(attempt, supervision):
             recorder.silent(silent)
@@ -217,8 +216,8 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
         found = clock() if found is None else found
         waited = 0.0 if recorder.verdict.kind == "silence" else patience.grace
         if forced is None and clock() - found >= waited:
-            safe_state = _made_safe(attempt.backend)
             forced = clock()
+            safe_state = _made_safe(attempt.backend)
         elif forced is not None and clock() - forced > patience.giving_up:
             return attempt.abandoned(safe_state)
     executed = attempt.concluded(forced=forced is not None)
@@ -242,6 +241,6 @@ def _allowed(attempt: _Attempt, supervision: Supervision) -> float:
 
 def _made_safe(backend: Backend) -> SafeState:
     try:
-        return backend.make_safe()
+        return foreign.make_safe(backend)
     except Exception:  # noqa: BLE001 - not seen safe; the runner asks again, and says why
         return SafeState.NOT_CONFIRMED

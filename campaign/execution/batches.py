@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from itertools import islice
 
 from campaign.backends.interface import Backend, ExecutesTogether
+from campaign.execution.foreign import called
 from campaign.trial import Trial
 
 LOOK_AHEAD = 512
@@ -79,6 +80,7 @@ class Batches:
 def _group(backend: ExecutesTogether, trial: Trial) -> Hashable | None:
     """None for a trial that the backend cannot place: it goes alone, and what is wrong is said."""
     try:
-        return backend.group(trial)
+        group: Hashable = called(backend, "group", trial)
+        return group
     except Exception:  # noqa: BLE001 - a bug in a backend must not cost the archive
         return None

@@ -1,9 +1,17 @@
-"""The process that sees that whoever insists is obeyed, whatever the program hangs in.
+"""The parent of a program that moves a bench: it says so when that program dies or falls silent.
 
-Run by its path, with nothing but the standard library: `guardian.py PARENT`. The C handler of
-Python writes each signal's number into our standard input, also while the program is inside a call
-that never lets another of its threads run. We hand the numbers on to the program's watching thread
-(standard output), and when the program has not ended soon after the second one, we end it.
+Run by its path, with nothing but the standard library: `guardian.py COMMAND...`. It starts the
+command with three pipe ends, which `VARIABLE` names: where signals are read, where they are
+written, and where the program writes to us. Until the program is connected to a bench, it is left
+alone. From then on the guardian
+
+- hands on the signals that it is sent. The C handler of Python writes the program's own ones to
+  us, also inside a call that lets none of its threads run: we count both, and kill a program that
+  does not obey the second one;
+- kills a program that owes a sign of life for `SILENCE`;
+- says, when the program has died, that nobody saw the bench at rest, and ends with exit code 5.
+
+No method of a plug-in can be called from here. A command that stops the controller can.
 """
 
 from __future__ import annotations
@@ -11,19 +19,33 @@ from __future__ import annotations
 import os
 import select
 import signal
+import subprocess
 import sys
 import time
+from contextlib import suppress
 
-NOTE = 0xFE
-MAKING_SAFE = 0xFD
-"""First bytes of what the program says itself, above all signal numbers: NOTE, its length (two
-bytes) and a text, or just MAKING_SAFE."""
+VARIABLE = "CAMPAIGN_GUARDIAN"
+NOTE, STOPPER = 0xFE, 0xFC
+"""First bytes of texts that the program sends: what is said if it dies, and the command that stops
+its controller, arguments separated by NUL. The length follows (two bytes)."""
+MAKING_SAFE, CONNECTED, LEAVING, BEAT, REST = 0xFD, 0xFB, 0xFA, 0xF9, 0xF8
+"""What it sends besides: somebody insists and the bench is being made safe; a bench is connected;
+the program has said all and only ends; a sign of life, another of which follows; none follows."""
+OURS = 64
+"""Added to the number of a signal that was sent to the guardian itself."""
 PIECE = 65536
 """bytes read at a time."""
 STUCK = 1.5
 """s in which the program has to begin to leave once it was insisted."""
 SAFE = 30.0
 """s that making the bench safe may take then."""
+SILENCE = 30.0
+"""s without a sign of life that is owed."""
+TURN = 1.0
+"""s between two looks; when it becomes three of them, the guardian itself did not run."""
+STOPPING = 8.0
+"""s that the command may take that stops the controller."""
+NOT_SAFE = 5  # the exit code
 ASKING = (signal.SIGINT, signal.SIGTERM)
 HANG_UP = getattr(signal, "SIGHUP", None)
 
@@ -41,56 +63,155 @@ class Asked:
 
 
 class Guardian:
-    """What is known of the program; fed with the bytes of its pipe."""
+    """What is known of the program; fed with the bytes of its pipe.
+
+    Attributes:
+        note, stopper: the last of each that was sent.
+        moves: whether a bench is connected.
+        deadline: when the program is killed unless something changes; None for never.
+        why: it would be killed then.
+    """
 
     def __init__(self) -> None:
-        self.note = b""
-        self.deadline: float | None = None
-        self._asked = Asked()
+        self.note = self.stopper = b""
+        self.moves = False
+        self._insisted: float | None = None
+        self._silent: float | None = None
+        self._asked = {0: Asked(), OURS: Asked()}
         self._left = b""
+
+    @property
+    def deadline(self) -> float | None:
+        return min(filter(None, (self._insisted, self._silent)), default=None)
+
+    @property
+    def why(self) -> bytes:
+        if self._insisted is not None:
+            return b"the program did not obey and was killed"
+        return f"the program gave no sign of life for {SILENCE:g} s and was killed".encode()
 
     def feed(self, data: bytes, now: float) -> bytes:
         """The signals in `data`, to be handed on."""
         data, signals = self._left + data, b""
         while data:
-            if data[0] == NOTE:
+            kind = data[0]
+            if kind in (NOTE, STOPPER):
                 end = 3 + int.from_bytes(data[1:3])
                 if len(data) < end:
                     break  # the rest is still to come
-                self.note, data = data[3:end], data[end:]
+                if kind == NOTE:
+                    self.note = data[3:end]
+                else:
+                    self.stopper = data[3:end]
+                data = data[end:]
                 continue
-            if data[0] == MAKING_SAFE:
-                self.deadline = now + SAFE
+            if kind < REST:
+                signals += self.hear(kind, now)
+            elif kind == MAKING_SAFE:
+                self._insisted = now + SAFE
+            elif kind in (BEAT, REST):
+                self._silent = now + SILENCE if kind == BEAT else None
             else:
-                signals += data[:1]
-                self._asked.add(data[0])
-                if self._asked.times > 1 and self.deadline is None:
-                    self.deadline = now + STUCK
+                self.moves = kind == CONNECTED
             data = data[1:]
         self._left = data
         return signals
 
+    def hear(self, byte: int, now: float) -> bytes:
+        """A signal came to the program, or with `OURS` added to the guardian."""
+        asked = self._asked[byte & OURS]
+        asked.add(byte % OURS)
+        if asked.times > 1 and self._insisted is None:
+            self._insisted = now + STUCK
+        return bytes((byte,))
 
-def main(parent: int) -> None:
-    """Watch until the program has gone, or has to be ended. POSIX: Windows has no such signal."""
-    guardian = Guardian()
-    while True:
-        due = guardian.deadline
-        patience = None if due is None else max(0.0, due - time.monotonic())
-        if not select.select([0], [], [], patience)[0]:
-            os.kill(parent, signal.SIGKILL)
-            os.write(2, b"\n" + guardian.note + b"\n")
-            return
-        data = os.read(0, PIECE)
-        if not data:
-            return
-        signals = guardian.feed(data, time.monotonic())
-        if signals:
-            try:
-                os.write(1, signals)
-            except OSError:
-                return
+    def slept(self, now: float) -> None:
+        """The guardian did not run for some time: what came meanwhile was not read."""
+        if self._silent is not None:
+            self._silent = now + SILENCE
+
+
+def main(command: list[str]) -> int:
+    """Start `command` and watch until it has ended; the exit code."""
+    come, back = os.pipe()
+    told, tell = os.pipe()
+    heard = _signals()
+    for end in (back, told):
+        os.set_blocking(end, False)
+    ends = (come, back, tell)
+    program = subprocess.Popen(  # noqa: S603 - the command that was typed, no shell
+        command, pass_fds=ends, env={**os.environ, VARIABLE: ",".join(map(str, ends))}
+    )
+    os.close(tell)
+    guardian, looked, why = Guardian(), time.monotonic(), b""
+    while program.poll() is None:
+        select.select([told, heard], [], [], TURN)
+        now = time.monotonic()
+        if now - looked > 3 * TURN:
+            guardian.slept(now)
+        looked = now
+        signals = guardian.feed(_read(told), now)
+        sent = [number for number in _read(heard) if number != signal.SIGCHLD]
+        if guardian.moves:
+            signals += b"".join(guardian.hear(OURS + number, now) for number in sent)
+            with suppress(OSError):
+                os.write(back, signals)
+            if guardian.deadline is not None and now >= guardian.deadline:
+                why = guardian.why
+                program.kill()
+                with suppress(subprocess.TimeoutExpired):  # a disk may hold it
+                    program.wait(TURN)
+                break
+        else:  # of a terminal's Ctrl-C the program hears twice, and leaves at the first
+            for number in sent:
+                program.send_signal(number)
+    guardian.feed(_read(told), looked)
+    return _ended(program.returncode, guardian, why)
+
+
+def _signals() -> int:
+    """Where the numbers of signals can be read from now on."""
+    numbers = [*ASKING, signal.SIGCHLD]
+    if HANG_UP is not None and signal.getsignal(HANG_UP) is not signal.SIG_IGN:
+        numbers.append(HANG_UP)
+    heard, woken = os.pipe()
+    for end in (heard, woken):
+        os.set_blocking(end, False)
+    for number in numbers:
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+    return heard
+
+
+def _read(pipe: int) -> bytes:
+    """All that there is."""
+    data = b""
+    with suppress(BlockingIOError):
+        while piece := os.read(pipe, PIECE):
+            data += piece
+    return data
+
+
+def _ended(status: int | None, guardian: Guardian, why: bytes) -> int:
+    """Say what there is to say of a program that has ended."""
+    if status is not None and not guardian.moves:
+        if status < 0:
+            signal.signal(-status, signal.SIG_DFL)
+            os.kill(os.getpid(), -status)
+        return status
+    how = f"signal {-status}" if status is not None and status < 0 else f"exit code {status}"
+    os.write(2, b"\n" + (why or f"the program died: {how}".encode()) + b"\n")
+    os.write(2, guardian.note + b"\n")
+    if not guardian.stopper:
+        os.write(2, b"the backend could not be asked to make the bench safe\n")
+        return NOT_SAFE
+    os.write(2, b"stopping the controller: " + guardian.stopper.replace(b"\0", b" ") + b"\n")
+    with suppress(OSError, subprocess.TimeoutExpired):
+        subprocess.run(  # noqa: S603 - the program's own command, no shell
+            guardian.stopper.split(b"\0"), stdin=subprocess.DEVNULL, stdout=2, timeout=STOPPING
+        )
+    return NOT_SAFE
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    sys.exit(main(sys.argv[1:]))

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import ValidationError
 
 from campaign.axis_kind import sides_in
+from campaign.channels import VOCABULARY, axis_of, info, wrong_names
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import WATCHED, LimitWatch
-from campaign.recording import Array, Ending, Fault, Outcome
+from campaign.plain_text import storable, storable_tree
+from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome
 from campaign.trial import Task, Trial
+from campaign.units import factor
 
 STEP = 0.5
 """Of a sample: further from its place, it could be another one."""
@@ -32,6 +36,74 @@ class Verdict:
     reason: str
     time: float
     fault: Fault | None = None
+
+
+@dataclass(frozen=True)
+class Announced:
+    """The channels of a trial as they are archived.
+
+    Attributes:
+        factors: (channels, 1), what the samples of each are multiplied by.
+        converted: what is said of each channel whose unit was another one.
+    """
+
+    channels: tuple[ChannelInfo, ...]
+    factors: Array
+    converted: tuple[str, ...]
+
+
+NOTHING = Announced((), np.ones((0, 1)), ())
+
+
+def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> Announced:
+    """`channels` with storable texts, and those of the vocabulary in its units.
+
+    Raises ValueError saying which channel cannot be archived.
+    """
+    if strange := next((each for each in channels if not isinstance(each, ChannelInfo)), None):
+        raise ValueError(f"a channel was announced as {type(strange).__name__!r}, no ChannelInfo")
+    if wrong := wrong_names([channel.name for channel in channels]):
+        raise ValueError(wrong)
+    found, factors, converted = [], [], []
+    for channel in channels:
+        rate = channel.own_rate
+        if rate is not None and not (isinstance(rate, int | float) and 0.0 < rate < math.inf):
+            raise ValueError(f"{channel.name}: its own rate is {storable_tree(rate)!r} Hz")
+        known, times = _in_its_unit(trial, channel)
+        factors.append(times)
+        if times != 1.0:
+            converted.append(
+                f"{channel.name} was announced in {channel.unit} and is archived in {known.unit}"
+            )
+        found.append(
+            replace(
+                known,
+                unit=storable(known.unit),
+                label=storable(known.label),
+                display_unit=storable(known.display_unit),
+                measured=bool(known.measured),
+            )
+        )
+    return Announced(tuple(found), np.array(factors)[:, np.newaxis], tuple(converted))
+
+
+def _in_its_unit(trial: Trial, channel: ChannelInfo) -> tuple[ChannelInfo, float]:
+    """The channel in the unit of the vocabulary, and how many of these its own unit is."""
+    if channel.name not in VOCABULARY:
+        return channel, 1.0
+    axis = axis_of(channel.name, sides_in(trial.bench))
+    wanted = info(channel.name, trial.task.mode, axis=axis)
+    if channel.unit == wanted.unit or not wanted.unit:  # a command of a mode that has no unit
+        return channel, 1.0
+    try:
+        times = factor(channel.unit, wanted.unit)
+    except (ValueError, LookupError, TypeError, AttributeError):
+        unit = storable(channel.unit)
+        raise ValueError(
+            f"{channel.name} is announced in {unit!r}; it is archived in {wanted.unit!r}, and no "
+            "factor leads there"
+        ) from None
+    return replace(channel, unit=wanted.unit, display_unit=wanted.display_unit), times
 
 
 def make_watch(trial: Trial, names: Sequence[str]) -> tuple[LimitWatch | None, tuple[str, ...]]:
@@ -55,19 +127,26 @@ def shaped(time: Array, block: Array | None, channels: int) -> tuple[Array, Arra
 
     Raises ValueError saying what else they are.
     """
-    try:
-        time = np.asarray(time, dtype=np.float64)
-        if block is None:
-            block = np.full((channels, len(time)), np.nan)
-        block = np.asarray(block, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"a block is no array of numbers: {error}") from None
+    time = _numbers(time)
+    block = np.full((channels, time.size), np.nan) if block is None else _numbers(block)
     if time.ndim != 1 or block.shape != (channels, len(time)):
         raise ValueError(
             f"a block has the shape {block.shape} and its time {time.shape}; {channels} channels "
             f"of n samples each were announced: ({channels}, n) and (n,)"
         )
     return time, block
+
+
+def _numbers(values: Array) -> Array:
+    """As float64. Raises ValueError for what a conversion would change: complex, masked, text."""
+    try:
+        given = np.asanyarray(values)
+    except Exception as error:  # noqa: BLE001 - an object may say anything to numpy
+        raise ValueError(f"a block is no array of numbers: {type(error).__name__}") from None
+    if given.dtype.kind not in "iuf" or isinstance(given, np.ma.MaskedArray):
+        masked = "masked " if isinstance(given, np.ma.MaskedArray) else ""
+        raise ValueError(f"a block holds {masked}{given.dtype} and no real numbers")
+    return np.asarray(given, dtype=np.float64)
 
 
 def wrong_time(task: Task, first: int, time: Array) -> tuple[int, Verdict] | None:

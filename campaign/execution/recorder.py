@@ -8,6 +8,7 @@ stopped: there the same is only said.
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import replace
 
@@ -18,8 +19,10 @@ from campaign.backends.interface import Source
 from campaign.channels import missing
 from campaign.errors import ArchiveError
 from campaign.execution.judging import (
+    NOTHING,
     STEP,
     Verdict,
+    announced,
     make_watch,
     shaped,
     tells_of_gaps,
@@ -30,10 +33,11 @@ from campaign.execution.pace import Pace
 from campaign.execution.supervision import Subscriber, Supervision, TrialStop
 from campaign.execution.writer import TrialWriter
 from campaign.physics.limit_watch import LimitWatch
+from campaign.plain_text import storable, storable_tree
 from campaign.recording import Array, ChannelInfo, Ending, Event, Fault, Outcome, lost_samples
 from campaign.trial import Trial
 
-ARCHIVE_PATIENCE = 30.0
+ARCHIVE_PATIENCE = 10.0
 """s that the archive may take to take a block, once the trial is over."""
 _OWN = (Outcome.LIMIT, Outcome.DIVERGED, Outcome.FAULT)
 
@@ -63,6 +67,7 @@ class SupervisingRecorder:
         self._supervision = supervision
         self._ends_trials = supervision.source is not Source.RECORDING
         self._subscribers: list[Subscriber] = list(supervision.subscribers)
+        self._announced = NOTHING
         self._channels: tuple[ChannelInfo, ...] | None = None
         self._watch: LimitWatch | None = None
         self._samples = 0
@@ -85,15 +90,17 @@ class SupervisingRecorder:
             if self._channels is not None:
                 self._refuse("channels", "the channels were announced a second time")
                 return
-            names = [info.name for info in channels]
-            twice = next((name for name in names if names.count(name) > 1), None)
-            if not names or twice:
-                what = f"two channels are called {twice!r}" if twice else "no channel was announced"
-                self._refuse("channels", what)
+            try:
+                self._announced = announced(self._trial, tuple(channels))
+            except (ValueError, TypeError) as error:
+                self._refuse("channels", str(error))
                 return
-            self._channels = channels
+            self._channels = self._announced.channels
+            names = [info.name for info in self._channels]
             self._watch, self.unwatched = make_watch(self._trial, names)
-            self._file.start(channels)
+            self._file.start(self._channels)
+            for text in self._announced.converted:
+                self._file.event(Event(0.0, text))
             lacking = missing(self._trial.requires, names)
             if lacking:
                 self._find(
@@ -120,6 +127,8 @@ class SupervisingRecorder:
     def event(self, event: Event) -> None:
         with self._writing:
             if not self._closed:
+                at = float(event.time)
+                event = Event(at if math.isfinite(at) else 0.0, storable(event.text))
                 self._events.append(event)
                 self._file.event(event)
 
@@ -132,6 +141,13 @@ class SupervisingRecorder:
             what = "the archive took no samples"
         reason = f"{what} for {seconds:.3g} s, and the trial had not ended"
         self._give(self._new("silence", reason, Fault.LOST_CONNECTION))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What somebody at the screen should know of the channels."""
+        limits = ", ".join(self.unwatched)
+        unwatched = (f"no channel tells of these limits: {limits}",) if limits else ()
+        return (*unwatched, *self._announced.converted)
 
     @property
     def is_complete(self) -> bool:
@@ -175,6 +191,8 @@ class SupervisingRecorder:
                 return
             if not len(time):
                 return
+            if self._announced.converted:
+                samples = samples * self._announced.factors
             self._pace.handed_over(self.heard, float(time[0]), float(time[-1]))
             good = self._judge(time, samples, was_lost=block is None)
             time, samples = time[:good], samples[:, :good]
@@ -254,11 +272,13 @@ class SupervisingRecorder:
     # The end
 
     def _concluded(self, ending: Ending, forced: bool) -> Ending:
+        telemetry = storable_tree(dict(ending.telemetry))
+        ending = replace(ending, reason=storable(ending.reason), telemetry=telemetry)
         if self.verdict is None and ending.outcome is Outcome.COMPLETED:
             self._judge_whole()
         ending = self._with_verdict(ending, forced) if self.verdict is not None else ending
         said = {} if self._ends_trials else self._judged(ending)
-        telemetry: dict[str, JsonValue] = {}
+        telemetry = {}
         if self._supervision.live and self._samples:
             telemetry |= self._timeliness()
         if self.unwatched and self._samples:

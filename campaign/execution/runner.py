@@ -8,10 +8,11 @@ last, and the archive says what happened.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from queue import SimpleQueue
 from types import MappingProxyType
 
 from campaign.archive.layout.header import RunStatus
@@ -22,7 +23,7 @@ from campaign.execution.attendance import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
-from campaign.execution.sequence import TrialSequence
+from campaign.execution.sequence import Begin, TrialSequence
 from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
@@ -94,9 +95,9 @@ def run_plan(
         with (
             supervision.timing.span(Work.WAITING),
             safe_afterwards(backend, ended),
-            _threads(workers) as executor,
+            _threads(workers) as begin,
         ):
-            sequence.execute(executor)
+            sequence.execute(begin)
         sequence.outside.look()  # it may have come after the last trial
         outside = sequence.outside.stop
         status, reason = _verdict(ledger, ended, stop, outside, stages)
@@ -108,15 +109,21 @@ def run_plan(
 
 
 @contextmanager
-def _threads(workers: int) -> Iterator[Executor]:
-    """Threads for trials. What raises lets them end; who insists, waits for none."""
-    pool = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="trial")
+def _threads(workers: int) -> Iterator[Begin]:
+    """What begins work in one of `workers` threads. None of them keeps the program from ending."""
+    waiting: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+
+    def serve() -> None:
+        while (work := waiting.get()) is not None:
+            work()
+
+    for _ in range(workers):
+        threading.Thread(target=serve, name="trial", daemon=True).start()
     try:
-        yield pool
-    except BaseException as error:
-        pool.shutdown(wait=not isinstance(error, KeyboardInterrupt), cancel_futures=True)
-        raise
-    pool.shutdown()
+        yield waiting.put
+    finally:
+        for _ in range(workers):
+            waiting.put(None)
 
 
 def _verdict(

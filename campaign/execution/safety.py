@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,11 +9,10 @@ from pathlib import Path
 
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, CampaignError, ExitCode
+from campaign.execution import foreign
 from campaign.execution.naming import how_to_go_on
 from campaign.recording import SafeState
 
-AT_ONCE = 20.0
-"""s that it may take to see the bench safe when somebody insists on leaving."""
 SAFE = "safe state confirmed: the bench is at rest with its drive off"
 NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
 
@@ -46,7 +44,7 @@ class Ended:
 
     kept: Path | None = None
     fault: str = ""
-    bug: Exception | None = None
+    bug: BaseException | None = None
     safe_state: SafeState = SafeState.NOT_CONFIRMED
     unsafe: str = ""
 
@@ -99,17 +97,21 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
     Raises BackendError when letting go fails after a block that did not raise; after one that did,
     its error goes on and `tell` is told of the other.
     """
-    entered = backend.__enter__()
+    try:
+        entered = foreign.connect(backend)
+    except foreign.HangsError:
+        with safe_when_broken_off(backend):  # it may have begun to move
+            raise
     try:
         yield entered
     except BaseException as error:
         try:
-            backend.__exit__(type(error), error, error.__traceback__)
+            foreign.leave(backend, error)
         except Exception as second:  # noqa: BLE001 - the first one says more
             tell(f"and {_let_go(second)}")
         raise
     try:
-        backend.__exit__(None, None, None)
+        foreign.leave(backend, None)
     except Exception as error:
         raise BackendError(_let_go(error)) from error
 
@@ -117,11 +119,8 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
 def safe_at_once(backend: Backend) -> ExitCode:
     """Bring the bench to rest, whatever other threads do meanwhile, before the program is left."""
     ended = Ended()
-    working = threading.Thread(target=make_safe, args=(backend, ended), daemon=True)
-    working.start()
-    working.join(AT_ONCE)
-    safe = not working.is_alive() and not ended.unsafe
-    return ExitCode.INTERRUPTED if safe else ExitCode.NOT_SAFE
+    make_safe(backend, ended)
+    return ExitCode.NOT_SAFE if ended.unsafe else ExitCode.INTERRUPTED
 
 
 def make_safe(backend: Backend, ended: Ended) -> None:
@@ -129,7 +128,7 @@ def make_safe(backend: Backend, ended: Ended) -> None:
     ended.safe_state = SafeState.NOT_CONFIRMED
     ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off
     try:
-        ended.safe_state = backend.make_safe()
+        ended.safe_state = foreign.make_safe(backend)
     except KeyboardInterrupt:
         ended.unsafe = "making the bench safe was interrupted"
         raise

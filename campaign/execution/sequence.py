@@ -6,8 +6,8 @@ own. Each decision is in the journal before it is acted upon.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, wait
 from queue import Empty, SimpleQueue
 
 from campaign.archive.reading.measured import Measure
@@ -29,6 +29,10 @@ from campaign.trial import Trial
 
 LOOK = 1.0
 """s after which a display is told how far the running trials are."""
+ENDING = 10.0
+"""s that the other trials may take to end when the run cannot go on."""
+Begin = Callable[[Callable[[], None]], None]
+"""Has a worker do something, and returns at once."""
 _Told = tuple[Trial, Executed]
 
 
@@ -71,28 +75,41 @@ class TrialSequence:
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
         self._conditions = Conditions(backend, writer, self._halted, supervision, measure)
-        self._unwatched: set[str] = set()
+        self._said: set[tuple[str, str]] = set()
 
-    def execute(self, executor: Executor) -> None:
-        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt.
-
-        `executor` executes batches of trials; it may have more or fewer workers than were said.
-        """
+    def execute(self, begin: Begin) -> None:
+        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt."""
         try:
             while True:
                 while len(self._running) < self._workers and (batch := self._next()):
                     for trial in batch:
                         self._ledger.begin(trial)
                         self._under_way[trial.number] = trial
-                    future = executor.submit(self._execute, batch)
-                    self._running.add(future)
-                    future.add_done_callback(self._news.put)
+                    begin(self._work(batch))
                 if not self._running:
                     break
                 self._hear()
-        except BaseException:
+        except BaseException as error:
             self._fail("the run cannot go on")  # lets the other trials end
+            if not isinstance(error, KeyboardInterrupt):
+                wait(self._running, timeout=ENDING)
             raise
+
+    def _work(self, batch: Sequence[Trial]) -> Callable[[], None]:
+        """What a thread does with a batch. It is running from now on."""
+        future: Future[None] = Future()
+        self._running.add(future)
+        future.add_done_callback(self._news.put)
+
+        def work() -> None:
+            try:
+                self._execute(batch)
+            except BaseException as error:  # noqa: BLE001 - from the archive, for `_hear`
+                future.set_exception(error)
+            else:
+                future.set_result(None)
+
+        return work
 
     def _execute(self, batch: Sequence[Trial]) -> None:
         """In a worker: what becomes of each trial is told as soon as it is archived."""
@@ -177,7 +194,7 @@ class TrialSequence:
         ending = executed.ending
         self._under_way.pop(trial.number, None)
         self._rests.worked(trial.task.duration)
-        self._say_unwatched(trial, executed)
+        self._say_remarks(trial, executed)
         self._say_unmeasured(trial, executed)
         if executed.gave_up:
             self._ended.bug = self._ended.bug or executed.bug
@@ -191,11 +208,12 @@ class TrialSequence:
             self._ledger.end(trial, ending)
             self._stages.ended(trial)
 
-    def _say_unwatched(self, trial: Trial, executed: Executed) -> None:
-        if executed.unwatched and trial.test not in self._unwatched:
-            self._unwatched.add(trial.test)
-            limits = ", ".join(executed.unwatched)
-            self._ledger.remark(f"{trial.test}: no channel tells of these limits: {limits}")
+    def _say_remarks(self, trial: Trial, executed: Executed) -> None:
+        """Once for each test."""
+        for remark in executed.remarks:
+            if (trial.test, remark) not in self._said:
+                self._said.add((trial.test, remark))
+                self._ledger.remark(f"{trial.test}: {remark}")
 
     def _say_unmeasured(self, trial: Trial, executed: Executed) -> None:
         if executed.unmeasured:

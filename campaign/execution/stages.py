@@ -23,6 +23,7 @@ from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
 from campaign.estimate import Estimate
+from campaign.execution import foreign
 from campaign.execution.safety import describe
 from campaign.experiments.interface import (
     Experiment,
@@ -196,9 +197,9 @@ def refusal_of(backend: Backend) -> Refusal:
     """Why `backend`, once it is connected, does not execute a trial."""
 
     def why(trial: Trial) -> str:
-        if reason := backend.refuses(trial):
+        if reason := foreign.refusal(backend, trial):
             return reason
-        known = backend.channels(trial) if trial.requires else None
+        known = foreign.channels(backend, trial) if trial.requires else None
         lacking = () if known is None else missing(trial.requires, known)
         return f"it requires {', '.join(lacking)}, and that is not recorded" if lacking else ""
 

@@ -2,25 +2,33 @@
 
 Nothing is raised where the program happens to stand: an exception out of a signal handler can be
 lost, for instance in a weak reference's callback, or break what it interrupts. The handler notes
-the request; a thread of its own leaves when somebody insists; and another process sees to it that
-this succeeds while the program hangs in a call that lets no thread run.
+the request; a thread of its own leaves when somebody insists. Where a bench moves, the guardian
+sees to it that this succeeds while the program hangs in a call that lets no thread run.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 from campaign.errors import ExitCode
-from campaign.execution.guardian import MAKING_SAFE, NOTE, Asked
+from campaign.execution.guarded import GuardianPipes
+from campaign.execution.guardian import (
+    CONNECTED,
+    LEAVING,
+    MAKING_SAFE,
+    NOTE,
+    OURS,
+    STOPPER,
+    Asked,
+)
+from campaign.execution.heartbeat import HEARTBEAT
 from campaign.execution.safety import NOT_SAFE, SAFE
 from campaign.plain_text import printable
 
@@ -33,7 +41,9 @@ _LONGEST = 2000
 _PIECE = 4096
 """bytes read at a time."""
 _OWN = 128
-"""Added to a signal's number by our own handler: the guardian hands on the plain ones."""
+"""Added to a signal's number by our own handler; the C handler of Python writes the plain ones."""
+_QUIT = 255
+"""Ends the thread that watches."""
 
 
 class StopSwitch:
@@ -48,12 +58,13 @@ class StopSwitch:
         make_safe: called in a thread of its own when somebody insists; the exit code.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, guardian: GuardianPipes | None = None) -> None:
+        """`guardian`: of a program that moves a bench."""
         self._reason = ""
         self._note: Callable[[], str] = lambda: NOTHING_BEGUN
         self._moves = False
         self._noticed = False
-        self._pipe: int | None = None  # to the guardian
+        self._guardian = guardian
         self.make_safe: Callable[[], ExitCode] = lambda: ExitCode.INTERRUPTED
 
     def __call__(self) -> bool:
@@ -68,15 +79,17 @@ class StopSwitch:
         """Ask the run to stop; a second request changes nothing."""
         self._reason = self._reason or reason
 
-    def kept(self, note: Callable[[], str], *, moves: bool) -> None:
+    def kept(self, note: Callable[[], str], *, moves: bool, stopper: Sequence[str] = ()) -> None:
         """What is said last when the program is left at once: what of the run is kept, and where.
 
-        `moves`: whether there is a bench that somebody has to have seen at rest. The text is at the
-        guardian's before this returns: if that has to end the program, nobody has seen it.
+        `moves`: whether there is a bench that somebody has to have seen at rest. The guardian has
+        the text before this returns, and the command `stopper` that stops the bench's controller.
         """
         self._note, self._moves = note, moves
-        text = f"{NOT_SAFE if moves else ''}\n{note()}".strip().encode()[:_LONGEST]
-        self._tell(bytes((NOTE,)) + len(text).to_bytes(2) + text)
+        text = f"{NOT_SAFE if moves else ''}\n{note()}".strip()
+        for kind, said in ((NOTE, text), (STOPPER, "\0".join(stopper))):
+            data = said.encode(errors="replace")[:_LONGEST]
+            self._tell(bytes((kind,)) + len(data).to_bytes(2) + data)
 
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
@@ -84,14 +97,23 @@ class StopSwitch:
 
         A SIGHUP that was ignored before stays ignored: that is what nohup is for.
         """
+        guardian = self._guardian
         with ExitStack() as stack:
-            come, back = os.pipe()
+            come, back = (guardian.come, guardian.back) if guardian else os.pipe()
+            os.set_blocking(back, False)
             watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
             watcher.start()
+            stack.callback(os.close, back)
             stack.callback(watcher.join)
-            stack.callback(os.close, back)  # the watcher ends by it
+            stack.callback(os.write, back, bytes((_QUIT,)))
+            if guardian:
+                self._tell(bytes((CONNECTED,)))
+                stack.callback(self._tell, bytes((LEAVING,)))
+                HEARTBEAT.goes_to(self._tell)
             if os.name == "posix":
-                stack.enter_context(self._guarded(back))
+                to = guardian.tell if guardian else back
+                before_it = signal.set_wakeup_fd(to, warn_on_full_buffer=False)
+                stack.callback(signal.set_wakeup_fd, before_it)
 
             def handle(number: int, frame: FrameType | None) -> None:
                 self._ask(number)
@@ -106,34 +128,14 @@ class StopSwitch:
                     if handler is not None:  # None: not set from Python, and not ours to put back
                         signal.signal(number, handler)
 
-    @contextmanager
-    def _guarded(self, back: int) -> Iterator[None]:
-        """With a guardian that is told of every signal at once. POSIX only."""
-        theirs, ours = os.pipe()
-        os.set_blocking(ours, False)
-        beside = Path(__file__).with_name("guardian.py")
-        # -I, -S: nothing in the user's folder can stand in for a module of the library.
-        guardian = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-I", "-S", str(beside), str(os.getpid())],
-            stdin=theirs,
-            stdout=back,
-            start_new_session=True,
-        )
-        os.close(theirs)
-        self._pipe = ours
-        before = signal.set_wakeup_fd(ours, warn_on_full_buffer=False)
-        try:
-            yield
-        finally:
-            signal.set_wakeup_fd(before)
-            self._pipe = None
-            os.close(ours)
-            guardian.wait()
-
     def _tell(self, data: bytes) -> None:
-        if self._pipe is not None:
-            with suppress(OSError):  # without a guardian the program looks after itself
-                os.write(self._pipe, data)
+        if self._guardian is not None:
+            try:
+                os.write(self._guardian.tell, data)
+            except BrokenPipeError:
+                self.request("the death of its guardian process")
+            except OSError:
+                pass  # the guardian does not run at the moment, and the pipe is full
 
     def _ask(self, number: int) -> None:
         self.request("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
@@ -142,18 +144,22 @@ class StopSwitch:
             _say(_NOTICE)
 
     def _watch(self, come: int) -> None:
-        """Count what our handler and what the guardian has heard: the larger number is true."""
-        heard = {0: Asked(), _OWN: Asked()}
+        """Count what each of those has heard who listen: the largest number is true."""
+        heard = {0: Asked(), OURS: Asked(), _OWN: Asked()}
         with suppress(OSError):
-            while data := os.read(come, _PIECE):
-                for byte in data:
-                    number = byte % _OWN
-                    if number in _stopping_signals():  # others may have handlers, too
-                        heard[byte & _OWN].add(number)
-                        self._ask(number)
-                if max(asked.times for asked in heard.values()) > 1:
-                    self._leave()
+            while _QUIT not in (data := os.read(come, _PIECE)):
+                self._count(data, heard)
+            self._count(data[: data.index(_QUIT)], heard)
         os.close(come)
+
+    def _count(self, data: bytes, heard: Mapping[int, Asked]) -> None:
+        for byte in data:
+            number = byte % OURS
+            if number in _stopping_signals():  # others may have handlers, too
+                heard[byte - number].add(number)
+                self._ask(number)
+        if max(asked.times for asked in heard.values()) > 1:
+            self._leave()
 
     def _leave(self) -> NoReturn:
         """Somebody insists: bench to rest, a last line, and out."""
@@ -164,6 +170,7 @@ class StopSwitch:
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
         note = printable(self._note(), keep="\n")
         _say(f"{cursor}\n{state}{note}\n")
+        self._tell(bytes((LEAVING,)))
         os._exit(code)
 
 

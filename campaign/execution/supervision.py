@@ -29,16 +29,16 @@ class Patience:
         silence: between two hand-overs of samples.
         closing: for `execute` to return once nothing more is to come: braking, coming to rest.
         grace: for `execute` to return once its stop flag was set, until `make_safe` is called.
-        giving_up: for `execute` to return once `make_safe` was, until the trial is given up.
+        giving_up: for `execute` to return once `make_safe` was called, until the trial is given up.
         tick: between two looks at the clock.
         asleep: a look that comes so late says that this program itself did not run: what was not
             heard meanwhile is nobody's silence.
         late: what samples may wait until they are handed over.
     """
 
-    first: float = 60.0
+    first: float = 15.0
     silence: float = 5.0
-    closing: float = 30.0
+    closing: float = 15.0
     grace: float = 0.5
     giving_up: float = 5.0
     tick: float = 0.05

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,15 +33,13 @@ from campaign.archive.reading.recorded import trial_of_record
 from campaign.archive.writing import hdf5
 from campaign.archive.writing.default_plot import Aim, beside
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
+from campaign.channels import wrong_names
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Event
 from campaign.trial import Trial
 
 Array = NDArray[np.float64]
-
-_CHANNEL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
-
 
 Written = tuple[int, str, list[SeriesRecord]]
 """Length of every series, digest of the time base, and the channels."""
@@ -255,15 +252,8 @@ def _time_attributes() -> dict[str, str]:
 
 
 def _check_names(trial: Trial, channels: tuple[ChannelInfo, ...]) -> None:
-    names = [channel.name for channel in channels]
-    if not names:
-        raise BackendError(f"{trial.name}: a recording needs at least one channel")
-    for name in names:
-        if not _CHANNEL_NAME.fullmatch(name) or name == "time" or names.count(name) > 1:
-            raise BackendError(
-                f"{trial.name}: {name!r} cannot name a channel: letters, digits and '_', "
-                "not 'time', and each once"
-            )
+    if wrong := wrong_names([channel.name for channel in channels]):
+        raise BackendError(f"{trial.name}: {wrong}")
     for channel in channels:
         rate = channel.own_rate
         if rate is not None and not (math.isfinite(rate) and rate > 0):
