@@ -150,7 +150,9 @@ def main(command: list[str]) -> int:
         if now - looked > 3 * TURN:
             guardian.slept(now)
         looked = now
-        signals = guardian.feed(_read(told), now)
+        moved, signals = guardian.moves, guardian.feed(_read(told), now)
+        if moved and not guardian.moves:
+            os.close(back)  # the end of what is handed on
         sent = [number for number in _read(heard) if number != signal.SIGCHLD]
         if guardian.moves:
             signals += b"".join(guardian.hear(OURS + number, now) for number in sent)
@@ -162,8 +164,8 @@ def main(command: list[str]) -> int:
                 with suppress(subprocess.TimeoutExpired):  # a disk may hold it
                     program.wait(TURN)
                 break
-        else:  # of a terminal's Ctrl-C the program hears twice, and leaves at the first
-            for number in sent:
+        else:
+            for number in sent:  # of a terminal's Ctrl-C it hears twice, and leaves at the first
                 program.send_signal(number)
     guardian.feed(_read(told), looked)
     return _ended(program.returncode, guardian, why)
@@ -196,7 +198,8 @@ def _ended(status: int | None, guardian: Guardian, why: bytes) -> int:
     """Say what there is to say of a program that has ended."""
     if status is not None and not guardian.moves:
         if status < 0:
-            signal.signal(-status, signal.SIG_DFL)
+            with suppress(OSError):  # SIGKILL has no handler
+                signal.signal(-status, signal.SIG_DFL)
             os.kill(os.getpid(), -status)
         return status
     how = f"signal {-status}" if status is not None and status < 0 else f"exit code {status}"

@@ -117,13 +117,16 @@ def _threads(workers: int) -> Iterator[Begin]:
         while (work := waiting.get()) is not None:
             work()
 
-    for _ in range(workers):
-        threading.Thread(target=serve, name="trial", daemon=True).start()
+    threads = [threading.Thread(target=serve, name="trial", daemon=True) for _ in range(workers)]
+    for thread in threads:
+        thread.start()
     try:
         yield waiting.put
     finally:
-        for _ in range(workers):
+        for _ in threads:
             waiting.put(None)
+    for thread in threads:
+        thread.join()  # nothing hangs: all trials have ended
 
 
 def _verdict(

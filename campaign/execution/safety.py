@@ -140,13 +140,14 @@ def make_safe(backend: Backend, ended: Ended) -> None:
 
 
 def describe(error: BaseException) -> str:
-    """An exception nobody expected, by its type and what it says."""
+    """An exception by its type and what it says; a message for the user as it is."""
+    if isinstance(error, CampaignError):
+        return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
 def _let_go(error: Exception) -> str:
-    what = str(error) if isinstance(error, CampaignError) else describe(error)
-    return f"the backend could not let go of the bench: {what}"
+    return f"the backend could not let go of the bench: {describe(error)}"
 
 
 def _why(error: BaseException) -> str:

@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
@@ -42,8 +42,8 @@ _PIECE = 4096
 """bytes read at a time."""
 _OWN = 128
 """Added to a signal's number by our own handler; the C handler of Python writes the plain ones."""
-_QUIT = 255
-"""Ends the thread that watches."""
+_ENDING = 1.0
+"""s in which a guardian that runs lets go of its end of the pipe."""
 
 
 class StopSwitch:
@@ -103,9 +103,8 @@ class StopSwitch:
             os.set_blocking(back, False)
             watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
             watcher.start()
-            stack.callback(os.close, back)
-            stack.callback(watcher.join)
-            stack.callback(os.write, back, bytes((_QUIT,)))
+            stack.callback(watcher.join, _ENDING if guardian else None)
+            stack.callback(os.close, back)  # the watcher ends by it
             if guardian:
                 self._tell(bytes((CONNECTED,)))
                 stack.callback(self._tell, bytes((LEAVING,)))
@@ -147,19 +146,15 @@ class StopSwitch:
         """Count what each of those has heard who listen: the largest number is true."""
         heard = {0: Asked(), OURS: Asked(), _OWN: Asked()}
         with suppress(OSError):
-            while _QUIT not in (data := os.read(come, _PIECE)):
-                self._count(data, heard)
-            self._count(data[: data.index(_QUIT)], heard)
+            while data := os.read(come, _PIECE):
+                for byte in data:
+                    number = byte % OURS
+                    if number in _stopping_signals():  # others may have handlers, too
+                        heard[byte - number].add(number)
+                        self._ask(number)
+                if max(asked.times for asked in heard.values()) > 1:
+                    self._leave()
         os.close(come)
-
-    def _count(self, data: bytes, heard: Mapping[int, Asked]) -> None:
-        for byte in data:
-            number = byte % OURS
-            if number in _stopping_signals():  # others may have handlers, too
-                heard[byte - number].add(number)
-                self._ask(number)
-        if max(asked.times for asked in heard.values()) > 1:
-            self._leave()
 
     def _leave(self) -> NoReturn:
         """Somebody insists: bench to rest, a last line, and out."""

@@ -70,6 +70,12 @@ class FakeBackend:
         return self.rest()
 
 
+class OwnBackend(FakeBackend):
+    """As one of the program's own: what it raises is a bug."""
+
+    __module__ = "campaign.backends.own"
+
+
 @dataclass
 class SwitchedBench(FakeBackend):
     """A bench that others can switch off, as `stop` says; it may not be asked while it moves."""

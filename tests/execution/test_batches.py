@@ -263,8 +263,17 @@ def test_a_backend_that_cannot_go_on_has_ended_what_it_ended() -> None:
         assert ending.safe_state is SafeState.NOT_CONFIRMED
 
 
+OWN = "campaign.backends.own"
+
+
+class OwnTogether(Together):
+    """As one of the program's own: what it raises is a bug."""
+
+    __module__ = OWN
+
+
 def test_a_bug_in_a_backend_costs_no_archive_and_is_not_swallowed() -> None:
-    run = Run(make_trials(3), Together(turns={2: raise_at(1, ZeroDivisionError("oh"))}))
+    run = Run(make_trials(3), OwnTogether(turns={2: raise_at(1, ZeroDivisionError("oh"))}))
     with pytest.raises(ZeroDivisionError):
         run()
     assert run.archive.sealed is not None
@@ -286,17 +295,23 @@ def test_a_backend_that_tells_of_no_ending_has_none() -> None:
 
 
 class TwiceTold(Together):
+    __module__ = OWN
+
     def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
         yield 1, COMPLETED
         yield 1, COMPLETED
 
 
 class Nowhere(Together):
+    __module__ = OWN
+
     def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
         yield 17, COMPLETED
 
 
 class NoGenerator(Together):
+    __module__ = OWN
+
     def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
         raise OverflowError("oh")
 

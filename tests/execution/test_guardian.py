@@ -1,4 +1,4 @@
-"""The process that ends the program when it does not obey, and leaves it in peace otherwise."""
+"""The parent of a program that moves a bench: death, silence, signals, and peace otherwise."""
 
 from __future__ import annotations
 
@@ -7,21 +7,29 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from campaign.execution import guardian
-from campaign.execution.guardian import MAKING_SAFE, NOTE, SAFE, STUCK, Asked, Guardian
+from campaign.execution.guardian import (
+    BEAT,
+    CONNECTED,
+    LEAVING,
+    MAKING_SAFE,
+    NOTE,
+    OURS,
+    REST,
+    SAFE,
+    SILENCE,
+    STOPPER,
+    STUCK,
+    Asked,
+    Guardian,
+)
 
 INT, TERM = bytes((signal.SIGINT,)), bytes((signal.SIGTERM,))
 hangs_up = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no SIGHUP here")
 on_posix = pytest.mark.skipif(sys.platform == "win32", reason="there is a guardian on POSIX only")
-
-
-def note(text: bytes) -> bytes:
-    return bytes((NOTE,)) + len(text).to_bytes(2) + text
 
 
 def asked(*numbers: int) -> int:
@@ -44,24 +52,48 @@ def test_a_hang_up_counts_only_before_anything_else_does() -> None:
     assert asked(signal.SIGHUP, signal.SIGINT) == 2
 
 
-def test_one_signal_is_handed_on_and_sets_no_deadline() -> None:
+def said(kind: int, text: bytes) -> bytes:
+    return bytes((kind,)) + len(text).to_bytes(2) + text
+
+
+def note(text: bytes) -> bytes:
+    return said(NOTE, text)
+
+
+def connected() -> Guardian:
     one = Guardian()
+    one.feed(bytes((CONNECTED,)), 0.0)
+    return one
+
+
+def test_one_signal_is_handed_on_and_sets_no_deadline() -> None:
+    one = connected()
     assert one.deadline is None
     assert one.feed(INT, 100.0) == INT
     assert one.deadline is None
 
 
 def test_the_second_one_sets_a_deadline_that_more_of_them_do_not_put_off() -> None:
-    one = Guardian()
+    one = connected()
     assert one.feed(INT + TERM, 100.0) == INT + TERM
     assert one.deadline == 100.0 + STUCK
     one.feed(INT, 101.0)
     assert one.deadline == 100.0 + STUCK
 
 
+def test_a_signal_that_both_have_heard_is_one() -> None:
+    """A terminal's Ctrl-C reaches the guardian and the program."""
+    one = connected()
+    one.feed(INT, 100.0)
+    assert one.hear(OURS + signal.SIGINT, 100.0) == bytes((OURS + signal.SIGINT,))
+    assert one.deadline is None
+    one.hear(OURS + signal.SIGTERM, 101.0)
+    assert one.deadline == 101.0 + STUCK
+
+
 def test_other_signals_are_handed_on_and_count_for_nothing() -> None:
     other = bytes((signal.SIGSEGV,))
-    one = Guardian()
+    one = connected()
     assert one.feed(INT + other + other, 100.0) == INT + other + other
     assert one.deadline is None
     one.feed(INT, 101.0)
@@ -69,7 +101,7 @@ def test_other_signals_are_handed_on_and_count_for_nothing() -> None:
 
 
 def test_a_program_that_makes_safe_has_longer() -> None:
-    one = Guardian()
+    one = connected()
     one.feed(INT + INT, 100.0)
     assert one.feed(bytes((MAKING_SAFE,)), 101.0) == b""
     assert one.deadline == 101.0 + SAFE
@@ -77,14 +109,37 @@ def test_a_program_that_makes_safe_has_longer() -> None:
     assert one.deadline == 101.0 + SAFE
 
 
-@pytest.mark.parametrize("text", [b"", b"kept \x02\x02\xfe\xfd", b"x" * 1000])
+def test_silence_counts_from_the_last_sign_of_life_until_none_is_owed() -> None:
+    one = connected()
+    one.feed(bytes((BEAT,)), 100.0)
+    assert one.deadline == 100.0 + SILENCE
+    one.feed(bytes((BEAT,)), 105.0)
+    assert one.deadline == 105.0 + SILENCE
+    one.slept(200.0)
+    assert one.deadline == 200.0 + SILENCE
+    one.feed(bytes((REST,)), 201.0)
+    assert one.deadline is None
+    one.slept(300.0)
+    assert one.deadline is None
+
+
+def test_a_bench_is_connected_until_the_program_only_ends() -> None:
+    one = Guardian()
+    assert not one.moves
+    one.feed(bytes((CONNECTED, BEAT, REST)), 1.0)
+    assert one.moves
+    one.feed(bytes((LEAVING,)), 2.0)
+    assert not one.moves
+
+
+@pytest.mark.parametrize("text", [b"", b"kept \x02\x02\xfe\xfd\xfa", b"x" * 1000])
 @pytest.mark.parametrize("piece", [1, 2, 3, 4, 5000])
 def test_a_note_comes_through_however_it_is_cut_and_is_no_signal(text: bytes, piece: int) -> None:
-    one = Guardian()
-    data = INT + note(b"first") + note(text) + TERM
+    one = connected()
+    data = INT + note(b"first") + note(text) + said(STOPPER, b"stop\0it") + TERM
     heard = b"".join(one.feed(data[i : i + piece], 1.0) for i in range(0, len(data), piece))
     assert heard == INT + TERM
-    assert one.note == text
+    assert (one.note, one.stopper, one.moves) == (text, b"stop\0it", True)
 
 
 def test_a_note_is_known_as_soon_as_it_is_whole() -> None:
@@ -95,98 +150,149 @@ def test_a_note_is_known_as_soon_as_it_is_whole() -> None:
     assert one.note == b"kept"
 
 
-def test_before_the_program_has_said_anything_there_is_no_note() -> None:
-    assert Guardian().note == b""
+PROGRAM = """
+import ctypes, os, signal, sys, time
+come, back, tell = map(int, os.environ["{variable}"].split(","))
+def say(*data): os.write(tell, bytes(data))
+def note(kind, text): os.write(tell, bytes((kind,)) + len(text).to_bytes(2) + text)
+def ready(): os.write(1, b"ready\\n")
+def heard(count): return [os.read(come, 1)[0] for _ in range(count)]
+signal.signal(signal.SIGINT, lambda *_: None)
+signal.signal(signal.SIGTERM, lambda *_: None)
+CONNECTED, LEAVING, BEAT, REST, NOTE, STOPPER, MAKING_SAFE = {bytes}
+note(NOTE, b"the run is kept")
+{does}
+"""
+BYTES = (CONNECTED, LEAVING, BEAT, REST, NOTE, STOPPER, MAKING_SAFE)
 
 
-@pytest.fixture
-def program() -> Iterator[subprocess.Popen[bytes]]:
-    """Something to watch over that does not end by itself."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
-    )
-    with process:
-        yield process
-        process.kill()
+class Watched:
+    """A program under a guardian, each in a process of its own."""
 
-
-class Watching:
-    """A guardian in a process of its own, over a program."""
-
-    def __init__(self, over: subprocess.Popen[bytes], *, edit: str = "") -> None:
-        """`edit`: what differs from guardian.py, for instance a shorter patience."""
-        path = str(Path(guardian.__file__))
-        code = f"import runpy, sys; g = runpy.run_path({path!r}); {edit}; g['main']({over.pid})"
-        run = ["-c", code] if edit else [path, str(over.pid)]
+    def __init__(self, does: str, **constants: float) -> None:
+        """`constants` of guardian.py that differ, for instance a shorter patience."""
+        path = guardian.__file__
+        program = PROGRAM.format(variable=guardian.VARIABLE, bytes=BYTES, does=does)
+        code = (
+            f"import runpy, sys; g = runpy.run_path({path!r}); "
+            f"g['main'].__globals__.update({constants!r}); sys.exit(g['main'](sys.argv[1:]))"
+        )
         self.process = subprocess.Popen(
-            [sys.executable, "-I", "-S", *run],
+            [sys.executable, "-I", "-S", "-c", code, sys.executable, "-c", program],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # one group, as in a terminal
         )
 
-    def say(self, data: bytes) -> None:
-        self.process.stdin.write(data)
-        self.process.stdin.flush()
+    def until_ready(self) -> None:
+        assert self.process.stdout.readline() == "ready\n"
 
-    def end(self) -> tuple[bytes, bytes]:
-        return self.process.communicate(timeout=60)
-
-
-IMPATIENT = "g['main'].__globals__.update(STUCK=0.05)"
+    def end(self) -> tuple[int, str, str]:
+        out, err = self.process.communicate(timeout=60)
+        return self.process.returncode, out, err
 
 
-@on_posix
-def test_signals_come_back_at_once_and_it_goes_when_the_program_goes(program) -> None:
-    watching = Watching(program)
-    watching.say(INT)
-    assert os.read(watching.process.stdout.fileno(), 10) == INT
-    watching.say(note(b"kept"))
-    assert watching.end() == (b"", b"")
-    assert watching.process.returncode == 0
-    assert program.poll() is None
+DIED = (
+    "\nthe program died: {}\nthe run is kept\n"
+    "the backend could not be asked to make the bench safe\n"
+)
 
 
 @on_posix
-def test_who_does_not_obey_is_ended_and_the_last_note_is_said(program) -> None:
-    watching = Watching(program, edit=IMPATIENT)
-    watching.say(note(b"the run is kept") + INT)
-    assert os.read(watching.process.stdout.fileno(), 10) == INT
-    assert program.poll() is None
-    watching.say(INT)
-    assert program.wait(60) == -signal.SIGKILL
-    # Not `communicate`: it has to go by itself, although its input stays open.
-    assert watching.process.wait(60) == 0
-    assert watching.process.stdout.read() == INT
-    assert watching.process.stderr.read() == b"\nthe run is kept\n"
-    watching.end()
+@pytest.mark.parametrize(
+    ("does", "code", "err"),
+    [
+        ("sys.exit(3)", 3, ""),
+        ("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL, ""),
+        ("say(CONNECTED); say(LEAVING); sys.exit(130)", 130, ""),
+        ("say(CONNECTED); os._exit(0)", 5, DIED.format("exit code 0")),
+        ("say(CONNECTED); os.kill(os.getpid(), signal.SIGKILL)", 5, DIED.format("signal 9")),
+        ("say(CONNECTED, LEAVING, CONNECTED); os._exit(0)", 5, DIED.format("exit code 0")),
+    ],
+)
+def test_who_dies_with_a_bench_connected_has_the_exit_code_of_an_unsafe_one(
+    does: str, code: int, err: str
+) -> None:
+    assert Watched(does).end() == (code, "", err)
 
 
 @on_posix
-def test_a_deadline_that_has_passed_already_is_kept_as_well(program) -> None:
-    watching = Watching(program, edit="g['main'].__globals__.update(STUCK=-60.0)")
-    watching.say(INT + INT)
-    assert program.wait(60) == -signal.SIGKILL
-    assert watching.end() == (INT + INT, b"\n\n")
+@pytest.mark.parametrize(
+    "hangs",
+    [
+        "time.sleep(60)",
+        "ctypes.PyDLL(None).sleep(60)",  # holds the interpreter's lock
+        "os.kill(os.getpid(), signal.SIGSTOP)",
+    ],
+)
+def test_who_owes_a_sign_of_life_is_killed(hangs: str) -> None:
+    code, _, err = Watched(f"say(CONNECTED, BEAT); {hangs}", SILENCE=0.3, TURN=0.1).end()
+    assert code == 5
+    assert err.startswith("\nthe program gave no sign of life for 0.3 s and was killed\nthe run is")
 
 
 @on_posix
-def test_who_makes_the_bench_safe_is_given_the_time_for_it(program) -> None:
+@pytest.mark.parametrize("before", ["", "say(CONNECTED); ", "say(CONNECTED, BEAT, REST); "])
+def test_who_owes_none_may_take_its_time(before: str) -> None:
+    does = f"{before}time.sleep(1.0); say(LEAVING)"
+    assert Watched(does, SILENCE=0.2, TURN=0.1).end() == (0, "", "")
+
+
+@on_posix
+def test_the_controller_of_a_program_that_died_is_stopped_by_its_own_command() -> None:
+    stopper = [sys.executable, "-c", "import sys; print('stopped', sys.argv[1:])", "a b", "c"]
+    does = f"note(STOPPER, b'\\0'.join({[each.encode() for each in stopper]!r}))"
+    code, out, err = Watched(f"{does}; say(CONNECTED); os._exit(0)").end()
+    assert (code, out) == (5, "")
+    assert err.endswith("\nstopped ['a b', 'c']\n")
+    assert "could not be asked" not in err
+
+
+@on_posix
+def test_a_command_that_hangs_as_well_is_not_waited_for() -> None:
+    stopper = f"[{sys.executable!r}.encode(), b'-c', b'import time; time.sleep(60)']"
+    does = f"note(STOPPER, b'\\0'.join({stopper})); say(CONNECTED); os._exit(0)"
+    assert Watched(does, STOPPING=0.2).end()[0] == 5
+
+
+@on_posix
+def test_signals_to_the_guardian_reach_the_program() -> None:
+    """By the pipe where it listens, else as signals; those of the whole group by both ways."""
+    watched = Watched("say(CONNECTED); ready(); print(heard(2)); say(LEAVING)")
+    watched.until_ready()
+    watched.process.send_signal(signal.SIGINT)
+    watched.process.send_signal(signal.SIGTERM)
+    code, out, _ = watched.end()
+    assert code == 0
+    assert set(eval(out)) == {OURS + signal.SIGINT, OURS + signal.SIGTERM}
+    before = Watched("signal.signal(signal.SIGTERM, signal.SIG_DFL); ready(); time.sleep(60)")
+    before.until_ready()
+    before.process.send_signal(signal.SIGTERM)
+    assert before.end()[0] == -signal.SIGTERM
+
+
+@on_posix
+def test_who_does_not_obey_is_ended_and_the_last_note_is_said() -> None:
+    watched = Watched("say(CONNECTED); ready(); time.sleep(60)", STUCK=0.05, TURN=0.1)
+    watched.until_ready()
+    os.killpg(watched.process.pid, signal.SIGINT)  # once, for both
+    time.sleep(0.3)
+    assert watched.process.poll() is None
+    watched.process.send_signal(signal.SIGINT)
+    code, _, err = watched.end()
+    assert code == 5
+    assert err.startswith("\nthe program did not obey and was killed\nthe run is kept\n")
+
+
+@on_posix
+def test_who_makes_the_bench_safe_is_given_the_time_for_it() -> None:
     """As long as SAFE, and not as long as STUCK."""
-    watching = Watching(program, edit=IMPATIENT)
-    watching.say(INT + INT + bytes((MAKING_SAFE,)))
-    time.sleep(0.5)
-    assert program.poll() is None
-    assert watching.end() == (INT + INT, b"")
-    assert program.poll() is None
-
-
-@on_posix
-def test_nobody_who_listens_is_no_reason_to_stay(program) -> None:
-    watching = Watching(program)
-    watching.process.stdout.close()
-    watching.say(INT)
-    assert watching.process.wait(60) == 0
-    assert watching.process.stderr.read() == b""
-    watching.process.stderr.close()
-    watching.process.stdin.close()
+    does = "say(CONNECTED); ready(); heard(2); say(MAKING_SAFE); time.sleep(0.5); say(LEAVING)"
+    watched = Watched(does, STUCK=0.2, TURN=0.05)
+    watched.until_ready()
+    watched.process.send_signal(signal.SIGINT)
+    time.sleep(0.1)
+    watched.process.send_signal(signal.SIGTERM)
+    assert watched.end() == (0, "", "")

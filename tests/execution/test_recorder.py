@@ -238,7 +238,7 @@ def test_a_trial_that_does_not_end_is_ended() -> None:
         (lambda r: r.append(np.zeros(3), np.zeros((3, 3))), "shape (3, 3)"),
         (lambda r: r.append(np.arange(3) / RATE, np.zeros((4, 2))), "shape (4, 2)"),
         (lambda r: r.append(np.zeros((3, 1)), np.zeros((4, 3))), "its time (3, 1)"),
-        (lambda r: r.append(["a"], [["a"]] * 4), "no array of numbers"),
+        (lambda r: r.append(["a"], [["a"]] * 4), "no real numbers"),
         (lambda r: r.start(CHANNELS), "a second time"),
     ],
 )

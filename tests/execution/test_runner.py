@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import _thread
+import json
 import threading
 import time
 from collections.abc import Callable
@@ -10,15 +12,22 @@ import numpy as np
 import pytest
 
 from campaign.archive.layout.header import RunStatus
-from campaign.errors import ArchiveError, BackendError, ExitCode
+from campaign.errors import ArchiveError, BackendError, ExitCode, UsageError
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
-from campaign.execution.safety import AbortedError, NotSafeError
+from campaign.execution.safety import AbortedError, NotSafeError, describe
 from campaign.execution.stop import StopSwitch
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import COMPLETED, RATE, FakeBackend, MemoryArchive, make_trials
+from tests.execution.fakes import (
+    COMPLETED,
+    RATE,
+    FakeBackend,
+    MemoryArchive,
+    OwnBackend,
+    make_trials,
+)
 
 
 class Bench:
@@ -134,14 +143,59 @@ def test_a_backend_that_gives_up_ends_the_run_as_a_fault_with_the_trial_kept():
     assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
 
 
-def test_a_bug_in_a_backend_still_seals_the_archive_and_is_not_swallowed():
-    bench = Bench(3, FakeBackend({2: raises(ZeroDivisionError("oops"))}))
+def test_a_bug_in_a_backend_of_ours_still_seals_the_archive_and_is_not_swallowed():
+    bench = Bench(3, OwnBackend({2: raises(ZeroDivisionError("oops"))}))
     with pytest.raises(ZeroDivisionError):
         bench.run()
     assert bench.backend.log[-1] == "made safe"
     status, reason, _ = bench.archive.sealed
     assert status == "fault"
     assert "ZeroDivisionError: oops" in reason
+
+
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError("oops"), SystemExit(0), KeyboardInterrupt(), UsageError("oops")]
+)
+def test_whatever_the_backend_of_another_raises_is_a_fault_with_its_name(error: BaseException):
+    bench = Bench(3, FakeBackend({2: raises(error)}))
+    run = bench.run()
+    assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
+    assert bench.backend.log[-1] == "made safe"
+    named = (
+        isinstance(error, UsageError) or "execute() failed in tests.execution.fakes" in run.reason
+    )
+    assert named, run.reason
+    assert describe(error) in run.reason
+
+
+@pytest.mark.parametrize(
+    "ending",
+    [
+        None,
+        "completed",
+        {"outcome": "completed"},
+        Ending("completed"),
+        Ending(Outcome.FAULT, fault="x"),
+    ],
+)
+def test_an_ending_of_another_type_is_a_fault(ending: object):
+    run = Bench(2, FakeBackend({1: lambda stopped: ending})).run()
+    assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
+    assert "execute() of tests.execution.fakes.FakeBackend answered with" in run.reason
+
+
+def test_what_execute_says_is_archived_as_plain_text_and_json():
+    telemetry = {"bad \ud800": float("nan"), "deep": [{"object": object()}], 3: True}
+    ending = Ending(Outcome.FAULT, "a\ud800b\x1b[2J" + "x" * 10_000, telemetry=telemetry)
+    bench = Bench(1, FakeBackend({1: lambda stopped: ending}))
+    bench.run()
+    kept = bench.archive.endings[1]
+    assert kept.reason.startswith("a?b?[2Jxxx")
+    assert len(kept.reason) < 2100
+    assert kept.telemetry == {
+        "bad ?": "nan", "deep": [{"object": "(object, no text)"}], "(int, no text)": True,
+    }  # fmt: skip
+    json.dumps(kept.telemetry, allow_nan=False).encode()
 
 
 def test_an_archive_that_cannot_be_written_ends_the_run_unsealed_with_the_bench_safe():
@@ -250,7 +304,9 @@ def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
 
 def test_a_stop_while_the_bench_is_made_safe_is_not_taken_for_safe():
     def interrupted() -> SafeState:
-        raise KeyboardInterrupt
+        _thread.interrupt_main()
+        time.sleep(5.0)
+        return SafeState.CONFIRMED
 
     bench = Bench(1, FakeBackend(rest=interrupted))
     with pytest.raises(NotSafeError, match="SAFE STATE NOT CONFIRMED") as unsafe:
@@ -293,7 +349,7 @@ def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_written(
 
 def test_an_unsafe_bench_comes_before_a_bug_in_the_backend():
     oops = raises(ZeroDivisionError("oops"))
-    bench = Bench(3, FakeBackend({2: oops}, rest=not_confirmed))
+    bench = Bench(3, OwnBackend({2: oops}, rest=not_confirmed))
     assert_unsafe_is_said_first(bench, "not seen at rest", "ZeroDivisionError: oops", "run.nxs")
     status, reason, safe_state = bench.archive.sealed
     assert (status, safe_state) == ("fault", SafeState.NOT_CONFIRMED)
@@ -411,7 +467,7 @@ def test_of_several_faults_the_first_is_the_reason():
     def second() -> Ending:
         raise ValueError("two")
 
-    bench = Bench(2, FakeBackend({1: raises(KeyError("one")), 2: until_stopped(second)}))
+    bench = Bench(2, OwnBackend({1: raises(KeyError("one")), 2: until_stopped(second)}))
     with pytest.raises(KeyError, match="one"):
         bench.run(workers=2)
     assert "KeyError: 'one'" in bench.archive.sealed[1]

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import _thread
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
 import pytest
 
 from campaign.errors import ArchiveError, BackendError, ExitCode
+from campaign.execution import foreign
 from campaign.execution.safety import (
     NOT_SAFE,
     AbortedError,
@@ -56,12 +58,23 @@ def test_seen_safe_is_seen_safe_also_after_it_was_not() -> None:
     assert ended.unsafe == ""
 
 
+FAILED = "making the bench safe failed"
+FAKE = "tests.execution.fakes.FakeBackend"
+
+
 @pytest.mark.parametrize(
     ("rest", "why"),
     [
         (not_seen, "the bench was not seen at rest with its drive off"),
-        (raising(OSError("port is gone")), "making the bench safe failed: OSError: port is gone"),
-        (raising(ValueError()), "making the bench safe failed: ValueError"),
+        (raising(BackendError("port is gone")), "making the bench safe failed: port is gone"),
+        (
+            raising(SystemExit(0)),
+            f"making the bench safe failed: make_safe() failed in {FAKE}: SystemExit: 0",
+        ),
+        (
+            lambda: "confirmed",
+            f"{FAILED}: make_safe() of {FAKE} answered with 'str', no SafeState",
+        ),
     ],
 )
 def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState], why: str) -> None:
@@ -71,21 +84,17 @@ def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState],
     assert ended.unsafe == why
 
 
-@pytest.mark.parametrize(
-    ("error", "why"),
-    [
-        (KeyboardInterrupt(), "making the bench safe was interrupted"),
-        (SystemExit(), "making the bench safe did not end"),
-    ],
-)
-def test_what_breaks_making_safe_off_goes_on_and_leaves_the_bench_unsafe(
-    error: BaseException, why: str
-) -> None:
+def test_who_interrupts_making_safe_leaves_the_bench_unsafe() -> None:
+    def interrupted() -> SafeState:
+        _thread.interrupt_main()
+        time.sleep(5.0)
+        return SafeState.CONFIRMED
+
     ended = Ended(safe_state=SafeState.CONFIRMED)
-    with pytest.raises(type(error)):
-        make_safe(resting(raising(error)), ended)
+    with pytest.raises(KeyboardInterrupt):
+        make_safe(resting(interrupted), ended)
     assert ended.safe_state is SafeState.NOT_CONFIRMED
-    assert ended.unsafe == why
+    assert ended.unsafe == "making the bench safe was interrupted"
 
 
 def test_an_error_of_a_safe_bench_is_its_own() -> None:
@@ -159,6 +168,9 @@ def test_a_connected_bench_is_made_safe_only_when_the_block_breaks_off() -> None
         raise KeyboardInterrupt
 
 
+EXIT = "__exit__() failed in tests.execution.test_safety.Clinging"
+
+
 class Clinging(FakeBackend):
     """Cannot let go."""
 
@@ -186,7 +198,8 @@ def test_a_backend_is_let_go_of_and_told_how_the_block_ended() -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "what"), [(OSError("busy"), "OSError: busy"), (BackendError("stuck"), "stuck")]
+    ("error", "what"),
+    [(OSError("busy"), f"{EXIT}: OSError: busy"), (BackendError("stuck"), "stuck")],
 )
 def test_what_cannot_let_go_hides_nothing(error: Exception, what: str) -> None:
     backend = Clinging()
@@ -217,23 +230,86 @@ def test_leaving_at_once_waits_for_a_bench_that_takes_a_moment() -> None:
     assert safe_at_once(resting(slow)) is ExitCode.INTERRUPTED
 
 
-def test_leaving_at_once_does_not_wait_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And what it no longer waits for does not keep the program."""
-    monkeypatch.setattr("campaign.execution.safety.AT_ONCE", 0.05)
-    let_go, threads = threading.Event(), []
+class Hanging(FakeBackend):
+    """Each of its methods waits until it is let go; which were called is in its log."""
 
-    def hang() -> SafeState:
-        threads.append(threading.current_thread())
-        assert let_go.wait(60)
+    def __init__(self, *hangs: str) -> None:
+        super().__init__()
+        self.hangs, self.let_go = hangs, threading.Event()
+
+    def wait(self, method: str) -> None:
+        self.log.append(method)
+        if method in self.hangs:
+            assert threading.current_thread().daemon, "it would keep the program"
+            self.let_go.wait(60)
+
+    def __enter__(self) -> FakeBackend:
+        self.wait("enter")
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.wait("exit")
+
+    def make_safe(self) -> SafeState:
+        self.wait("make safe")
         return SafeState.CONFIRMED
 
-    try:
-        assert safe_at_once(resting(hang)) is ExitCode.NOT_SAFE
-        assert all(thread.daemon for thread in threads)
-    finally:
-        let_go.set()
-    for thread in threads:
-        thread.join(60)
+
+@pytest.fixture
+def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Hanging]]:
+    made: list[Hanging] = []
+
+    def make(*hangs: str) -> Hanging:
+        made.append(Hanging(*hangs))
+        return made[-1]
+
+    for limit in ("CONNECTING", "MAKING_SAFE", "LEAVING"):
+        monkeypatch.setattr(f"campaign.execution.foreign.{limit}", 0.05)
+    yield make
+    for each in made:
+        each.let_go.set()
+
+
+def test_leaving_at_once_does_not_wait_for_ever(hanging: Callable[..., Hanging]) -> None:
+    assert safe_at_once(hanging("make safe")) is ExitCode.NOT_SAFE
+
+
+def test_a_bench_that_hangs_while_it_is_connected_is_made_safe(
+    hanging: Callable[..., Hanging],
+) -> None:
+    """It may have begun to move."""
+    backend = hanging("enter")
+    late = pytest.raises(BackendError, match=r"__enter__\(\) of tests.*Hanging did not end within")
+    with late, connected(backend, pytest.fail):
+        pytest.fail("it is not connected")
+    assert backend.log == ["enter", "make safe"]
+    both = hanging("enter", "make safe")
+    with pytest.raises(NotSafeError, match="did not end within"), connected(both, pytest.fail):
+        pytest.fail("it is not connected")
+
+
+def test_a_bench_that_cannot_be_connected_is_not_made_safe() -> None:
+    class Refuses(FakeBackend):
+        def __enter__(self) -> FakeBackend:
+            raise BackendError("no such port")
+
+    backend = Refuses()
+    with pytest.raises(BackendError, match=r"^no such port$"), connected(backend, pytest.fail):
+        pytest.fail("it is not connected")
+    assert backend.log == []
+
+
+def test_a_backend_that_does_not_let_go_is_left_behind(hanging: Callable[..., Hanging]) -> None:
+    late = pytest.raises(BackendError, match=r"could not let go .* did not end within 0.05 s")
+    with late, connected(hanging("exit"), pytest.fail):
+        pass
+
+
+@pytest.mark.parametrize("method", ["execute", "make_safe", "refuses", "channels"])
+def test_a_backend_that_lacks_a_method_is_refused_by_name(method: str) -> None:
+    lacking = type("Lacking", (FakeBackend,), {method: None})()
+    with pytest.raises(BackendError, match=rf"the backend 'tx1' .*Lacking lacks {method}\(\)"):
+        foreign.opened(lacking, "tx1")
 
 
 def test_an_exception_is_its_type_and_what_it_says() -> None:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
 import pytest
 
+from campaign.execution.guarded import GuardianPipes
+from campaign.execution.guardian import OURS, SILENCE, Guardian
+from campaign.execution.heartbeat import HEARTBEAT
 from campaign.execution.safety import NOT_SAFE
 from campaign.execution.stop import StopSwitch
 
@@ -187,25 +191,12 @@ def test_it_is_said_once_that_the_run_is_being_stopped(left: threading.Event, ca
     assert capfd.readouterr().err.count("stopping: ") == 1
 
 
-@pytest.fixture
-def guardian(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
-    """Every process that is started."""
-    started, known = [], subprocess.Popen
-
-    def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
-        started.append(known(*arguments, **options))
-        return started[-1]
-
-    monkeypatch.setattr(subprocess, "Popen", start)
-    return started
-
-
 def open_files() -> set[Path]:
     return {file for file in Path("/dev/fd").iterdir() if file.exists()}  # not its own
 
 
 @on_posix
-def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
+def test_nothing_is_left_behind():
     come, back = os.pipe()
     os.set_blocking(back, False)
     outer = signal.set_wakeup_fd(back)
@@ -213,11 +204,8 @@ def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
         threads, files = set(threading.enumerate()), open_files()
         with StopSwitch().on_signals():
             assert all(thread.daemon for thread in set(threading.enumerate()) - threads)
-            (process,) = guardian
-            assert process.poll() is None
         assert not set(threading.enumerate()) - threads
         assert open_files() == files
-        assert process.returncode == 0
         assert signal.set_wakeup_fd(-1) == back
     finally:
         signal.set_wakeup_fd(outer)
@@ -225,47 +213,103 @@ def test_nothing_is_left_behind(guardian: list[subprocess.Popen[bytes]]):
         os.close(back)
 
 
-@on_posix
-def test_a_note_that_comes_late_is_written_into_nobodys_file():
-    with StopSwitch().on_signals() as stop:
-        pass
-    pipes = [os.pipe() for _ in range(8)]  # they get the numbers that have become free
-    stop.kept(lambda: "late", moves=False)
-    for come, back in pipes:
-        os.close(back)
-        assert os.read(come, 100) == b""
-        os.close(come)
+class FakeGuardian:
+    """The ends that a guardian holds; not blocking."""
+
+    def __init__(self) -> None:
+        come, self.back = os.pipe()
+        self.told, tell = os.pipe()
+        for end in (self.told, tell):
+            os.set_blocking(end, False)
+        self.pipes = GuardianPipes(come, os.dup(self.back), tell)
+        self.known = Guardian()
+
+    def heard(self) -> Guardian:
+        """What the program has told, up to now."""
+        with suppress(BlockingIOError):
+            while data := os.read(self.told, 100_000):
+                self.known.feed(data, 0.0)
+        return self.known
+
+
+@pytest.fixture
+def guardian() -> Iterator[FakeGuardian]:
+    one = FakeGuardian()
+    yield one
+    HEARTBEAT.goes_to(lambda data: None)
+    for end in (one.back, one.told, one.pipes.tell):
+        with suppress(OSError):
+            os.close(end)
 
 
 @on_posix
-def test_a_guardian_that_does_nothing_holds_nothing_up(
-    left: threading.Event, guardian: list[subprocess.Popen[bytes]], capfd
+def test_the_guardian_knows_that_a_bench_is_connected_and_what_is_kept(guardian: FakeGuardian):
+    with StopSwitch(guardian.pipes).on_signals() as stop:
+        assert guardian.heard().moves
+        stop.kept(lambda: "kept \udcff", moves=True, stopper=("stop", "--port", "x"))
+        assert guardian.heard().note == f"{NOT_SAFE}\nkept ?".encode()
+        assert guardian.heard().stopper == b"stop\0--port\0x"
+        assert guardian.heard().deadline is None
+        with HEARTBEAT.expected():
+            assert guardian.heard().deadline == SILENCE
+            with HEARTBEAT.expected():
+                pass
+            assert guardian.heard().deadline == SILENCE
+        assert guardian.heard().deadline is None
+    assert not guardian.heard().moves
+
+
+@on_posix
+def test_what_guardian_and_program_have_both_heard_is_one(
+    guardian: FakeGuardian, left: threading.Event
 ):
-    with StopSwitch().on_signals() as stop:
-        (process,) = guardian
-        # The terminal's Ctrl-C reaches the program only.
-        assert os.getsid(process.pid) != os.getsid(0)
-        process.send_signal(signal.SIGSTOP)
-        try:
-            for text in ("x" * 5000, ""):  # more than a pipe can hold, to the last byte
-                for _ in range(1000):
-                    stop.kept(partial(str, text), moves=False)
-            signal.raise_signal(signal.SIGINT)
-            assert not left.is_set()
-            signal.raise_signal(signal.SIGINT)
-            assert left.wait(60)
-            signal.raise_signal(signal.SIGINT)
-            signal.raise_signal(signal.SIGINT)
-        finally:
-            process.send_signal(signal.SIGCONT)
+    with StopSwitch(guardian.pipes).on_signals() as stop:
+        os.write(guardian.back, bytes((OURS + signal.SIGINT, signal.SIGINT)))
+        signal.raise_signal(signal.SIGINT)
+        while not stop():
+            pass
+    assert not left.is_set()
+    again = FakeGuardian()  # who hears it once more
+    with StopSwitch(again.pipes).on_signals():
+        os.write(again.back, bytes((OURS + signal.SIGINT, OURS + signal.SIGTERM)))
+        assert left.wait(60)
+
+
+@on_posix
+def test_a_program_whose_guardian_is_gone_is_asked_to_stop(guardian: FakeGuardian):
+    with StopSwitch(guardian.pipes).on_signals() as stop:
+        assert not stop()
+        os.close(guardian.told)
+        with HEARTBEAT.expected():
+            assert stop.reason == "the death of its guardian process"
+
+
+@on_posix
+def test_a_guardian_that_does_nothing_holds_nothing_up(guardian: FakeGuardian, left, capfd):
+    with StopSwitch(guardian.pipes).on_signals() as stop:
+        for text in ("x" * 5000, ""):  # more than a pipe can hold, to the last byte
+            for _ in range(1000):
+                stop.kept(partial(str, text), moves=False)
+        signal.raise_signal(signal.SIGINT)
+        assert not left.is_set()
+        signal.raise_signal(signal.SIGINT)
+        assert left.wait(60)
+        signal.raise_signal(signal.SIGINT)
     assert "ignored" not in capfd.readouterr().err  # what Python says of a wakeup pipe that is full
 
 
 @on_posix
-def test_a_note_is_never_longer_than_a_pipe_takes_whole(tmp_path: Path):
-    code, said = insisted(tmp_path, "asked(); kept('x' * 100_000); hang(ctypes.PyDLL)")
-    assert code == -signal.SIGKILL
-    assert 1000 < said.count("x") <= 4096 - 3
+def test_a_note_is_never_longer_than_a_pipe_takes_whole(guardian: FakeGuardian):
+    with StopSwitch(guardian.pipes).on_signals() as stop:
+        stop.kept(lambda: "x" * 100_000, moves=False)
+    assert 1000 < len(guardian.heard().note) <= select.PIPE_BUF - 3
+
+
+def test_without_a_guardian_nobody_is_told(monkeypatch: pytest.MonkeyPatch):
+    with StopSwitch().on_signals() as stop:
+        stop.kept(lambda: "kept", moves=True)
+        with HEARTBEAT.expected():
+            HEARTBEAT.beat()
 
 
 PROGRAM = """
@@ -376,26 +420,9 @@ def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
 
 
 @on_posix
-def test_a_bench_that_the_guardian_has_not_seen_safe_is_said_to_be_so(tmp_path: Path):
-    code, said = insisted(
-        tmp_path, "asked(); stop.kept(lambda: 'kept', moves=True); hang(ctypes.PyDLL)"
-    )
-    assert code == -signal.SIGKILL
-    assert said.endswith("look at the bench before anything else\nkept\n")
-
-
-@on_posix
 def test_who_insists_is_told_that_a_bench_which_moves_is_safe(tmp_path: Path):
     code, said = insisted(
         tmp_path, "asked(); stop.kept(lambda: 'kept', moves=True); hang(ctypes.CDLL)"
     )
     assert code == 130
     assert said.endswith("safe state confirmed: the bench is at rest with its drive off\nkept\n")
-
-
-@on_posix
-def test_a_program_that_lets_no_thread_run_is_ended_with_its_last_note(tmp_path: Path):
-    code, said = insisted(tmp_path, "asked(); kept('one'); kept('zwö'); hang(ctypes.PyDLL)")
-    assert code == -signal.SIGKILL
-    assert said.endswith("\nzwö\n")
-    assert "one" not in said
