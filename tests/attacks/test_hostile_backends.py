@@ -619,7 +619,6 @@ def test_standard_output_holds_the_path_and_nothing_else(apart: Packages) -> Non
     ("at", "do", "code"),
     [
         ("execute", "sys.exit(0)", FAULT),
-        seldom("within", "os.umask(0o777)", DONE),
         seldom("ending", "fault(NASTY)", FAULT),
         seldom("execute", "throw(UnprintableError())", FAULT),
         seldom("make_safe", "threading.Event().wait(600)", NOT_SEEN_SAFE),
