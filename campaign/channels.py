@@ -26,6 +26,8 @@ from campaign.axis_kind import AxisKind as AxisKind  # known by this name to bac
 from campaign.axis_kind import Sides
 from campaign.recording import ChannelInfo
 
+MOST = 256
+"""channels of a recording."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
 
 COMMAND = "command"
@@ -306,8 +308,8 @@ def info(
 
 def wrong_names(names: Sequence[object]) -> str:
     """Why `names` cannot be those of the channels of a recording; empty when they can."""
-    if not names:
-        return "no channel was announced"
+    if not 0 < len(names) <= MOST:
+        return f"{len(names) or 'no'} channels were announced; a recording has 1 to {MOST}"
     for name in names:
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name == "time":
             return f"{name!r} cannot name a channel: letters, digits and '_', not 'time'"

@@ -42,6 +42,11 @@ class PlugIn:
     def __str__(self) -> str:
         return f"the package {self.distribution} {self.version} (entry point {self.entry_point})"
 
+    @property
+    def package(self) -> str:
+        """The package alone, for what any of its code has done."""
+        return f"the package {self.distribution} {self.version}"
+
     def load(self) -> object:
         """Import it. Raises whatever the package raises."""
         return metadata.EntryPoint(self.name, self.entry_point, self.group).load()
@@ -102,7 +107,10 @@ def blamed(error: BaseException) -> PlugIn | None:
 
 def one_line(error: BaseException) -> str:
     """An error without its traceback."""
-    lines = str(error).strip().splitlines()
+    try:
+        lines = str(error).strip().splitlines()
+    except Exception:  # noqa: BLE001 - one that cannot be told
+        lines = []
     return f"{type(error).__name__}: {lines[0]}"[:300] if lines else type(error).__name__
 
 

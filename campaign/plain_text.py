@@ -48,7 +48,7 @@ def storable_tree(value: object, depth: int = 0) -> Any:
     """`value` as JSON: other types, and what is too deep, by the name of the type."""
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
-    if value is None or isinstance(value, bool | int):
+    if value is None or (isinstance(value, int) and abs(value) < 2**63):
         return value
     if depth < DEEPEST and isinstance(value, Mapping):
         return {storable(key): storable_tree(each, depth + 1) for key, each in value.items()}

@@ -132,7 +132,7 @@ def open_backend(
     Raises UsageError when it does not, or is known not to record what one of them requires;
     ArchiveError when it does not and the run that it serves is damaged.
     """
-    backend = foreign.opened(foreign.called(kind, "open", options), kind.name)
+    backend = foreign.opened(kind, options)
     if isinstance(backend, SimulatesTruth):
         backend.simulate_instead(truths or {})
     elif kind.source is not Source.RECORDING and (named := [t for t in trials if t.truth]):

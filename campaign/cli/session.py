@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
+from campaign.execution import foreign
 from campaign.execution.display import clock, progress_display
 from campaign.execution.guarded import GuardianPipes
 from campaign.execution.measuring import Measuring
@@ -138,7 +139,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     if isinstance(session.backend, Introduced):
-        session.backend.introduce(session.folder.stem)
+        foreign.called(session.backend, "introduce", session.folder.stem)
     if isinstance(session.backend, Timed):
         session.backend.timing = session.timing
     try:
@@ -168,6 +169,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             keep()
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
+                archive = session.folder.with_name(outcome.archive.name)
+                outcome = replace(outcome, archive=archive)  # as it was typed
     except BackendError as error:
         if outcome is None:
             raise

@@ -15,6 +15,7 @@ from campaign.backends.interface import Backend, StopFlag, StoppedOutside
 from campaign.entry_points import blamed, provider
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.heartbeat import HEARTBEAT
+from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, SafeState
 from campaign.trial import Trial
@@ -29,6 +30,7 @@ LOOKING = 20.0
 """and `panic_stop`. A bench that hangs is safe, or known not to be, within 40 s of all of them."""
 TICK = 0.05
 """s between two looks at the clock."""
+STOPPABLE = ("introduce", "panic_stop", "clear_stop")
 METHODS = ("__enter__", "__exit__", "refuses", "channels", "execute", "make_safe")
 _MAIN = threading.main_thread()
 
@@ -39,19 +41,20 @@ class HangsError(BackendError):
     """A backend did not answer in time."""
 
 
-def opened(backend: Any, name: str) -> Backend:
-    """What a kind has opened, or what entering it has returned. Raises BackendError."""
-    lacking = [method for method in METHODS if not callable(getattr(backend, method, None))]
-    if lacking:
-        who = "None" if backend is None else _named(backend)
-        raise BackendError(f"the backend {name!r} cannot be used: {who} lacks {lacking[0]}()")
-    checked: Backend = backend
-    return checked
+def opened(kind: BackendKind, options: Options) -> Backend:
+    """A backend of `kind`. Raises BackendError."""
+    try:
+        backend: object = kind.open(options)
+    except BaseException as error:
+        raise as_fault(error, kind.open, "open") from error
+    stoppable = STOPPABLE if kind.stopped_outside else ()
+    return _is_backend(backend, f"open() of {_named(kind.open)}", stoppable)
 
 
 def connect(backend: Backend) -> Backend:
     """Enter `backend`. Raises HangsError, BackendError, and what its own code may raise."""
-    return opened(_within(CONNECTING, backend, "__enter__"), _named(backend))
+    entered = _within(CONNECTING, backend, "__enter__")
+    return _is_backend(entered, f"__enter__() of {_named(backend)}")
 
 
 def leave(backend: Backend, error: BaseException | None) -> None:
@@ -68,18 +71,23 @@ def make_safe(backend: Backend) -> SafeState:
 def panic_stop(backend: StoppedOutside) -> PanicStop | None:
     """The stop from outside that keeps the bench off. Raises as `connect`."""
     found = _within(LOOKING, backend, "panic_stop")
-    return None if found is None else _typed(found, PanicStop, backend, "panic_stop")
+    if found is None:
+        return None
+    stop = _typed(found, PanicStop, backend, "panic_stop")
+    count = _typed(stop.count, int, backend, "panic_stop")
+    age = stop.age if isinstance(stop.age, float) and math.isfinite(stop.age) else None
+    return PanicStop(count, storable(stop.by), age)
 
 
 def refusal(backend: Backend, trial: Trial) -> str:
     """Why `backend` does not execute `trial`; empty when it does. Raises BackendError."""
-    found = called(backend, "refuses", trial)
+    found = _asked(backend, "refuses", trial)
     return "" if found is None else storable(_typed(found, str, backend, "refuses"))
 
 
 def channels(backend: Backend, trial: Trial) -> frozenset[str] | None:
     """Names of the channels of `trial`, None while they are not known. Raises BackendError."""
-    found = called(backend, "channels", trial)
+    found = _asked(backend, "channels", trial)
     if found is not None:
         for name in _typed(found, frozenset, backend, "channels"):
             _typed(name, str, backend, "channels")
@@ -96,6 +104,7 @@ def checked_ending(ending: Any, backend: object) -> Ending:
     _typed(ending, Ending, backend, "execute")
     _typed(ending.outcome, Outcome, backend, "execute")
     _typed(ending.safe_state, SafeState, backend, "execute")
+    _typed(ending.telemetry, Mapping, backend, "execute")
     if ending.fault is not None:
         _typed(ending.fault, Fault, backend, "execute")
     return ending  # type: ignore[no-any-return]
@@ -103,12 +112,15 @@ def checked_ending(ending: Any, backend: object) -> Ending:
 
 def called(backend: object, method: str, *arguments: object) -> Any:
     """The answer of a method that needs no limit. Raises BackendError for another's faults."""
+    here = os.getcwd()
     try:
         return getattr(backend, method)(*arguments)
     except BaseException as error:
         if (fault := as_fault(error, backend, method)) is error:
             raise
         raise fault from error
+    finally:
+        os.chdir(here)
 
 
 def as_fault(error: BaseException, backend: object, method: str) -> BaseException:
@@ -119,9 +131,15 @@ def as_fault(error: BaseException, backend: object, method: str) -> BaseExceptio
     plug_in = blamed(error)
     if plug_in is None and _is_ours(backend) and isinstance(error, Exception):
         return error  # a bug
-    who = str(plug_in) if plug_in is not None else _named(backend)
-    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return BackendError(f"{method}() failed in {who}: {storable(what)}")
+    who = plug_in.package if plug_in is not None else _named(backend)
+    return BackendError(f"{method}() failed in {who}: {storable(one_line(error))}")
+
+
+def _asked(backend: Backend, method: str, trial: Trial) -> Any:
+    """Of thousands of trials: the program's own backends need no thread for each."""
+    if _is_ours(backend):
+        return called(backend, method, trial)
+    return _within(LOOKING, backend, method, trial)
 
 
 def _within(limit: float, backend: object, method: str, *arguments: object) -> Any:
@@ -159,11 +177,27 @@ def _typed(value: Any, wanted: type[Answer], backend: object, method: str) -> An
     )
 
 
-def _is_ours(backend: object) -> bool:
-    return type(backend).__module__.startswith("campaign.")
+def _is_backend(found: Any, who: str, also: Sequence[str] = ()) -> Backend:
+    for method in (*METHODS, *also):
+        if not callable(getattr(found, method, None)):
+            name = type(found).__name__
+            raise BackendError(f"{who} answered with {name!r}, no backend: it lacks {method}()")
+    backend: Backend = found
+    return backend
 
 
-def _named(backend: object) -> str:
+def _is_ours(thing: object) -> bool:
+    return _module(thing).startswith("campaign.")
+
+
+def _module(thing: object) -> str:
+    """Of a function, or of the class of an object."""
+    named = thing if hasattr(thing, "__qualname__") else type(thing)
+    return getattr(named, "__module__", None) or ""
+
+
+def _named(thing: object) -> str:
     """Who has written a backend, for messages."""
-    own = type(backend)
-    return str(provider(own.__module__) or f"{own.__module__}.{own.__qualname__}")
+    plug_in = provider(_module(thing))
+    own = getattr(thing, "__qualname__", type(thing).__qualname__)
+    return plug_in.package if plug_in is not None else f"{_module(thing)}.{own}"

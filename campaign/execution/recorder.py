@@ -110,7 +110,7 @@ class SupervisingRecorder:
                 )
 
     def append(self, time: Array, block: Array) -> None:
-        self._hand_over(time, block)
+        self._hand_over(time, np.asarray(block))  # None, too, which here means lost samples
 
     def lost(self, time: Array) -> None:
         """Samples that the backend names as lost: NaN, an event, and no `undefined`."""

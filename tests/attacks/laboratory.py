@@ -132,9 +132,9 @@ class Done:
         return self
 
     def names_the_plug_in(self, *words: str) -> Done:
-        """The reason says which backend of which package, and what it did."""
+        """The reason says which package, and what it did."""
         told = self.run.reason if self.archive is not None else self.err
-        for word in (PACKAGE, self.backend, *words):
+        for word in (PACKAGE, *words):
             assert word in told, told
             assert word in self.err, self.err
         return self

@@ -13,6 +13,8 @@ PART = ".part"
 """Ending of a file that is still being written. No reader takes such a file for an archive."""
 
 _BLOCK = 1 << 20
+_UMASK = os.umask(0o022)
+os.umask(_UMASK)
 _REASON = re.compile(r"errno = \d+, error message = '([^']+)'")
 
 
@@ -24,6 +26,14 @@ def why(error: Exception) -> str:
     if reason := _REASON.search(told):
         return reason[1]
     return told[:300] or type(error).__name__
+
+
+def keep_umask() -> None:
+    """Give a file that is made next the mode that this process began with, whatever a plug-in did.
+
+    To be called right before: other code of the process can change it at any time.
+    """
+    os.umask(_UMASK)
 
 
 def sync_file(path: Path) -> None:
@@ -58,6 +68,7 @@ def write_atomically(path: Path, content: str) -> None:
 def write_lines_atomically(path: Path, lines: Iterable[str]) -> None:
     """Write lines, each with its end, so that all of them are there or no file at all."""
     part = path.with_name(path.name + PART)
+    keep_umask()
     with part.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(lines)
     publish(part, path)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from campaign.archive.layout.files import (
     PART,
+    keep_umask,
     sync_folder,
     write_atomically,
     write_lines_atomically,
@@ -25,6 +26,7 @@ def make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Jou
     part = folder.with_name(folder.name + PART)
     if part.is_dir():
         remove_folder(part)
+    keep_umask()
     part.mkdir()
     try:
         write_full_plan(part, trials)

@@ -25,6 +25,7 @@ from h5py import h5a, h5d, h5ds, h5f, h5g, h5o, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.layout.checksums import SeriesDigest
+from campaign.archive.layout.files import keep_umask
 from campaign.archive.layout.storage import CHECKSUM, CHUNK, LEVEL, SAMPLE, pack, storable
 
 Array = NDArray[np.float64]
@@ -49,6 +50,7 @@ def create_file(path: Path) -> h5py.File:
     access.set_file_locking(False, False)
     plan = h5p.create(h5p.FILE_CREATE)
     plan.set_obj_track_times(False)
+    keep_umask()
     return h5py.File(h5f.create(os.fsencode(path), h5f.ACC_TRUNC, plan, access))
 
 

@@ -55,6 +55,7 @@ def unseal(sealed: Path) -> Path:
         _check_sealed(sealed)
         if part.is_dir() and remove_folder(part):
             raise ArchiveError(f"{part}: holds files that are not the program's; move them away")
+        keep_umask()
         part.mkdir()
         _fill(sealed, part)
         if folder.is_dir():  # a remnant: where both are found, the sealed run counts

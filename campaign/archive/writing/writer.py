@@ -68,7 +68,7 @@ class RunWriter:
         Raises:
             UsageError: the folder cannot be made or written, or has a run of that name.
         """
-        folder = results / f"{header.name}{PARTIAL}"
+        folder = results.absolute() / f"{header.name}{PARTIAL}"
         try:
             results.mkdir(parents=True, exist_ok=True)
             lock = lock or RunLock.acquire(results, header.name)
@@ -111,7 +111,7 @@ class RunWriter:
             UsageError: there is nothing to go on with, or another process writes the run.
             ArchiveError: the run is damaged, named by file, or cannot be written. It is as it was.
         """
-        folder, story, journal, lock = reopen(path)
+        folder, story, journal, lock = reopen(path.absolute())
         writer = cls(folder, journal, lock)
         writer._last = dict(story.finished)
         for finished in story.files:
