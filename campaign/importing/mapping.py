@@ -14,7 +14,7 @@ from pydantic import Field
 
 from campaign.errors import Problem
 from campaign.importing.defects import CHANNEL_KINDS
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.protocol.files import Origin
 from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.units import Frequency, Time
@@ -22,7 +22,11 @@ from campaign.units import Frequency, Time
 TIME = "time"
 """The key of `[columns.NAME]` that is no channel."""
 
-ChannelName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60)]
+ChannelName = Annotated[
+    str,
+    Field(max_length=60),
+    spelled(r"[a-z][a-z0-9_]*", "a lower-case letter, then lower-case letters, digits and _"),
+]
 Repair = Literal["resample", "drop repeated", "mark gaps"]
 
 
