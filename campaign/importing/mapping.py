@@ -104,8 +104,8 @@ class RecordingEntry(Options):
     """One `[[test.recording]]`: a file, or several of one clock, that hold a trial or some."""
 
     file: str | tuple[str, ...]
-    """Path relative to the mapping; `*` stands for anything: one recording for each file. A list is
-    one recording that lies in several files."""
+    """Path relative to the mapping; `*` stands for anything there: one recording for each file. A
+    list is one recording that lies in several files."""
     columns: str = ""
     """Which `[columns.NAME]` it is read by; absent where there is one."""
     table: str = ""
