@@ -178,7 +178,7 @@ def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
             return f"{here} is not a list; write [[{detail['loc'][-1]}]] for each of its tables"
         return f"{here} is not {wanted}"
     message = str(detail["msg"]).removeprefix("Value error, ")
-    message = re.sub("^(Input|String) should", "it should", message)
+    message = re.sub(r"^\w+ should", "it should", message).replace(" after validation", "")
     return f"{here}: {message}" if not isinstance(value, Mapping) else message
 
 

@@ -112,6 +112,11 @@ def test_a_file_may_hold_several_trials(tmp_path: Path, line: str, trials: int, 
         assert second["relative_angle"][0] == pytest.approx(np.deg2rad(5.0))
 
 
+def test_a_channel_says_which_letters_its_name_may_have(tmp_path: Path):
+    told = refused(tmp_path, COLUMNS.replace("rig.relative_angle", "rig.Angle") + TEST + ENTRY)
+    assert "'Angle': must be a lower-case letter, then lower-case letters, digits and _" in told
+
+
 def test_a_pattern_is_a_recording_for_each_file(tmp_path: Path):
     text = COLUMNS + TEST + ENTRY.replace("a.csv", "*.csv")
     rows = "t,pos,i\n" + "\n".join(f"{k},{k},{k}" for k in range(100))
