@@ -8,12 +8,19 @@ default and a meaning. Validation, error messages and documentation all come fro
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as attribute
 from typing import Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    ValidationInfo,
+)
 from pydantic_core import PydanticUndefined, core_schema
 
 from campaign.choice import Choice
@@ -30,6 +37,17 @@ class Options(BaseModel):
     def without_effect(self) -> frozenset[str]:
         """Names of options that do nothing as the others are; a report does not list them."""
         return frozenset()
+
+
+def spelled(pattern: str, words: str) -> AfterValidator:
+    """Of a text that must match `pattern` as a whole; `words` tell a user what that allows."""
+
+    def check(text: str) -> str:
+        if re.fullmatch(pattern, text) is None:
+            raise ValueError(f"must be {words}")
+        return text
+
+    return AfterValidator(check)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,11 @@ class Outcome(StrEnum):
     FAULT = "fault"  # the backend or the bench failed
     INTERRUPTED = "interrupted"  # somebody stopped it
 
+    @property
+    def failed(self) -> bool:
+        """Whether the trial did not complete although nobody stopped it."""
+        return self not in (Outcome.COMPLETED, Outcome.INTERRUPTED)
+
 
 class Fault(StrEnum):
     """What failed, in the words by which a protocol's `[faults]` chooses what to do about it."""

@@ -27,7 +27,10 @@ def compiling_meanwhile(backend: str) -> Iterator[FirstStart | None]:
         yield None
         return
     from campaign.execution.first_start import FirstStart
+    from campaign.physics.compiled import distrusted
 
+    if why := distrusted():
+        print_note(why, "yellow")
     with FirstStart() as first:
         yield first
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.protocol.files import Source, UnreadableError, read_source, read_text
-from campaign.protocol.migrations import Change, Kind, kind_of, migrate, newest
+from campaign.protocol.files import NEWEST, Kind, Source, UnreadableError, read_source, read_text
+from campaign.protocol.migrations import Change, kind_of, migrate
 
 
 def migrate_files(files: Sequence[Path], output: Path | None, *, check: bool) -> ExitCode:
@@ -36,12 +36,12 @@ def migrate_files(files: Sequence[Path], output: Path | None, *, check: bool) ->
         for change in changes:
             _say(file, change, planned=check or by_hand)
         if not changes:
-            print_line(f"{file}: {kind} schema {newest(kind)}, nothing to change")
+            print_line(f"{file}: {kind} schema {NEWEST[kind]}, nothing to change")
         if by_hand:
             print_note(f"{file}: not written: decide that first, then migrate again", "yellow")
         elif not check and (changes or output is not None):
             _write(output or file, text)
-            print_line(f"{output or file}: {kind} schema {newest(kind)} now")
+            print_line(f"{output or file}: {kind} schema {NEWEST[kind]} now")
     # When every file is written: a bench may be given together with its protocols.
     for file in [file for file, (kind, *_) in found if kind == "protocol"]:
         if older := _older_benches(file):
@@ -59,7 +59,7 @@ def migrated(file: Path) -> tuple[Kind, str, list[Change]]:
         raise UsageError(f"{file}: {error}") from None
     if not isinstance(source, list):
         kind = kind_of(source.tree)
-        source = read_source(file, file.name, newest(kind))  # which knows other schemas
+        source = read_source(file, file.name, kind)  # which knows other schemas
     if isinstance(source, list):
         raise ProtocolError(source)
     text = written.replace("\r\n", "\n")
@@ -68,7 +68,7 @@ def migrated(file: Path) -> tuple[Kind, str, list[Change]]:
     if not changes or any(change.by_hand for change in changes):
         return kind, written, changes
     try:
-        text = _edited(text, kind, {**values, "schema": newest(kind)})
+        text = _edited(text, kind, {**values, "schema": NEWEST[kind]})
     except _NotEditableError as error:
         return kind, written, [_by_hand(change, str(error)) for change in changes]
     return kind, text.replace("\n", "\r\n") if "\r\n" in written else text, changes
@@ -122,10 +122,10 @@ def _migrated_text(text: str, kind: Kind) -> str:
         document = tomlkit.parse(text)
         migrate(document, kind)
         if "schema" in document:
-            document["schema"] = newest(kind)
+            document["schema"] = NEWEST[kind]
             new = document.as_string()
         else:
-            new = f"schema = {newest(kind)}\n{document.as_string()}"
+            new = f"schema = {NEWEST[kind]}\n{document.as_string()}"
         tomllib.loads(new)
     except (TOMLKitError, LookupError, ValueError, TypeError, AttributeError, AssertionError):
         raise _NotEditableError(_FORM) from None  # what tomllib accepts, and tomlkit does not

@@ -11,6 +11,7 @@ from campaign.errors import ExitCode
 def warm_up() -> ExitCode:
     """Make all machine code that the shipped benches need; say what, how long, and where it is."""
     from campaign.execution.first_start import Helpers, make_all
+    from campaign.physics.compiled import distrusted
     from campaign.physics.machine_code import Made, all_made, folder
 
     compiled: list[Made] = []
@@ -39,7 +40,8 @@ def warm_up() -> ExitCode:
     where = folder()
     if where is None:
         print_note(
-            "nothing is kept: the user's cache cannot be written; NUMBA_CACHE_DIR may name "
+            distrusted()
+            or "nothing is kept: the user's cache cannot be written; NUMBA_CACHE_DIR may name "
             "another folder",
             "yellow",
         )

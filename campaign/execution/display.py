@@ -15,7 +15,7 @@ from rich.text import Text
 
 from campaign.execution.progress import Progress
 from campaign.plain_text import printable
-from campaign.recording import Ending, Outcome
+from campaign.recording import Ending
 from campaign.trial import Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
@@ -172,9 +172,10 @@ def current_test(progress: Progress) -> str:
 
 
 def counts(progress: Progress) -> str:
-    """`37 done, 1 failed, 125 left`."""
-    failed = f", {progress.failed} failed" if progress.failed else ""
-    return f"{progress.done} done{failed}, {progress.left} left"
+    """`37 done, 1 failed, 2 interrupted, 122 left`."""
+    others = {"failed": progress.failed, "interrupted": progress.interrupted}
+    told = "".join(f", {number} {way}" for way, number in others.items() if number)
+    return f"{progress.done} done{told}, {progress.left} left"
 
 
 def time_left(progress: Progress) -> str:
@@ -193,7 +194,7 @@ def clock(seconds: float) -> str:
 
 def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
     # How many trials a stop has interrupted, and who stopped them, is said once: at the end.
-    if ended is None or ended[1].outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):
+    if ended is None or not ended[1].outcome.failed:
         return None
     trial, ending = ended
     reason = f": {ending.reason}" if ending.reason else ""

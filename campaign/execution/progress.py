@@ -19,7 +19,7 @@ class Progress:
 
     Attributes:
         total: trials that are known by now: those of the plan, and what has followed from them.
-        done, failed: trials that completed, and that ended in any other way.
+        done, failed, interrupted: trials that completed, that did not, and that somebody stopped.
         running: trials being executed, in plan order.
         started: when the run began, on `time.monotonic` (s).
         elapsed: wall-clock time since then (s).
@@ -35,6 +35,7 @@ class Progress:
     total: int
     done: int
     failed: int
+    interrupted: int
     running: tuple[Trial, ...]
     started: float
     elapsed: float
@@ -49,7 +50,7 @@ class Progress:
     @property
     def left(self) -> int:
         """Trials that have not ended."""
-        return self.total - self.done - self.failed
+        return self.total - self.done - self.failed - self.interrupted
 
 
 Display = Callable[[Progress], None]
@@ -148,7 +149,6 @@ class Ledger:
     def _tell(
         self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
     ) -> None:
-        done = self._outcomes.get(Outcome.COMPLETED, 0)
         self._told = running = self._of_running()
         shares = {
             number: self._reached.get(number, 0.0) / trial.task.duration
@@ -159,8 +159,9 @@ class Ledger:
         self._display(
             Progress(
                 total=self._total,
-                done=done,
-                failed=sum(self._outcomes.values()) - done,
+                done=self._outcomes.get(Outcome.COMPLETED, 0),
+                failed=sum(n for outcome, n in self._outcomes.items() if outcome.failed),
+                interrupted=self._outcomes.get(Outcome.INTERRUPTED, 0),
                 running=tuple(self._running[number] for number in sorted(self._running)),
                 started=self._started,
                 elapsed=now - self._started,

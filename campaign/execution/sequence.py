@@ -233,7 +233,7 @@ class TrialSequence:
 
     def _is_final(self, trial: Trial, ending: Ending) -> bool:
         """Apply the policy; False when the trial will be executed again."""
-        if ending.outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED) or self._ended.fault:
+        if not ending.outcome.failed or self._ended.fault:
             return True
         choice = self._responses.choose(trial, ending)
         self._writer.decision(choice.do, choice.reason, trial.number)

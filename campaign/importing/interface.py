@@ -23,6 +23,11 @@ HEAD = 1 << 16
 ROWS = 65_536
 """Most rows of a block: memory does not grow with a recording."""
 
+LARGEST_PART = 1 << 28
+"""Bytes that what is read at once may unpack to, however small it is packed."""
+MOST_UNPACKED = 1 << 33
+"""Bytes that a file may unpack to."""
+
 LISTED = 5000
 """Files of a folder among which a name that is not there is looked for."""
 

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from campaign.errors import Problem
 from campaign.importing.defects import CHANNEL_KINDS
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.protocol.files import Origin
 from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.units import Frequency, Time
@@ -22,7 +22,11 @@ from campaign.units import Frequency, Time
 TIME = "time"
 """The key of `[columns.NAME]` that is no channel."""
 
-ChannelName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60)]
+ChannelName = Annotated[
+    str,
+    Field(max_length=60),
+    spelled(r"[a-z][a-z0-9_]*", "a lower-case letter, then lower-case letters, digits and _"),
+]
 Repair = Literal["resample", "drop repeated", "mark gaps"]
 
 
@@ -100,8 +104,8 @@ class RecordingEntry(Options):
     """One `[[test.recording]]`: a file, or several of one clock, that hold a trial or some."""
 
     file: str | tuple[str, ...]
-    """Path relative to the mapping; `*` stands for anything: one recording for each file. A list is
-    one recording that lies in several files."""
+    """Path relative to the mapping; `*` stands for anything there: one recording for each file. A
+    list is one recording that lies in several files."""
     columns: str = ""
     """Which `[columns.NAME]` it is read by; absent where there is one."""
     table: str = ""

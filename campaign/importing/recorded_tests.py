@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -38,6 +39,11 @@ _FILE = re.compile(r"^.*?(?=(:\d+:\d+)?: )")
 """What a message says first of which file it is about; rows are not part of it."""
 NO_RECORDING = (
     "it has no recordings; add [[test.recording]] for each, or `campaign run` executes it"
+)
+
+
+OUTSIDE = (
+    "leads out of the mapping's folder, and a pattern stays below it; name such a file by its path"
 )
 
 
@@ -213,12 +219,39 @@ class _Loader:
             yield [entry.file]
             return
         pattern = entry.file
-        matching = sorted(glob.glob(pattern, root_dir=self.folder))  # noqa: PTH207 - absolute ones, too
+        try:
+            matching = _matching(self.folder, pattern)
+        except _OutsideError as error:
+            matching, why = [], str(error)
+        else:
+            why = f"no file of that name (looked in {self.folder})"
         if not matching:
-            message = f"{shown(pattern)}: no file of that name (looked in {self.folder})"
-            self.problems.append(at.problem((*below, "file"), "value", message))
+            problem = at.problem((*below, "file"), "value", f"{shown(pattern)}: {why}")
+            self.problems.append(problem)
         for each in matching:
             yield [each]
+
+
+class _OutsideError(Exception):
+    """What of a pattern leads out of the folder of its mapping."""
+
+
+def _matching(folder: Path, pattern: str) -> list[str]:
+    """Files below `folder` that the pattern matches; nothing outside is looked at."""
+    parts = Path(pattern).parts
+    if Path(pattern).anchor or ".." in parts:
+        raise _OutsideError(f"a pattern {OUTSIDE}")
+    root, found = folder.resolve(), [""]
+    for part in parts:
+        found = [
+            os.path.join(base, name)  # noqa: PTH118 - as written, with no dot before it
+            for base in found
+            for name in glob.glob(part, root_dir=folder / base)  # noqa: PTH207 - names alone
+        ]
+        for each in found:
+            if not Path(os.path.realpath(folder / each)).is_relative_to(root):
+                raise _OutsideError(f"the link {shown(each)} {OUTSIDE}")
+    return sorted(found)
 
 
 @dataclass(frozen=True)

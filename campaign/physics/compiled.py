@@ -15,13 +15,15 @@ kept. What a module reads from data files while it is imported is not seen.
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
+import stat
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -44,7 +46,7 @@ def cache_folder(module: str) -> Path | None:
     """Where machine code of a module's functions is kept; None: it is not kept.
 
     The folder lies in the user's cache (in NUMBA_CACHE_DIR, where that is set), or in a temporary
-    folder if that is shut.
+    folder if that is shut, or if another user may have written in it (`distrust`).
     """
     try:
         name = _key(module)
@@ -54,11 +56,50 @@ def cache_folder(module: str) -> Path | None:
         return None
     folder = _user_cache() / name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        trusted = not distrust(folder)
     except OSError:
+        trusted = False
+    if not trusted:
         folder = Path(tempfile.mkdtemp(prefix="campaign-compiled-"))
     return folder
+
+
+@cache
+def distrust(folder: Path) -> str:
+    """Why another user may have written what lies in a folder, which would be run; "" if none may.
+
+    A folder that others cannot enter may hold files that their group may write, as a umask of 002
+    makes them. On Windows a user's cache is the user's.
+    """
+    if os.name != "posix":
+        return ""
+    loose = 0o022 if folder.stat().st_mode & 0o077 else 0o002
+    inside = (
+        Path(base, name) for base, folders, files in os.walk(folder) for name in (*folders, *files)
+    )
+    for path in (folder, folder.resolve(), *inside):
+        with suppress(FileNotFoundError):  # another process is writing there
+            about = path.lstat()
+            if about.st_uid != os.geteuid():
+                return f"{path} belongs to another user"
+            if stat.S_ISLNK(about.st_mode):
+                if path != folder:
+                    return f"{path} is a link"
+            elif about.st_mode & loose:
+                return f"{path} can be written by other users"
+    return ""
+
+
+def distrusted() -> str:
+    """What to say of the engine's folder where it is not used for that; "" where it is."""
+    folder = _user_cache() / digest_of_sources(_PHYSICS)
+    why = distrust(folder) if folder.is_dir() else ""
+    return why and (
+        f"the machine code kept in {folder} is not used: {why}; remove that folder, or let "
+        "NUMBA_CACHE_DIR name one of your own"
+    )
 
 
 def is_kept_for_good(folder: Path) -> bool:

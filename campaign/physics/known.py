@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     BaseModel,
-    Field,
     SerializerFunctionWrapHandler,
     model_serializer,
     model_validator,
 )
 
 from campaign.axis_kind import BOTH_ROTARY
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.physics.friction_paths import Keys, invalid
 from campaign.units import Quantity, split_quantity
 
@@ -60,7 +59,7 @@ class KnownValue(Options):
 class FingerprintOptions(Options):
     """Which bench it is that something is known of; `campaign fingerprint` writes it."""
 
-    bench: str = Field(pattern=r"^[0-9a-f]{16}$")
+    bench: Annotated[str, spelled(r"[0-9a-f]{16}", "16 hexadecimal digits")]
     """Of all that acts on motion but the compensations."""
     compensation: dict[str, str] = {}
     """Of each compensation, by its name."""

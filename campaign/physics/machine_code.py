@@ -57,7 +57,7 @@ class Made:
 
 
 def folder() -> Path | None:
-    """Where the engine is kept; None: nowhere, as the user's cache cannot be written."""
+    """Where the engine is kept; None: the user's cache cannot be used."""
     kept = cache_folder(__name__)
     return kept if kept is not None and is_kept_for_good(kept) else None
 

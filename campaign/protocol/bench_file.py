@@ -5,13 +5,12 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from campaign.errors import Problem, ProtocolError, UsageError
+from campaign.errors import ProtocolError, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, IncompleteBenchError, complete
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
 from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.problems import validate
-from campaign.protocol.schema import BENCH_SCHEMA
 from campaign.resources import protocols_folder
 
 
@@ -35,7 +34,7 @@ def bench_source(written: str) -> Source:
     """The text of that bench. Raises UsageError when there is none, ProtocolError when no TOML."""
     file = _find(written)
     try:
-        source = read_source(file, written, BENCH_SCHEMA)
+        source = read_source(file, written, "bench")
     except UnreadableError as error:
         raise UsageError(f"{written}: {error}") from None
     if not isinstance(source, Source):
@@ -45,9 +44,6 @@ def bench_source(written: str) -> Source:
 
 def checked(source: Source) -> Bench:
     """The bench in a file. Raises ProtocolError with everything that is wrong with it."""
-    if "test" in source.tree and "axis" not in source.tree:
-        told = "this is a protocol, and a bench is asked for; `campaign plan` takes protocols"
-        raise ProtocolError([Problem(source.file, 0, 0, told)])
     bench = validate(Bench, source.tree, Within(source))
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)

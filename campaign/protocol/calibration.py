@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StrictFloat, StrictInt, StrictStr, model_validator
 
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.protocol.files import Origin, Source
 from campaign.units import Time
 
@@ -18,7 +18,11 @@ Number = StrictStr | StrictFloat | StrictInt
 class CalibrationParameter(Options):
     """One `[[calibration.parameter]]`: an unknown of the bench."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
+    name: Annotated[
+        str,
+        Field(max_length=60),
+        spelled(r"[A-Za-z][A-Za-z0-9_-]*", "a letter, then letters, digits, - and _"),
+    ]
     """What the result calls it."""
     path: str = ""
     """The field of the bench that it is, e.g. axis.inertia."""

@@ -24,7 +24,7 @@ from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, nearest, shown, validate
-from campaign.protocol.schema import PROTOCOL_SCHEMA, ProtocolFile, replaced
+from campaign.protocol.schema import ProtocolFile, replaced
 
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256
@@ -141,7 +141,7 @@ def sibling(source: Source, written: str) -> tuple[Path, str]:
 
 
 def _collect(file: Path, name: str, chain: tuple[str, ...], collected: Collected) -> Source | None:
-    source = read_source(file, name, PROTOCOL_SCHEMA)
+    source = read_source(file, name, "protocol")
     if not isinstance(source, Source):
         collected.problems += source
         return None

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import campaign
 from campaign.errors import Problem
@@ -20,6 +20,20 @@ MOST_VALUES = 200_000
 """of a protocol with its includes, of a bench; 100 000 trials have fewer."""
 DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
+
+Kind = Literal["protocol", "bench"]
+NEWEST: Mapping[Kind, int] = {"protocol": 2, "bench": 3}
+"""The present schema; raised when a key is renamed, removed or means something else. `migrations`
+has how to follow."""
+MARKS: Mapping[Kind, frozenset[str]] = {
+    "protocol": frozenset({"test", "include"}),
+    "bench": frozenset({"axis", "motor", "limits", "friction"}),
+}
+"""Keys that one kind of file has and the other has not."""
+_TAKEN_BY: Mapping[Kind, str] = {
+    "protocol": "`campaign plan` takes protocols",
+    "bench": "`campaign check` takes benches",
+}
 
 LONGEST_PATH = 400
 """letters of a path that are shown."""
@@ -107,10 +121,10 @@ class Patched:
         return self.base.problem(keys, aim, message)
 
 
-def read_source(file: Path, name: str, newest: int = 0) -> Source | list[Problem]:
+def read_source(file: Path, name: str, kind: Kind | None = None) -> Source | list[Problem]:
     """The TOML file, or what is wrong with its text; UnreadableError when there is no text.
 
-    `newest`: the schema that this program reads, of a kind of file that may say which it has.
+    `kind`: what the file must be; it may say which schema it has.
     """
     text = read_text(file)
     try:
@@ -126,7 +140,7 @@ def read_source(file: Path, name: str, newest: int = 0) -> Source | list[Problem
     if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     source = Source(file, name, text, tree)
-    if newest and (problem := _other_schema(source, newest)) is not None:
+    if kind and (problem := _other_kind(source, kind) or _other_schema(source, NEWEST[kind])):
         return [problem]
     oversized = [
         source.problem(keys, "value", "an integer of more than 64 bits")
@@ -134,6 +148,15 @@ def read_source(file: Path, name: str, newest: int = 0) -> Source | list[Problem
         if isinstance(value, int) and not -(2**63) <= value < 2**63
     ]
     return oversized or source
+
+
+def _other_kind(source: Source, kind: Kind) -> Problem | None:
+    """The problem of a bench in place of a protocol, or the other way round."""
+    other: Kind = "bench" if kind == "protocol" else "protocol"
+    if source.tree.keys() & MARKS[kind] or not source.tree.keys() & MARKS[other]:
+        return None
+    told = f"this is a {other}, and a {kind} is asked for; {_TAKEN_BY[other]}"
+    return Problem(source.file, 0, 0, told)
 
 
 def _other_schema(source: Source, newest: int) -> Problem | None:

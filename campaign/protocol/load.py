@@ -24,6 +24,7 @@ from campaign.protocol.collect import (
     top_level,
 )
 from campaign.protocol.files import (
+    Kind,
     Origin,
     Patched,
     Source,
@@ -41,7 +42,6 @@ from campaign.protocol.points import PointError, points_of
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, nearest, shown, validate
 from campaign.protocol.schema import (
-    BENCH_SCHEMA,
     Check,
     CheckEntry,
     ExperimentKind,
@@ -78,9 +78,6 @@ def load_protocol(
     source = collect(path, collected)
     if source is None:
         raise _failed(collected)
-    if "axis" in source.tree and "test" not in source.tree:
-        told = "this is a bench, and a protocol is asked for; `campaign check` takes benches"
-        raise ProtocolError([Problem(path, 0, 0, told)])
     apply_overrides(settings, collected)
     loader = _Loader(collected, experiments, Truths(shipped, collected.problems, truth))
     tests = loader.tests()
@@ -247,18 +244,26 @@ class _Loader:
             return None
         if "/" in written or "\\" in written or written.endswith(".toml"):
             file, name = sibling(source, written)
-            return self._read(file, name, origin, keys, written, BENCH_SCHEMA)
+            return self._read(file, name, origin, keys, written, "bench")
         shipped = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
         if written in shipped:
             file = self.shipped / "benches" / f"{written}.toml"
-            return self._read(file, written, origin, keys, written, BENCH_SCHEMA)
+            return self._read(file, written, origin, keys, written, "bench")
         message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
-        message += f", or the path of a .toml file{nearest(written, shipped)}"
+        beside = self._toml_files(source.file.parent)
+        slip = nearest(written, shipped) or nearest(f"{written}.toml", beside)
+        message += f", or the path of a .toml file{slip}"
         self._report(origin.problem(keys, "value", message))
         return None
 
     def _read(
-        self, file: Path, name: str, origin: Origin, keys: Keys, written: str, newest: int = 0
+        self,
+        file: Path,
+        name: str,
+        origin: Origin,
+        keys: Keys,
+        written: str,
+        kind: Kind | None = None,
     ) -> Source | None:
         """A further file, read once; a missing one is a problem of the text that names it."""
         known = self.collected.sources.get(name)
@@ -267,9 +272,9 @@ class _Loader:
         if known is not None:  # a protocol file that is called like a shipped bench
             name = str(file)
         try:
-            source = read_source(file, name, newest)
+            source = read_source(file, name, kind)
         except UnreadableError as error:
-            hint = nearest(file.name, _toml_files(file.parent))
+            hint = nearest(file.name, self._toml_files(file.parent))
             message = f"{shown(written)}: {error} {looked_for(file)}{hint}"
             self._report(origin.problem(keys, "value", message))
             return None
@@ -278,6 +283,15 @@ class _Loader:
             return None
         self.collected.sources[name] = source
         return source
+
+    def _toml_files(self, folder: Path) -> list[str]:
+        """Those there that may be benches: a protocol that was read is none."""
+        protocols = {file.name for file in self.collected.chains}
+        try:
+            names = sorted(file.name for file in folder.glob("*.toml"))[:1000]
+        except (OSError, ValueError):
+            return []
+        return [name for name in names if name not in protocols]
 
     def _attached(
         self, draft: Draft, experiment: ExperimentKind, options: Mapping[str, Any]
@@ -373,10 +387,3 @@ def _patched(tree: Mapping[str, Any], patches: Sequence[Override]) -> dict[str, 
     for patch in patches:
         patched = replaced(patched, patch.keys, patch.value)
     return patched
-
-
-def _toml_files(folder: Path) -> list[str]:
-    try:
-        return sorted(file.name for file in folder.glob("*.toml"))[:1000]
-    except (OSError, ValueError):
-        return []

@@ -10,15 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from campaign.physics.known import FORMER as FORMER_KNOWN
 from campaign.physics.preload import FORMER as FORMER_PRELOAD
 from campaign.physics.scatter import CLASSIC
 from campaign.physics.scatter import FORMER as FORMER_VARIATION
-from campaign.protocol.schema import BENCH_SCHEMA, PROTOCOL_SCHEMA
+from campaign.protocol.files import MARKS, Kind
 
-Kind = Literal["protocol", "bench"]
 Document = MutableMapping[str, Any]
 
 
@@ -37,12 +36,7 @@ Migration = Callable[[Document], Iterator[Change]]
 
 def kind_of(document: Mapping[str, Any]) -> Kind:
     """A bench has an axis, a motor or limits; a protocol has none of them."""
-    return "bench" if document.keys() & {"axis", "motor", "limits", "friction"} else "protocol"
-
-
-def newest(kind: Kind) -> int:
-    """The present schema."""
-    return BENCH_SCHEMA if kind == "bench" else PROTOCOL_SCHEMA
+    return "bench" if document.keys() & MARKS["bench"] else "protocol"
 
 
 def migrate(document: Document, kind: Kind) -> list[Change]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
@@ -176,7 +177,8 @@ def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
         if wanted == "a list" and isinstance(value, Mapping):
             return f"{here} is not a list; write [[{detail['loc'][-1]}]] for each of its tables"
         return f"{here} is not {wanted}"
-    message = str(detail["msg"]).removeprefix("Value error, ").replace("Input should", "it should")
+    message = str(detail["msg"]).removeprefix("Value error, ")
+    message = re.sub(r"^\w+ should", "it should", message).replace(" after validation", "")
     return f"{here}: {message}" if not isinstance(value, Mapping) else message
 
 

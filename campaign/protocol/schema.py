@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.physics.bench import Bench
 from campaign.policy import Occasion, Policy, Response, Rest
 from campaign.protocol.calibration import Calibration, CalibrationOptions
@@ -23,11 +23,13 @@ from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
 from campaign.trial import Most, Offered, Tree, TrialRequest
 
-PROTOCOL_SCHEMA = 2
-BENCH_SCHEMA = 3
-"""Raised when a key is renamed, removed or means something else; `migrations` has how to follow."""
-
-Slug = Annotated[str, Field(pattern=r"^[a-z0-9]+([-_][a-z0-9]+)*$", max_length=60)]
+Slug = Annotated[
+    str,
+    Field(max_length=60),
+    spelled(
+        r"[a-z0-9]+([-_][a-z0-9]+)*", "lower-case letters and digits, single - or _ between them"
+    ),
+]
 
 
 class ChosenValue(typing.Protocol):

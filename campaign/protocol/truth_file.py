@@ -22,7 +22,6 @@ from campaign.protocol.files import (
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Aim, Keys
 from campaign.protocol.problems import allowed, nearest, shown, validate
-from campaign.protocol.schema import BENCH_SCHEMA
 from campaign.trial import Tree
 
 
@@ -101,7 +100,7 @@ class Truths:
         self, file: Path, name: str, origin: Origin, keys: Keys, written: str
     ) -> Source | None:
         try:
-            source = read_source(file, name, BENCH_SCHEMA)
+            source = read_source(file, name, "bench")
         except UnreadableError as error:
             message = f"{shown(written)}: {error} {looked_for(file)}"
             self._report(origin.problem(keys, "value", message))

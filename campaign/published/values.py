@@ -12,12 +12,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from campaign.errors import UsageError
-from campaign.options import Options
+from campaign.options import Options, spelled
 from campaign.published.patterns import covers
 from campaign.result import Value
 from campaign.units import to_si
@@ -75,7 +75,10 @@ class MarkOptions(Options):
 class TableOptions(Part):
     """One published table, figure or claim in words."""
 
-    name: str = Field(pattern=r"^(figure |text )?[A-Z0-9]+(\.[0-9A-Za-z]+)*$")
+    name: Annotated[
+        str,
+        spelled(r"(figure |text )?[A-Z0-9]+(\.[0-9A-Za-z]+)*", "like 5.8, figure 5.14, text 4.2.3"),
+    ]
     """Its number: 5.8, or `figure 5.14`, `text 4.2.3`."""
     title: str
     """What it shows."""

@@ -7,6 +7,7 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs
 from campaign.archive.reading.index import INDEX
+from campaign.errors import UsageError
 
 
 @pytest.fixture
@@ -88,5 +89,6 @@ def test_runs_that_are_gone_leave_the_index(results):
 
 
 def test_a_folder_that_is_not_there_gets_no_index(tmp_path):
-    assert list_runs(tmp_path / "none") == []
+    with pytest.raises(UsageError, match="there is no such folder"):
+        list_runs(tmp_path / "none")
     assert not (tmp_path / "none").exists()

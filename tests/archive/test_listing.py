@@ -101,8 +101,21 @@ def test_what_cannot_be_found_names_what_there_is(results):
         find_run(results, "2026")
     with pytest.raises(UsageError, match="no run 'map'; there are mine, 2026-11-21"):
         find_run(results, "map")
+    (results / "none").mkdir()
     with pytest.raises(UsageError, match="there are no runs"):
         find_run(results / "none")
+    with pytest.raises(UsageError, match="gone: there is no such folder; name the one that holds"):
+        find_run(results / "gone")
+
+
+@pytest.mark.parametrize("content", [b"t,x\n0,1\n", b"", b"MATLAB 7.3 MAT-file" + bytes(500)])
+def test_what_another_program_recorded_is_to_be_imported(tmp_path, content):
+    recorded = tmp_path / "my log.csv"
+    recorded.write_bytes(content)
+    with pytest.raises(UsageError, match=r"is not a run\. .*import --guess '.*my log\.csv' > "):
+        find_run(tmp_path, str(recorded))
+    (tmp_path / "cut.nxs").write_bytes(content)
+    assert find_run(tmp_path, str(tmp_path / "cut.nxs")) == tmp_path / "cut.nxs"
 
 
 def test_a_torn_last_line_was_never_reported(tmp_path, kit):

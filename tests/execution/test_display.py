@@ -7,11 +7,19 @@ import io
 import pytest
 from rich.console import Console
 
-from campaign.execution.display import PlainDisplay, clock, live_display, progress_display
-from campaign.execution.progress import Ledger
+from campaign.archive import RunHeader, RunWriter, list_runs
+from campaign.execution.display import (
+    PlainDisplay,
+    clock,
+    counts,
+    live_display,
+    progress_display,
+)
+from campaign.execution.progress import Ledger, Progress
 from campaign.recording import Ending, Outcome
 from tests.execution.fakes import COMPLETED, make_trials
 
+NOW = "2026-11-21T09:37:00Z"
 DIVERGED = Ending(Outcome.DIVERGED, "gyro_rate [rad/s] is infinite at 0.3 s")
 
 
@@ -66,6 +74,22 @@ def test_trials_that_a_stop_interrupts_are_not_told_one_by_one():
             ledger.begin(trial)
             ledger.end(trial, Ending(Outcome.INTERRUPTED, "stopped by the operator"))
     assert "stopped" not in stream.getvalue()
+
+
+def test_the_live_line_counts_what_failed_as_the_list_of_runs_does(tmp_path):
+    """One trial of each outcome; those that somebody stopped are counted apart."""
+    told: list[Progress] = []
+    trials = make_trials(len(Outcome))
+    ledger = Ledger(trials, told.append, {})
+    writer = RunWriter.create(tmp_path, RunHeader(name="run", created=NOW), trials)
+    for trial, outcome in zip(trials, Outcome, strict=True):
+        ending = Ending(outcome, "why")
+        ledger.begin(trial)
+        ledger.end(trial, ending)
+        writer.begin(trial).finish(ending, NOW, NOW)
+    (listed,) = list_runs(tmp_path)
+    assert (told[-1].failed, told[-1].interrupted) == (listed.failed, listed.interrupted) == (3, 1)
+    assert counts(told[-1]) == "1 done, 3 failed, 1 interrupted, 0 left"
 
 
 def test_a_terminal_keeps_failures_above_the_live_line_and_reads_no_markup_in_them():

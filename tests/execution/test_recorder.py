@@ -327,6 +327,27 @@ def test_lost_samples_are_no_divergence_but_no_completed_trial_either() -> None:
     assert recording.events[0] == Event(0.5, "samples 50 to 59 were lost and are NaN")
 
 
+@pytest.mark.parametrize(("first", "ends"), [(60, None), (59, 0.59)])
+def test_the_window_of_the_rate_limit_does_not_close_over_lost_samples(
+    first: int, ends: float | None
+) -> None:
+    """A mean of 2 samples: 0.6 rad/s beside a lost one is 0.3, beside another 0.6 too fast."""
+    desk = Desk()
+    block = np.zeros((4, SAMPLES))
+    block[1, [49, 58, 60]] = 0.6
+    block[1, first] = 0.6
+    desk.recorder.start(CHANNELS)
+    desk.recorder.append(np.arange(50) / RATE, block[:, :50])
+    desk.recorder.lost(np.arange(50, 58) / RATE)
+    desk.recorder.append(np.arange(58, SAMPLES) / RATE, block[:, 58:])
+    ending, _ = desk.end(COMPLETED)
+    if ends is None:
+        assert ending.fault is Fault.LOST_SAMPLES
+    else:
+        assert ending.outcome is Outcome.LIMIT
+        assert f"at {ends} s" in ending.reason
+
+
 def test_the_first_verdict_stands() -> None:
     desk = Desk()
     desk.recorder.start(CHANNELS)

@@ -79,6 +79,15 @@ def test_csv_is_read_to_the_last_bit_by_pandas_and_numpy(run, tmp_path):
         same(matrix[:, column], expected)
 
 
+def test_a_heading_of_csv_holds_nothing_that_a_terminal_obeys(run, tmp_path):
+    strange = channel("rate\x1b[2J\u202e", "°/s\x07", np.arange(3.0))
+    recording = Recording(np.arange(3) / 3, {strange.name: strange}, (), Ending(Outcome.COMPLETED))
+    path = tmp_path / "trial.csv"
+    exports()["csv"].write(run.trial(2), recording, path)
+    heading = path.read_text(encoding="utf-8").splitlines()[0]
+    assert heading == "time (s),rate?[2J? (°/s?)"
+
+
 def test_parquet_is_read_by_pandas_with_its_units(run, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     path = exported(run, "parquet", tmp_path / "out")

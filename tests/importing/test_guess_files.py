@@ -16,7 +16,7 @@ from campaign.importing.guess import Basis, guess, mapping_text
 from campaign.importing.interface import RecordingError
 from tests.importing import rig
 from tests.importing.newcomer import completed, imported
-from tests.importing.test_mapping import planned
+from tests.importing.test_mapping import planned, served
 from tests.importing.wild import DEG, text, together
 
 
@@ -135,6 +135,33 @@ def test_files_that_are_alike_share_their_columns(tmp_path: Path):
     }
     highest = max(table.columns[1].high for table in found.tables[:2])
     assert f"to {highest:.6g}; taken for relative_angle" in mapping_text(found)
+
+
+def test_files_of_one_signal_each_can_be_joined_as_the_mapping_says(tmp_path: Path):
+    m = rig.sines(1)
+    text(together(m.t, m.q), "")(tmp_path / "pos.t")
+    text(together(m.t, m.tau), "")(tmp_path / "tau.t")
+    told = mapping_text(guess([tmp_path / "pos.t", tmp_path / "tau.t"]), tmp_path)
+    assert 'with file = ["pos.t", "tau.t"],\n# and file = 1, file = 2, ... in each channel' in told
+    mapping = """
+        [columns.rig]
+        time = { column = 1, unit = "s" }
+        relative_angle = { column = 2, file = 1, unit = "rad" }
+        drive_torque = { column = 2, file = 2, unit = "N m" }
+        [[test]]
+        name = "any"
+        kind = "motion"
+        bench = "platform"
+        [[test.recording]]
+        file = ["pos.t", "tau.t"]
+    """
+    (trial,) = planned(tmp_path, mapping).trials
+    recording, _ = served(trial)
+    np.testing.assert_allclose(recording["drive_torque"], m.tau, rtol=1e-5)
+
+    text(together(m.t, m.q, m.tau), "")(tmp_path / "both.t")
+    told = mapping_text(guess([tmp_path / "pos.t", tmp_path / "both.t"]), tmp_path)
+    assert "one signal" not in told
 
 
 def test_columns_that_are_not_known_have_a_block_to_fill_in(tmp_path: Path):

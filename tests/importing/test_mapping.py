@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -111,11 +112,63 @@ def test_a_file_may_hold_several_trials(tmp_path: Path, line: str, trials: int, 
         assert second["relative_angle"][0] == pytest.approx(np.deg2rad(5.0))
 
 
+def test_a_channel_says_which_letters_its_name_may_have(tmp_path: Path):
+    told = refused(tmp_path, COLUMNS.replace("rig.relative_angle", "rig.Angle") + TEST + ENTRY)
+    assert "'Angle': must be a lower-case letter, then lower-case letters, digits and _" in told
+
+
 def test_a_pattern_is_a_recording_for_each_file(tmp_path: Path):
     text = COLUMNS + TEST + ENTRY.replace("a.csv", "*.csv")
     rows = "t,pos,i\n" + "\n".join(f"{k},{k},{k}" for k in range(100))
     write(tmp_path, text, rows, "b.csv")
     assert len(planned(tmp_path, text, rows).trials) == 2
+
+
+def test_a_pattern_finds_files_in_folders_below_and_through_links_that_stay_there(tmp_path: Path):
+    text = COLUMNS + TEST + ENTRY.replace("a.csv", "*/[ab].csv")
+    rows = "t,pos,i\n" + "\n".join(f"{k},{k},{k}" for k in range(100))
+    (tmp_path / "day").mkdir()
+    write(tmp_path / "day", text, rows, "b.csv")
+    (tmp_path / "day" / "a.csv").symlink_to(tmp_path / "a.csv")
+    (tmp_path / "again").symlink_to(tmp_path / "again")  # a link to itself is nowhere
+    assert len(planned(tmp_path, text, rows).trials) == 2
+
+
+@pytest.mark.parametrize(
+    ("pattern", "what"),
+    [
+        ("/*", "a pattern"),
+        ("../*.csv", "a pattern"),
+        ("day/../../*.csv", "a pattern"),
+        ("out/*.csv", "the link 'out'"),
+        ("*/*.csv", "the link 'out'"),
+        ("o*/*/*/*", "the link 'out'"),
+        ("*.csv", "the link 'far.csv'"),
+    ],
+)
+def test_a_pattern_does_not_lead_out_of_its_folder(
+    tmp_path: Path, pattern: str, what: str, monkeypatch: pytest.MonkeyPatch
+):
+    """And nothing outside is looked at: a pattern of the root would walk through all files."""
+    inside, outside = tmp_path / "in", tmp_path / "outside"
+    (inside / "day").mkdir(parents=True)
+    (outside / "deep").mkdir(parents=True)
+    write(outside, "", "t,pos\n0,1\n", "far.csv")
+    (inside / "out").symlink_to(outside)
+    (inside / "far.csv").symlink_to(outside / "far.csv")
+    looked: list[Path] = []
+    scan = os.scandir
+
+    def seen(path):
+        looked.append(Path(path).resolve())
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", seen)
+    told = refused(inside, COLUMNS + TEST + ENTRY.replace("a.csv", pattern))
+    assert re.search(r"m\.toml:19:8: ", told)
+    assert f"{what} leads out of the mapping's folder" in told
+    assert all(path.is_relative_to(inside) for path in looked if path.is_relative_to(tmp_path))
+    assert Path("/") not in looked
 
 
 def test_a_delay_is_put_back_by_whole_samples(tmp_path: Path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import h5py
@@ -163,6 +165,24 @@ def test_whole_numbers_do_not_wrap_around(tmp_path):
     scipy.io.savemat(path, {"n": counts.astype(np.uint8)})
     (table,) = opened(path, "mat")
     assert np.diff(table.whole().ravel()).tolist() == [1, -1, 249]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_small_file_that_unpacks_to_too_much_is_refused_unread(tmp_path, monkeypatch, order):
+    """Counted, whatever its headers say; what is measured does not pack so well."""
+    noise = np.random.default_rng(1).normal(size=100_000)
+    scipy.io.savemat(tmp_path / "noise.mat", {"x": noise, "y": noise[::-1]}, do_compression=True)
+    packed = zlib.compress(struct.pack(f"{order}2I", 14, 48) + bytes(4 << 20))
+    parts = struct.pack(f"{order}2I", 15, len(packed)) + packed
+    version = b"\x00\x01IM" if order == "<" else b"\x01\x00MI"
+    bomb = tmp_path / "bomb.mat"
+    bomb.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + version + 3 * parts)
+    monkeypatch.setattr(mat_format, "LARGEST_PART", 1 << 20)
+    mat_format.tables(tmp_path / "noise.mat")
+    monkeypatch.setattr(mat_format, "LARGEST_PART", 10 << 20)
+    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: pytest.fail("it was read"))
+    with pytest.raises(RecordingError, match=r"unpacks to more than 0\.0105 GB, which is too much"):
+        mat_format.tables(bomb)
 
 
 def test_signals_of_dspace_have_the_clock_they_name(tmp_path):

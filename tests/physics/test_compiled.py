@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import stat
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 import campaign.physics
-from campaign.physics.compiled import cache_folder, compiled, digest_of_sources
+from campaign.cli.compiling import compiling_meanwhile
+from campaign.execution import first_start
+from campaign.physics import compiled as compiled_module
+from campaign.physics.compiled import cache_folder, compiled, digest_of_sources, distrust
 from tests.packages import FILM, Packages
 
 PHYSICS = Path(campaign.physics.__file__).parent
@@ -127,6 +133,89 @@ def test_a_function_without_a_file_is_compiled_and_not_kept() -> None:
     twice.__module__ = "__nowhere__"
     assert cache_folder("__nowhere__") is None
     assert compiled(twice)(1.5) == 3.0
+
+
+posix = pytest.mark.skipif(os.name != "posix", reason="modes and owners are of POSIX")
+
+
+def kept(folder: Path) -> Path:
+    """A file of machine code in a folder as it is made."""
+    folder.mkdir(mode=0o700)
+    (folder / "physics").mkdir()
+    (folder / "physics").chmod(0o755)
+    file = folder / "physics" / "engine.nbi"
+    file.touch()
+    file.chmod(0o644)
+    return file
+
+
+@posix
+@pytest.mark.parametrize(
+    ("folder_mode", "file_mode", "why"),
+    [
+        (0o700, 0o644, ""),
+        (0o755, 0o644, ""),
+        (0o700, 0o664, ""),  # by a umask of 002, where nobody else can enter
+        (0o755, 0o664, "engine.nbi can be written by other users"),
+        (0o700, 0o666, "engine.nbi can be written by other users"),
+        (0o755, 0o666, "engine.nbi can be written by other users"),
+        (0o770, 0o644, "cache can be written by other users"),
+        (0o777, 0o644, "cache can be written by other users"),
+        (0o1777, 0o644, "cache can be written by other users"),
+    ],
+)
+def test_machine_code_that_others_can_write_is_not_trusted(
+    tmp_path: Path, folder_mode: int, file_mode: int, why: str
+) -> None:
+    kept(tmp_path / "cache").chmod(file_mode)
+    (tmp_path / "cache").chmod(folder_mode)
+    (tmp_path / "link").symlink_to(tmp_path / "cache")
+    for folder in (tmp_path / "cache", tmp_path / "link"):
+        assert distrust(folder).endswith(why)
+        assert bool(distrust(folder)) is bool(why)
+
+
+@posix
+def test_links_among_machine_code_and_other_owners_are_not_trusted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept(tmp_path / "linked")
+    (tmp_path / "linked" / "more").symlink_to(tmp_path)
+    assert distrust(tmp_path / "linked").endswith("more is a link")
+    kept(tmp_path / "cache")
+    another = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: another)
+    assert distrust(tmp_path / "cache").endswith("cache belongs to another user")
+
+
+@posix
+def test_a_cache_that_others_can_write_is_not_used_and_it_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compiled_module, "_user_cache", lambda: tmp_path / "compiled")
+    monkeypatch.setattr(first_start, "FirstStart", nullcontext)
+    folder = cache_folder.__wrapped__("campaign.physics.engine")
+    assert folder.parent == tmp_path / "compiled"
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    folder.chmod(0o777)
+    distrust.cache_clear()
+    other = cache_folder.__wrapped__("campaign.physics.engine")
+    assert other.parent != tmp_path / "compiled"
+    other.rmdir()
+    with compiling_meanwhile("sim"):
+        pass
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.count("can be written by other users; remove that folder") == 1
+
+
+@posix
+def test_planted_machine_code_is_not_loaded(tmp_path: Path) -> None:
+    packages = Packages(tmp_path / "packages")
+    packages.grease()
+    assert [torque(packages)[1], torque(packages)[1]] == [0, 1]
+    for file in (tmp_path / "cache").rglob("*grease*.nbi"):
+        file.chmod(0o666)
+    assert torque(packages) == (3.0, 0)
 
 
 def write(path: Path, text: str) -> None:

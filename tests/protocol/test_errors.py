@@ -36,7 +36,7 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD.replace('"swing"', "§7"), r"7 is not text"),
         (GOOD.replace('[[test]]\nname = "t"', "§[[test]]"), r"'name' is missing: What the test"),
         (GOOD.replace('"t"', "§[]"), r"a list is not text in quotes"),
-        (GOOD.replace('"t"', '§"Tea Time"'), r"'Tea Time': .*pattern"),
+        (GOOD.replace('"t"', '§"Tea Time"'), r"'Tea Time': must be lower-case letters and digits"),
         (GOOD.replace('"simulink"', '§"simulik"'), r"no shipped bench.*or the path.*'simulink'\?"),
         (GOOD.replace('"simulink"', '§"nope.toml"'), r"'nope.toml': no such file \(looked for"),
         (GOOD.replace('"simulink"', '§"../.."'), r"a folder, not a TOML file"),
@@ -347,6 +347,21 @@ def test_near_name_of_a_missing_bench(desk, simulink: str) -> None:
     desk.write("benches/platform.toml", simulink)
     problems = desk.problems(GOOD.replace('"simulink"', '§"benches/platfrom.toml"'))
     assert "did you mean 'platform.toml'?" in problems[0].message
+
+
+def test_a_missing_bench_is_not_taken_for_the_protocol_that_names_it(desk, simulink: str) -> None:
+    problems = desk.problems(GOOD.replace('"simulink"', '§"protocols.toml"'))
+    assert "did you mean" not in problems[0].message
+    desk.write("Rig.toml", simulink)
+    problems = desk.problems(GOOD.replace('"simulink"', '§"rig"'))
+    assert "did you mean 'Rig.toml'?" in problems[0].message
+
+
+def test_a_bench_that_is_included_is_told_to_be_one(desk, simulink: str) -> None:
+    desk.write("rig.toml", "schema = 3\n" + simulink)
+    problems = desk.problems('include = ["rig.toml"]\n' + GOOD)
+    assert [str(each.file.name) for each in problems] == ["rig.toml"]
+    assert "this is a bench, and a protocol is asked for" in problems[0].message
 
 
 def test_missing_published_values(desk) -> None:

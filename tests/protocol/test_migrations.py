@@ -14,7 +14,8 @@ from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol import load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
-from campaign.protocol.migrations import MIGRATIONS, migrate, newest
+from campaign.protocol.files import NEWEST
+from campaign.protocol.migrations import MIGRATIONS, migrate
 from campaign.resources import protocols_folder
 
 from .conftest import SHIPPED
@@ -125,7 +126,7 @@ def test_the_text_says_what_the_migrated_values_are(tmp_path: Path, text, kind, 
     assert migrate(plain, kind)
     found, new, _ = migrated(file(tmp_path, text.replace("\n", end)))
     assert found == kind
-    assert tomllib.loads(new) == {**plain, "schema": newest(kind)}
+    assert tomllib.loads(new) == {**plain, "schema": NEWEST[kind]}
     assert ("\r\n" in new) == (end == "\r\n")
     assert new.count("\n") == new.count(end)
 
@@ -219,7 +220,7 @@ def test_saying_the_schema_changes_no_trial(tmp_path: Path):
 
 def test_every_schema_has_its_migration():
     for kind, steps in MIGRATIONS.items():
-        assert len(steps) == newest(kind) - 1
+        assert len(steps) == NEWEST[kind] - 1
 
 
 def test_a_migrated_document_is_still_one_of_tomlkit():

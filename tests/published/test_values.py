@@ -177,7 +177,10 @@ def test_a_laboratory_s_own_table_wins_and_the_others_stay() -> None:
         (OWN.replace("[488]", "[488, 1]"), "row 'none' has 2 numbers for 1 columns (240)"),
         (OWN.replace('"urad"', '"wumpus"'), "'wumpus' is not a unit"),
         (OWN.replace('quantity = "stabilization_error"', ""), "cell none/240 has no quantity"),
-        (OWN.replace('name = "5.8"', 'name = "<b>"'), "String should match pattern"),
+        (
+            OWN.replace('name = "5.8"', 'name = "<b>"'),
+            "must be like 5.8, figure 5.14",
+        ),
         (OWN + OWN.split('paper"')[1], "two tables are called '5.8'"),
         (OWN + '[[table.mark]]\ncells = ["nine/*"]\nreason = "x"', "a mark names 'nine/*'"),
         (OWN.replace("[488]", "[nan]"), "own.toml: table.0.cells.none.0"),

@@ -121,7 +121,7 @@ def test_a_protocol_in_place_of_a_bench_and_the_other_way_round_are_told_in_one_
         "this is a protocol, and a bench is asked for; `campaign plan` takes protocols"
     ]
     bench = tmp_path / "rig.toml"
-    bench.write_text(PLATFORM.read_text())
+    bench.write_text("schema = 3\n" + PLATFORM.read_text())  # newer than any of a protocol
     with pytest.raises(ProtocolError) as met:
         show_plan(Request(bench), tmp_path, as_json=False)
     assert [each.message for each in met.value.problems] == [

@@ -89,6 +89,7 @@ def kill_again_and_again(folder: Path, kills: int, seed: int) -> int:
     """
     chance = random.Random(seed)
     results = folder / "results"
+    results.mkdir()
     write(folder, PROTOCOL)
     met = 0
     with Nursery(folder) as nursery:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+import shlex
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from campaign.archive.layout.files import PART
 from campaign.archive.layout.header import PARTIAL, SEALED
 from campaign.archive.layout.results import ENDING, results_path
 from campaign.archive.reading.index import Index
 from campaign.archive.reading.summary import RunSummary
 from campaign.errors import UsageError
 
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 _DATED = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}-\d{2}-\d{2}-")
 
 
@@ -29,10 +32,14 @@ def list_runs(results: Path) -> list[RunSummary]:
 def run_paths(results: Path) -> list[Path]:
     """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder.
 
-    Results of a run are none, whether or not that run is beside them.
+    Results of a run are none, whether or not that run is beside them. Raises UsageError when there
+    is no such folder.
     """
     try:
-        found = sorted(results.iterdir()) if results.exists() else []
+        found = sorted(results.iterdir())
+    except FileNotFoundError:
+        told = "there is no such folder; name the one that holds the runs; `campaign run` makes one"
+        raise UsageError(f"{results}: {told}") from None
     except OSError as error:
         raise UsageError(f"{results}: cannot be read: {error.strerror}") from None
     sealed = {path.stem: path for path in found if path.suffix == SEALED and path.is_file()}
@@ -66,9 +73,11 @@ def _without_results(paths: list[Path]) -> list[Path]:
 def find_run(results: Path, name: str | None = None) -> Path:
     """The run that a user means: a path, a name, a unique beginning of one, or None for the newest.
 
-    Raises UsageError listing what there is when it is none or several.
+    Raises UsageError listing what there is when it is none or several, and for a file that another
+    program recorded.
     """
     if name and (path := _as_path(name)):
+        _refuse_foreign(path)
         return path
     runs = {path.stem: path for path in run_paths(results)}
     if not runs:
@@ -107,6 +116,22 @@ def _as_path(name: str) -> Path | None:
         if path.is_file() or (path.is_dir() and path.suffix == PARTIAL):
             return path
     return None
+
+
+def _refuse_foreign(path: Path) -> None:
+    """A file that is not called like a run and does not begin like one."""
+    if path.is_dir() or path.suffix in (SEALED, PART):
+        return
+    try:
+        with path.open("rb") as file:
+            begins = file.read(len(_HDF5))
+    except OSError:
+        return  # opening the run says so
+    if begins != _HDF5:
+        raise UsageError(
+            f"{path}: is not a run. If another program recorded it, `campaign import --guess "
+            f"{shlex.quote(str(path))} > mapping.toml` writes a first mapping to import it by"
+        )
 
 
 def _some(names: list[str]) -> str:

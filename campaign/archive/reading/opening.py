@@ -12,6 +12,8 @@ from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.run_reader import Glance, RunReader
 from campaign.errors import ArchiveError
 
+IMPORT = "; `campaign import` makes one of what other programs recorded"
+
 
 def open_run(path: Path) -> RunReader:
     """Open a sealed run, or the folder of a run in progress.
@@ -70,7 +72,7 @@ def sealed_format(path: Path) -> int:
         run = guarded.member(file, "run")
         provenance = guarded.member(run, "provenance") if run is not None else None
         if provenance is None:
-            raise ArchiveError(f"{path}: /run: is not the archive of a run")
+            raise ArchiveError(f"{path}: /run: is not the archive of a run{IMPORT}")
         version = guarded.integer_at(provenance, "format")
     check_format(path, version)
     return version

@@ -11,7 +11,6 @@ from campaign.archive.layout.journal import JOURNAL, RunStarted
 from campaign.archive.layout.run_folder import read_header
 from campaign.archive.layout.story import read_lines
 from campaign.errors import ArchiveError
-from campaign.recording import Outcome
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
         tags=header.tags,
         planned=planned,
         trials=len(finished),
-        failed=sum(f.outcome not in (Outcome.COMPLETED, Outcome.INTERRUPTED) for f in finished),
+        failed=sum(f.outcome.failed for f in finished),
         interrupted=story.interrupted,
         untold=max(0, planned - len(finished)) if story.damaged else 0,
     )

@@ -22,6 +22,8 @@ from campaign.errors import Problem
 from campaign.importing.cells import is_lost, is_number, is_unit, plain, value_of
 from campaign.importing.heading import heading
 from campaign.importing.interface import (
+    LARGEST_PART,
+    MOST_UNPACKED,
     ROWS,
     Array,
     Column,
@@ -33,10 +35,6 @@ from campaign.importing.streaming import tables_streamed
 
 SAMPLE = 200
 """Rows by which a table is found."""
-LARGEST_PART = 1 << 28
-"""Bytes of texts that all sheets share, unpacked: they are read at once."""
-MOST_UNPACKED = 1 << 33
-"""Bytes that a workbook may unpack to."""
 DAY = 86400.0
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _MOMENTS = (dt.datetime, dt.date, dt.time, dt.timedelta)

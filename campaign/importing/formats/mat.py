@@ -6,18 +6,30 @@ no documented form; they are named, with how to save what is in them.
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from campaign.errors import Problem
 from campaign.importing.apart import tables_apart
 from campaign.importing.arrays import Named, named, table_of, tables_of
-from campaign.importing.interface import RecordingError, RecordingFormat, Table
+from campaign.importing.interface import (
+    LARGEST_PART,
+    MOST_UNPACKED,
+    RecordingError,
+    RecordingFormat,
+    Table,
+)
 
+MOST_TIMES = 100
+"""How many times its own size a file may unpack to; what is measured has noise, and does not."""
+_COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
 """Structures within each other."""
 OPAQUE = (
@@ -34,6 +46,7 @@ def tables(path: Path) -> Sequence[Table]:
     """What is in a MAT file, read in this process. Raises RecordingError."""
     from scipy.io import loadmat
 
+    _check_size(path)
     try:
         # mat_dtype: whole numbers were written as bytes; their differences would wrap around.
         found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
@@ -55,6 +68,36 @@ def tables(path: Path) -> Sequence[Table]:
         message = f"{shown or 'a variable'} {OPAQUE}" if objects else NOTHING
         raise RecordingError([Problem(path, 0, 0, message)])
     return whole
+
+
+def _check_size(path: Path) -> None:
+    """A small file may unpack to more than a machine holds; it is counted, and nothing is kept."""
+    unpacked = 0
+    with suppress(OSError, zlib.error), path.open("rb") as file:  # reading it says so
+        most = min(MOST_UNPACKED, max(LARGEST_PART, MOST_TIMES * path.stat().st_size))
+        for count in _unpacking(file):
+            unpacked += count
+            if unpacked > most:
+                message = f"it unpacks to more than {most / 1e9:.3g} GB, which is too much"
+                raise RecordingError([Problem(path, 0, 0, message)])
+
+
+def _unpacking(file: BinaryIO) -> Iterator[int]:
+    """Bytes that each step of unpacking the variables of a file of version 5 gives."""
+    head = file.read(128)
+    order = ">" if head[126:] == b"MI" else "<"
+    while head[:6] == b"MATLAB" and len(tag := file.read(8)) == 8:
+        kind, size = struct.unpack(f"{order}2I", tag)
+        end = file.tell() + size
+        unpack = zlib.decompressobj()
+        while kind == _COMPRESSED and not unpack.eof and file.tell() < end:
+            packed = file.read(min(_BLOCK, end - file.tell()))
+            if not packed:
+                return
+            while packed and not unpack.eof:
+                yield len(unpack.decompress(packed, _BLOCK))
+                packed = unpack.unconsumed_tail
+        file.seek(end)
 
 
 def _sort_out(

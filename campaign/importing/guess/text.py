@@ -76,6 +76,7 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
         for layout in found:
             if layout.axis == axis:
                 lines += ["", *_recording(layout, base)]
+    lines += _joined(guess)
     for layout in found:
         if not layout.known:
             lines += ["", *_columns(layout)]
@@ -124,6 +125,19 @@ def _recording(layout: LayoutGuess, base: Path | None) -> Iterator[str]:
             yield _doubt(f"{of}{doubt}")
     for key, value in list(layout.tables[0].said.items())[:5]:
         yield _comment(f"it says {key}: {value}"[:100])
+
+
+def _joined(guess: Guess) -> Iterator[str]:
+    """How files of one signal each become one recording; a time may stand beside each."""
+    files = list(dict.fromkeys(table.file.name for table in guess.tables))
+    if len(files) > 1 and all(len(table.columns) <= 2 for table in guess.tables):
+        names = ", ".join(map(_quoted, files[:3])) + (", ..." if len(files) > 3 else "")
+        yield ""
+        yield _comment("Each file holds one signal. If they are parts of one recording, write one")
+        yield _comment(f"[[test.recording]] with file = [{names}],")
+        yield _comment(
+            "and file = 1, file = 2, ... in each channel; the time is that of each file."
+        )
 
 
 def _columns(layout: LayoutGuess) -> Iterator[str]:

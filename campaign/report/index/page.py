@@ -67,8 +67,6 @@ def write_index(results: Path, packaged_templates: Path) -> Path:
     say of themselves are read. Raises UsageError when an `index.html` that is not ours is there, or
     when the folder cannot be read or written.
     """
-    if not results.is_dir():
-        raise UsageError(f"{results}: there is no such folder")
     path = results / NAME
     _refuse_foreign(path)
     text = on_a_page(render(results, packaged_templates))
