@@ -229,10 +229,10 @@ class SerialBackend:
         number = self._trials
         sides = sides_in(trial.bench)
         recorder.start(tuple(_info(channel, task.mode, sides) for channel in channels))
-        collector = Collector(session, number, rate, channels, recorder, task.duration)
         if stop() or self._urgent.is_set():
             session.command(Clear())
             return Ending(Outcome.INTERRUPTED, "stopped by the operator before it moved")
+        collector = Collector(session, number, rate, channels, recorder, task.duration)
         if self._motion is not None:
             self._motion.trigger()
         try:

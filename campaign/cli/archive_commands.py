@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from campaign.cli.app import app
+from campaign.cli.output import print_line
 from campaign.cli.parameters import (
     RESULTS,
     JsonOption,
@@ -86,7 +87,7 @@ def report(
         file, code = draw_figure(
             run, results, output, only_figure, measure_anew=measure_anew, useless=useless
         )
-        typer.echo(file)
+        print_line(str(file))
         raise typer.Exit(code)
     page, code = report_run(
         run,
@@ -99,7 +100,7 @@ def report(
         trials=trials,
         zoom=zoom,
     )
-    typer.echo(page)
+    print_line(str(page))
     raise typer.Exit(code)
 
 
@@ -133,7 +134,7 @@ def compare(
     from campaign.cli.compare import compare_archives
 
     page, code = compare_archives(runs, results, output, exchanged or (), open_it=open_it)
-    typer.echo(page)
+    print_line(str(page))
     raise typer.Exit(code)
 
 
@@ -147,7 +148,7 @@ def index(
     """Write index.html into a results folder: one searchable page over all its runs."""
     from campaign.cli.index import index_results
 
-    typer.echo(index_results(results, open_it=open_it))
+    print_line(str(index_results(results, open_it=open_it)))
 
 
 @app.command()
@@ -174,7 +175,7 @@ def export(
     from campaign.cli.export import export_archive
 
     folder, code = export_archive(run, results, to, output, tests or (), trials or ())
-    typer.echo(folder)
+    print_line(str(folder))
     raise typer.Exit(code)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from campaign.cli.output import print_text
 from campaign.cli.prepare import IMPORT, Request
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
@@ -41,5 +41,5 @@ def guess_mapping(files: Sequence[Path]) -> ExitCode:
     """Print a first mapping of files; what is doubtful is marked in it."""
     from campaign.importing.guess import guess, mapping_text
 
-    sys.stdout.write(mapping_text(guess(files)))
+    print_text(mapping_text(guess(files)))
     return ExitCode.DONE

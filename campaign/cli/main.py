@@ -5,16 +5,29 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from typing import NoReturn
+from typing import Any, NoReturn
+
+from typer.core import TyperCommand
 
 from campaign.cli.bench_commands import app  # with all commands
-from campaign.cli.output import plain_streams, print_note
+from campaign.cli.output import others_print_aside, plain_streams, print_note
 from campaign.errors import CampaignError, ExitCode, ProtocolError
 
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
 DEBUG = "CAMPAIGN_DEBUG"
 
-for _command in app.registered_commands:  # the whole sentence; the list of commands would cut it
+
+class QuietCommand(TyperCommand):
+    """A command whose standard output is for what it prints itself, and for no plug-in."""
+
+    def invoke(self, ctx: Any) -> Any:
+        with others_print_aside():
+            return super().invoke(ctx)
+
+
+for _command in app.registered_commands:
+    _command.cls = QuietCommand
+    # The whole sentence; the list of commands would cut it.
     _command.short_help = getattr(_command.callback, "__doc__", None)
 
 

@@ -30,6 +30,10 @@ ONE_LINE = 20
 """Characters up to which no cell of a table on a terminal goes on below."""
 
 
+_ours: TextIO | None = None
+"""Standard output while `sys.stdout` is something else."""
+
+
 class PlainConsole(Console):
     """A console that obeys nothing in what it prints; cursor and colours are its own."""
 
@@ -75,6 +79,18 @@ def plain_streams() -> Iterator[None]:
         sys.stdout, sys.stderr = before
 
 
+@contextmanager
+def others_print_aside() -> Iterator[None]:
+    """Inside the block `print` goes to standard error, and standard output is for this module."""
+    global _ours
+    before, _ours = _ours, sys.stdout
+    sys.stdout = sys.stderr
+    try:
+        yield
+    finally:
+        sys.stdout, _ours = _ours, before
+
+
 def _beneath(stream: TextIO) -> TextIO:
     """What a plain stream writes to, also while a live display has put itself in front."""
     stream = getattr(stream, "rich_proxied_file", stream)
@@ -83,7 +99,7 @@ def _beneath(stream: TextIO) -> TextIO:
 
 def console() -> Console:
     """Standard output: what a command was asked for."""
-    return PlainConsole(sys.stdout)
+    return PlainConsole(_ours or sys.stdout)
 
 
 def error_console() -> Console:
@@ -94,6 +110,11 @@ def error_console() -> Console:
 def print_line(text: str = "") -> None:
     """One line of output; on a terminal it goes on below between words, and no word is broken."""
     _print_words(console(), Text(_plain(text)))
+
+
+def print_text(text: str) -> None:
+    """Output in lines that are as they are, also on a terminal."""
+    (_ours or sys.stdout).write(text)
 
 
 def print_note(text: str, style: str = "") -> None:
@@ -141,7 +162,7 @@ def print_table(
     out = console()
     if not out.is_terminal:
         for row in (headings, *rows):
-            print("\t".join(_plain(" ".join(cell.split())) for cell in row))  # noqa: T201
+            print_text("\t".join(_plain(" ".join(cell.split())) for cell in row) + "\n")
         return
     columns = [[heading, *cells] for heading, *cells in _columns(headings, rows)]
     kept = _fitting(out, columns, list(spare))

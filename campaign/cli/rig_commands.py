@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from campaign.cli.archive_commands import app
+from campaign.cli.output import print_line
 from campaign.cli.parameters import (
     RESULTS,
     OpenOption,
@@ -87,7 +88,7 @@ def identify(
         settings=changes or (),
         open_it=open_it,
     )
-    typer.echo(made)
+    print_line(str(made))
     raise typer.Exit(code)
 
 
@@ -143,5 +144,5 @@ def trend(
     page, code = trend_of_archives(
         runs, results, output, over, model or (), exchanged or (), open_it=open_it
     )
-    typer.echo(page)
+    print_line(str(page))
     raise typer.Exit(code)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -145,6 +145,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
+            chdir("."),  # and back, wherever a plug-in has gone
             StopSwitch(session.guardian).on_signals() as stop,
             connected(session.backend, print_warning) as backend,
         ):

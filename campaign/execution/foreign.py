@@ -7,12 +7,14 @@ that exceeds its limit goes on in a thread of its own that keeps no program from
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from campaign.backends.interface import Backend, StopFlag, StoppedOutside
-from campaign.entry_points import blamed, provider
+from campaign.backends.interface import Backend, BackendKind, StopFlag, StoppedOutside
+from campaign.entry_points import blamed, one_line, provider
 from campaign.errors import BackendError, CampaignError
 from campaign.execution.heartbeat import HEARTBEAT
 from campaign.options import Options
@@ -104,7 +106,7 @@ def checked_ending(ending: Any, backend: object) -> Ending:
     _typed(ending, Ending, backend, "execute")
     _typed(ending.outcome, Outcome, backend, "execute")
     _typed(ending.safe_state, SafeState, backend, "execute")
-    _typed(ending.telemetry, Mapping, backend, "execute")
+    _typed(ending.telemetry, Mapping, backend, "execute")  # type: ignore[type-abstract]
     if ending.fault is not None:
         _typed(ending.fault, Fault, backend, "execute")
     return ending  # type: ignore[no-any-return]
@@ -112,15 +114,12 @@ def checked_ending(ending: Any, backend: object) -> Ending:
 
 def called(backend: object, method: str, *arguments: object) -> Any:
     """The answer of a method that needs no limit. Raises BackendError for another's faults."""
-    here = os.getcwd()
     try:
         return getattr(backend, method)(*arguments)
     except BaseException as error:
         if (fault := as_fault(error, backend, method)) is error:
             raise
         raise fault from error
-    finally:
-        os.chdir(here)
 
 
 def as_fault(error: BaseException, backend: object, method: str) -> BaseException:

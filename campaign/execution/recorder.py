@@ -110,7 +110,8 @@ class SupervisingRecorder:
                 )
 
     def append(self, time: Array, block: Array) -> None:
-        self._hand_over(time, np.asarray(block))  # None, too, which here means lost samples
+        # None stands for lost samples here.
+        self._hand_over(time, np.asarray(None) if block is None else block)
 
     def lost(self, time: Array) -> None:
         """Samples that the backend names as lost: NaN, an event, and no `undefined`."""

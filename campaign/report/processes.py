@@ -13,6 +13,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -196,6 +197,7 @@ def _begin(handed: bytes) -> None:
     """Ctrl-C is for the process that asked, which ends this one; it ends with that one, too."""
     global _run
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout = sys.stderr  # what a plug-in prints
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.set_threshold(*SELDOM)
     _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)

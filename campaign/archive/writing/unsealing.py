@@ -17,6 +17,7 @@ from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import entry_name, entry_names
 from campaign.archive.layout.files import (
     PART,
+    keep_umask,
     publish,
     sha256_of,
     sync_folder,
