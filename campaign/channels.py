@@ -19,12 +19,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
 from campaign.axis_kind import Sides
 from campaign.recording import ChannelInfo
+from campaign.units import factor
 
 MOST = 256
 """channels of a recording."""
@@ -321,6 +322,26 @@ def axis_of(name: str, sides: Sides) -> AxisKind:
     """How the side of a bench moves that a channel is about: the motor's own, or the axis'."""
     what = VOCABULARY.get(name)
     return sides.motor if what is not None and what.side is Side.MOTOR else sides.load
+
+
+def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[ChannelInfo, float]:
+    """A channel in the unit that the vocabulary gives its name, and how many of these its own is.
+
+    Raises ValueError where no factor leads there. Channels of other names keep their unit.
+    """
+    known = VOCABULARY.get(channel.name)
+    unit = info(channel.name, mode, axis=axis_of(channel.name, sides)).unit if known else ""
+    if not unit or channel.unit == unit:  # none: also of a command in a mode that has no unit
+        return channel, 1.0
+    try:
+        times = factor(channel.unit, unit)
+    except ValueError:
+        raise ValueError(
+            f"{channel.name} was announced in {channel.unit!r}, which cannot be converted into "
+            f"{unit!r}"
+        ) from None
+    display = info(channel.name, mode, axis=axis_of(channel.name, sides)).display_unit
+    return replace(channel, unit=unit, display_unit=display), times
 
 
 def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, ...]:

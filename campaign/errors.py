@@ -8,7 +8,7 @@ code  meaning
 0     done
 1     some trials failed
 2     bad usage, protocol or bench file, or no such run
-3     a backend fault or a limit (also a plan that breaks one)
+3     a fault of a backend or of another plug-in, or a limit (also a plan that breaks one)
 4     an unreadable or damaged archive, or one without the signature it should have
 5     safe state NOT confirmed
 130   interrupted

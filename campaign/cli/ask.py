@@ -16,6 +16,7 @@ from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
 from campaign.options import Options
+from campaign.plain_text import storable
 from campaign.protocol import PlannedTest
 from campaign.protocol.loop_check import sought_instability
 from campaign.protocol.stages import most_of
@@ -140,7 +141,7 @@ class ConsoleOperator:
                 line = read_line(stop)
                 if line is None or line.strip().lower() == "stop":
                     return None
-                answer = line.strip() or "done"
+                answer = storable(line.strip()) or "done"
                 if answer.lower() not in ("no", "n"):
                     return answer
 

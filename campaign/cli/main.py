@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+from pathlib import Path
 from typing import Any, NoReturn
 
 from typer.core import TyperCommand
 
 from campaign.cli.bench_commands import app  # with all commands
 from campaign.cli.output import others_print_aside, plain_streams, print_note
-from campaign.errors import CampaignError, ExitCode, ProtocolError
+from campaign.entry_points import blamed, one_line
+from campaign.errors import CampaignError, ExitCode, ProtocolError, UsageError
+from campaign.plain_text import printable
 
+PLUG_IN_FAULT = ExitCode.LIMIT_OR_FAULT
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
 DEBUG = "CAMPAIGN_DEBUG"
 
@@ -42,10 +46,13 @@ def main() -> None:
 
 def _run() -> None:
     try:
+        _check_texts()
         app(prog_name="campaign")
     except SystemExit as leaving:
         if _by_interrupt(leaving):
             _leave("campaign: interrupted", ExitCode.INTERRUPTED)
+        if plug_in := blamed(leaving):
+            _leave(f"campaign: {plug_in.package} failed: {one_line(leaving)}", PLUG_IN_FAULT)
         raise
     except ProtocolError as error:  # as it is: editors jump to file:line:column
         _explain_in_debug()
@@ -57,11 +64,22 @@ def _run() -> None:
         _leave("campaign: interrupted", ExitCode.INTERRUPTED)
     except Exception as error:  # noqa: BLE001 - a bug: no traceback unless asked for
         _explain_in_debug()
-        _leave(
-            f"campaign: internal error: {type(error).__name__}: {error}\n"
-            f"This is a bug. Set {DEBUG}=1 and run the command again for its traceback.",
-            INTERNAL_ERROR,
-        )
+        again = f"Set {DEBUG}=1 and run the command again for its traceback."
+        if plug_in := blamed(error):
+            _leave(f"campaign: {plug_in.package} failed: {one_line(error)}\n{again}", PLUG_IN_FAULT)
+        what = f"{type(error).__name__}: {error}"
+        _leave(f"campaign: internal error: {what}\nThis is a bug. {again}", INTERNAL_ERROR)
+
+
+def _check_texts() -> None:
+    """Raise UsageError where a name cannot be kept: archives and pages are UTF-8."""
+    for text in (*sys.argv[1:], str(Path.cwd())):
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise UsageError(
+                f"{printable(text)}: this name is not valid UTF-8; rename the file or folder"
+            ) from None
 
 
 def _by_interrupt(leaving: SystemExit) -> bool:

@@ -23,7 +23,6 @@ from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
-from campaign.execution.guarded import under_guardian
 from campaign.execution.resume import (
     Conditions,
     archived_conditions,
@@ -36,6 +35,7 @@ from campaign.execution.resume import (
     stages_of,
     trial_differences,
 )
+from campaign.execution.stop import under_guardian
 from campaign.options import Options
 from campaign.policy import Policy
 from campaign.protocol import PlannedStage, PlannedTest, check_limits, check_loops

@@ -18,7 +18,7 @@ from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
 from campaign.execution import provenance
-from campaign.execution.guarded import under_guardian
+from campaign.execution.stop import under_guardian
 from campaign.protocol import as_tree, check_limits, check_loops
 from campaign.protocol.bench_file import names_file
 from campaign.stopwatch import UNTIMED, Stopwatch, Work

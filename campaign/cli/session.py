@@ -30,7 +30,6 @@ from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import foreign
 from campaign.execution.display import clock, progress_display
-from campaign.execution.guarded import GuardianPipes
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
@@ -44,7 +43,7 @@ from campaign.execution.safety import (
     safe_when_broken_off,
 )
 from campaign.execution.stages import Stages, refusal_of
-from campaign.execution.stop import NOTHING_BEGUN, StopSwitch
+from campaign.execution.stop import NOTHING_BEGUN, GuardianPipes, StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
@@ -281,10 +280,9 @@ def _report(outcome: RunOutcome) -> ExitCode:
     except Exception as error:
         if outcome.exit_code is ExitCode.DONE:
             raise
-        print_warning(
-            f"no report: internal error: {type(error).__name__}: {error}\n"
-            f"This is a bug; campaign report {reference(outcome.archive)} shows it again."
-        )
+        what = f"{type(error).__name__}: {error}"
+        again = f"campaign report {reference(outcome.archive)} shows it again"
+        print_warning(f"no report: internal error: {what}\n{again}")
     return ExitCode.DONE
 
 

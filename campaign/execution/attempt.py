@@ -11,7 +11,7 @@ from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import ArchiveError, CampaignError
 from campaign.execution import foreign
-from campaign.execution.heartbeat import HEARTBEAT
+from campaign.execution.foreign import HEARTBEAT
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop

@@ -29,16 +29,12 @@ NOTE, STOPPER = 0xFE, 0xFC
 """First bytes of texts that the program sends: what is said if it dies, and the command that stops
 its controller, arguments separated by NUL. The length follows (two bytes)."""
 MAKING_SAFE, CONNECTED, LEAVING, BEAT, REST = 0xFD, 0xFB, 0xFA, 0xF9, 0xF8
-"""What it sends besides: somebody insists and the bench is being made safe; a bench is connected;
-the program has said all and only ends; a sign of life, another of which follows; none follows."""
+"""Single bytes: the bench is being made safe as somebody insists; a bench is connected; all is said
+and the program only ends; a sign of life, another of which follows; none follows."""
 OURS = 64
 """Added to the number of a signal that was sent to the guardian itself."""
-PIECE = 65536
-"""bytes read at a time."""
-STUCK = 1.5
-"""s in which the program has to begin to leave once it was insisted."""
-SAFE = 30.0
-"""s that making the bench safe may take then."""
+STUCK, SAFE = 1.5, 30.0
+"""s in which a program begins to leave once somebody insists, and may then make the bench safe."""
 SILENCE = 30.0
 """s without a sign of life that is owed."""
 TURN = 1.0
@@ -69,7 +65,6 @@ class Guardian:
         note, stopper: the last of each that was sent.
         moves: whether a bench is connected.
         deadline: when the program is killed unless something changes; None for never.
-        why: it would be killed then.
     """
 
     def __init__(self) -> None:
@@ -84,11 +79,10 @@ class Guardian:
     def deadline(self) -> float | None:
         return min(filter(None, (self._insisted, self._silent)), default=None)
 
-    @property
-    def why(self) -> bytes:
-        if self._insisted is not None:
-            return b"the program did not obey and was killed"
-        return f"the program gave no sign of life for {SILENCE:g} s and was killed".encode()
+    def why(self) -> str:
+        """It was killed at its deadline."""
+        silent = f"gave no sign of life for {SILENCE:g} s"
+        return f"{'did not obey' if self._insisted else silent} and was killed"
 
     def feed(self, data: bytes, now: float) -> bytes:
         """The signals in `data`, to be handed on."""
@@ -99,10 +93,7 @@ class Guardian:
                 end = 3 + int.from_bytes(data[1:3])
                 if len(data) < end:
                     break  # the rest is still to come
-                if kind == NOTE:
-                    self.note = data[3:end]
-                else:
-                    self.stopper = data[3:end]
+                setattr(self, "note" if kind == NOTE else "stopper", data[3:end])
                 data = data[end:]
                 continue
             if kind < REST:
@@ -143,7 +134,7 @@ def main(command: list[str]) -> int:
         command, pass_fds=ends, env={**os.environ, VARIABLE: ",".join(map(str, ends))}
     )
     os.close(tell)
-    guardian, looked, why = Guardian(), time.monotonic(), b""
+    guardian, looked, killed = Guardian(), time.monotonic(), ""
     while program.poll() is None:
         select.select([told, heard], [], [], TURN)
         now = time.monotonic()
@@ -159,7 +150,7 @@ def main(command: list[str]) -> int:
             with suppress(OSError):
                 os.write(back, signals)
             if guardian.deadline is not None and now >= guardian.deadline:
-                why = guardian.why
+                killed = guardian.why()
                 program.kill()
                 with suppress(subprocess.TimeoutExpired):  # a disk may hold it
                     program.wait(TURN)
@@ -168,7 +159,7 @@ def main(command: list[str]) -> int:
             for number in sent:  # of a terminal's Ctrl-C it hears twice, and leaves at the first
                 program.send_signal(number)
     guardian.feed(_read(told), looked)
-    return _ended(program.returncode, guardian, why)
+    return _ended(program.returncode, guardian, killed)
 
 
 def _signals() -> int:
@@ -189,29 +180,29 @@ def _read(pipe: int) -> bytes:
     """All that there is."""
     data = b""
     with suppress(BlockingIOError):
-        while piece := os.read(pipe, PIECE):
+        while piece := os.read(pipe, 65536):
             data += piece
     return data
 
 
-def _ended(status: int | None, guardian: Guardian, why: bytes) -> int:
-    """Say what there is to say of a program that has ended."""
+def _ended(status: int | None, guardian: Guardian, killed: str) -> int:
+    """Say what there is to say of a program that has ended; the exit code."""
     if status is not None and not guardian.moves:
         if status < 0:
             with suppress(OSError):  # SIGKILL has no handler
                 signal.signal(-status, signal.SIG_DFL)
             os.kill(os.getpid(), -status)
         return status
-    how = f"signal {-status}" if status is not None and status < 0 else f"exit code {status}"
-    os.write(2, b"\n" + (why or f"the program died: {how}".encode()) + b"\n")
-    os.write(2, guardian.note + b"\n")
+    died = f"exit code {status}" if (status or 0) >= 0 else f"signal {-(status or 0)}"
+    os.write(2, f"\nthe program {killed or f'died: {died}'}\n".encode() + guardian.note + b"\n")
     if not guardian.stopper:
         os.write(2, b"the backend could not be asked to make the bench safe\n")
         return NOT_SAFE
-    os.write(2, b"stopping the controller: " + guardian.stopper.replace(b"\0", b" ") + b"\n")
+    command = guardian.stopper.split(b"\0")
+    os.write(2, b"stopping the controller: " + b" ".join(command) + b"\n")
     with suppress(OSError, subprocess.TimeoutExpired):
         subprocess.run(  # noqa: S603 - the program's own command, no shell
-            guardian.stopper.split(b"\0"), stdin=subprocess.DEVNULL, stdout=2, timeout=STOPPING
+            command, stdin=subprocess.DEVNULL, stdout=2, timeout=STOPPING
         )
     return NOT_SAFE
 

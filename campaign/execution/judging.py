@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydantic import ValidationError
 
 from campaign.axis_kind import sides_in
-from campaign.channels import VOCABULARY, axis_of, info, wrong_names
+from campaign.channels import in_known_unit, wrong_names
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import WATCHED, LimitWatch
 from campaign.plain_text import storable, storable_tree
 from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome
 from campaign.trial import Task, Trial
-from campaign.units import factor
 
 STEP = 0.5
 """Of a sample: further from its place, it could be another one."""
@@ -47,12 +46,9 @@ class Announced:
         converted: what is said of each channel whose unit was another one.
     """
 
-    channels: tuple[ChannelInfo, ...]
-    factors: Array
-    converted: tuple[str, ...]
-
-
-NOTHING = Announced((), np.ones((0, 1)), ())
+    channels: tuple[ChannelInfo, ...] = ()
+    factors: Array = field(default_factory=lambda: np.ones((0, 1)))
+    converted: tuple[str, ...] = ()
 
 
 def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> Announced:
@@ -64,46 +60,31 @@ def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> Announced:
         raise ValueError(f"a channel was announced as {type(strange).__name__!r}, no ChannelInfo")
     if wrong := wrong_names([channel.name for channel in channels]):
         raise ValueError(wrong)
-    found, factors, converted = [], [], []
-    for channel in channels:
+    given = [
+        replace(
+            channel,
+            unit=storable(channel.unit),
+            label=storable(channel.label),
+            display_unit=storable(channel.display_unit),
+            measured=bool(channel.measured),
+        )
+        for channel in channels
+    ]
+    for channel in given:
         rate = channel.own_rate
         if rate is not None and not (isinstance(rate, int | float) and 0.0 < rate < math.inf):
             raise ValueError(f"{channel.name}: its own rate is {storable_tree(rate)!r} Hz")
-        known, times = _in_its_unit(trial, channel)
-        factors.append(times)
-        if times != 1.0:
-            converted.append(
-                f"{channel.name} was announced in {channel.unit} and is archived in {known.unit}"
-            )
-        found.append(
-            replace(
-                known,
-                unit=storable(known.unit),
-                label=storable(known.label),
-                display_unit=storable(known.display_unit),
-                measured=bool(known.measured),
-            )
-        )
-    return Announced(tuple(found), np.array(factors)[:, np.newaxis], tuple(converted))
-
-
-def _in_its_unit(trial: Trial, channel: ChannelInfo) -> tuple[ChannelInfo, float]:
-    """The channel in the unit of the vocabulary, and how many of these its own unit is."""
-    if channel.name not in VOCABULARY:
-        return channel, 1.0
-    axis = axis_of(channel.name, sides_in(trial.bench))
-    wanted = info(channel.name, trial.task.mode, axis=axis)
-    if channel.unit == wanted.unit or not wanted.unit:  # a command of a mode that has no unit
-        return channel, 1.0
-    try:
-        times = factor(channel.unit, wanted.unit)
-    except (ValueError, LookupError, TypeError, AttributeError):
-        unit = storable(channel.unit)
-        raise ValueError(
-            f"{channel.name} is announced in {unit!r}; it is archived in {wanted.unit!r}, and no "
-            "factor leads there"
-        ) from None
-    return replace(channel, unit=wanted.unit, display_unit=wanted.display_unit), times
+    sides, mode = sides_in(trial.bench), trial.task.mode
+    found = [in_known_unit(channel, mode, sides) for channel in given]
+    return Announced(
+        tuple(channel for channel, _ in found),
+        np.array([[times] for _, times in found]),
+        tuple(
+            f"{kept.name} was announced in {channel.unit} and is archived in {kept.unit}"
+            for channel, (kept, times) in zip(given, found, strict=True)
+            if times != 1.0
+        ),
+    )
 
 
 def make_watch(trial: Trial, names: Sequence[str]) -> tuple[LimitWatch | None, tuple[str, ...]]:

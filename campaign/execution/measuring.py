@@ -77,7 +77,7 @@ class Measuring:
         except (ValueError, UsageError) as error:
             with speaking_of(sides_in(data.trial.bench)):
                 return Measured(problem=words_here(_one_line(str(error))))
-        except Exception as error:  # noqa: BLE001 - a bug of a plug-in must not cost the trial
+        except BaseException as error:  # noqa: BLE001 - a plug-in must not cost the trial
             return Measured(problem=_one_line(f"measuring failed: {describe(error)}"))
 
     def _by(self, kind: str) -> str:

@@ -19,8 +19,8 @@ from campaign.backends.interface import Source
 from campaign.channels import missing
 from campaign.errors import ArchiveError
 from campaign.execution.judging import (
-    NOTHING,
     STEP,
+    Announced,
     Verdict,
     announced,
     make_watch,
@@ -67,7 +67,7 @@ class SupervisingRecorder:
         self._supervision = supervision
         self._ends_trials = supervision.source is not Source.RECORDING
         self._subscribers: list[Subscriber] = list(supervision.subscribers)
-        self._announced = NOTHING
+        self._announced = Announced()
         self._channels: tuple[ChannelInfo, ...] | None = None
         self._watch: LimitWatch | None = None
         self._samples = 0

@@ -16,11 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from campaign.execution.guarded import GuardianPipes
+from campaign.execution.foreign import HEARTBEAT
 from campaign.execution.guardian import OURS, SILENCE, Guardian
-from campaign.execution.heartbeat import HEARTBEAT
 from campaign.execution.safety import NOT_SAFE
-from campaign.execution.stop import StopSwitch
+from campaign.execution.stop import GuardianPipes, StopSwitch
 
 hangs_up = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no SIGHUP here")
 on_posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX, and a guardian")
@@ -236,7 +235,7 @@ class FakeGuardian:
 def guardian() -> Iterator[FakeGuardian]:
     one = FakeGuardian()
     yield one
-    HEARTBEAT.goes_to(lambda data: None)
+    HEARTBEAT.tell = lambda data: None
     for end in (one.back, one.told, one.pipes.tell):
         with suppress(OSError):
             os.close(end)
