@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage import Damage, DamageList
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.recording import Recording
 
@@ -61,6 +62,29 @@ def readable(path: Path, trials: Sequence[ArchivedTrial]) -> tuple[Trials, tuple
         else:
             good.append(trial)
     return tuple(good), tuple(damaged)
+
+
+def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
+    """Damage of the records that stand with the samples of a sealed run; no sample is read.
+
+    The index has every record again, and opening a run looks there alone. In the folder of a run in
+    progress there is no index: whatever opens that has looked at them.
+    """
+    from campaign.archive.reading import guarded
+
+    damaged = DamageList(run.path)
+    if not run.sealed:
+        return ()
+    finished = run.story.finished
+    with damaged.noting(), guarded.open_file(run.path) as file:
+        for each in trials:
+            told = finished.get(each.trial.number)
+            if each.not_kept or told is None or not told.record:
+                continue  # dropped; or the journal is damaged; or of a format without records
+            with damaged.noting(), guarded.guarded(run.path, f"/{each.entry}/record"):
+                record = guarded.inner_group(guarded.inner_group(file, each.entry), "record")
+                guarded.text_at(record, "json", told.record)
+    return tuple(damaged.found)
 
 
 def without_damaged(
