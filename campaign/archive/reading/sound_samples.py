@@ -72,18 +72,17 @@ def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
     """
     from campaign.archive.reading import guarded
 
-    damaged = DamageList(run.path)
-    if not run.sealed:
+    # Empty before format 3. Of a damaged journal some are missing, and that is told already.
+    digests = {each.trial: each.record for each in run.story.finished.values() if each.record}
+    wanted = [t for t in trials if t.trial.number in digests and not t.not_kept]
+    if not run.sealed or not wanted:
         return ()
-    finished = run.story.finished
+    damaged = DamageList(run.path)
     with damaged.noting(), guarded.open_file(run.path) as file:
-        for each in trials:
-            told = finished.get(each.trial.number)
-            if each.not_kept or told is None or not told.record:
-                continue  # dropped; or the journal is damaged; or of a format without records
+        for each in wanted:
             with damaged.noting(), guarded.guarded(run.path, f"/{each.entry}/record"):
                 record = guarded.inner_group(guarded.inner_group(file, each.entry), "record")
-                guarded.text_at(record, "json", told.record)
+                guarded.text_at(record, "json", digests[each.trial.number])
     return tuple(damaged.found)
 
 
