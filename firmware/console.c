@@ -10,6 +10,9 @@
  *                   a new device whose ring has room for RECORDS; it was never stopped, or is
  *                   latched by stop COUNT, of `ada`, or has no lasting memory
  *   reset | wipe    power off and on: with what it remembers, or with its memory gone
+ *   cut COUNT | fill COUNT OCTET
+ *                   power off and on: with the first octets of its memory alone, or with an OCTET
+ *                   in place of each of them
  *   memory 0|1      whether remembering works
  *   receive TIME HEX | tick TIME
  *   samples FIRST COUNT HEX | event SECONDS HEX | finish OUTCOME FAULT HEX
@@ -38,9 +41,10 @@ static struct campaign_device device;
 static struct campaign_decoder decoder;
 static bool drive, rest, persists;
 
-/* What outlives a reset. */
-static struct campaign_latch kept;
-static bool is_known, memory_works;
+/* What outlives a reset: latched u8, count u32, cause u8, by short, CRC-32 of all that. */
+static campaign_octet memory[1u + 4u + 1u + 1u + CAMPAIGN_LONGEST_HOST + 4u];
+static size_t memory_used;
+static bool memory_works;
 static unsigned long records_kept;
 
 static void print_octets(const campaign_octet *data, size_t count)
@@ -191,6 +195,36 @@ static double get_temperature(void *context)
     return 25.0;
 }
 
+static void write_memory(const struct campaign_latch *latch)
+{
+    struct campaign_writer writer = {memory, sizeof memory, 0, false};
+    campaign_put_u8(&writer, latch->latched);
+    campaign_put_u32(&writer, latch->count);
+    campaign_put_u8(&writer, latch->cause);
+    campaign_put_short(&writer, latch->by);
+    campaign_put_u32(&writer, campaign_crc32(0, memory, writer.used));
+    memory_used = writer.used;
+}
+
+/* False for a memory that does not say for certain what was remembered. */
+static bool read_memory(struct campaign_latch *latch)
+{
+    struct campaign_reader reader = {memory, memory_used, 0, false};
+    size_t length = 0, end;
+    const campaign_octet *by;
+    latch->latched = campaign_get_u8(&reader) != 0;
+    latch->count = campaign_get_u32(&reader);
+    latch->cause = (enum campaign_latch_cause)campaign_get_u8(&reader);
+    by = campaign_get_short(&reader, &length);
+    end = reader.at;
+    if (campaign_get_u32(&reader) != campaign_crc32(0, memory, end) || reader.failed ||
+        reader.at != memory_used || length > CAMPAIGN_LONGEST_HOST)
+        return false;
+    memcpy(latch->by, by, length);
+    latch->by[length] = '\0';
+    return true;
+}
+
 static bool on_remember(void *context, const struct campaign_latch *latch)
 {
     (void)context;
@@ -201,8 +235,7 @@ static bool on_remember(void *context, const struct campaign_latch *latch)
         puts("failed");
         return false;
     }
-    kept = *latch;
-    is_known = true;
+    write_memory(latch);
     return true;
 }
 
@@ -221,6 +254,8 @@ static struct campaign_identity identity = {
 
 static void switch_on(void)
 {
+    struct campaign_latch kept;
+    const bool is_known = read_memory(&kept);
     drive = persists = false;
     rest = true;
     identity.boot++;
@@ -233,8 +268,9 @@ static void renew(unsigned long records, const char *past, unsigned long count)
     static const struct campaign_latch never = {false, 0, CAMPAIGN_NOT_LATCHED, ""};
     const struct campaign_latch by_ada = {true, (uint32_t)count, CAMPAIGN_STOPPED, "ada"};
     const bool forgetful = past != NULL && strcmp(past, "forgetful") == 0;
-    kept = past != NULL && strcmp(past, "latched") == 0 ? by_ada : never;
-    is_known = !forgetful;
+    write_memory(past != NULL && strcmp(past, "latched") == 0 ? &by_ada : &never);
+    if (forgetful)
+        memory_used = 0;
     memory_works = true;
     hooks.remember = forgetful ? NULL : on_remember;
     records_kept = records == 0 || records > MOST_RECORDS ? MOST_RECORDS : records;
@@ -301,7 +337,15 @@ static void act(const char *word, const char *a, const char *b, const char *c)
     } else if (strcmp(word, "reset") == 0) {
         switch_on();
     } else if (strcmp(word, "wipe") == 0) {
-        is_known = false;
+        memory_used = 0;
+        switch_on();
+    } else if (strcmp(word, "cut") == 0) {
+        count = number(a);
+        memory_used = count < memory_used ? count : memory_used;
+        switch_on();
+    } else if (strcmp(word, "fill") == 0) {
+        count = number(a);
+        memset(memory, (int)number(b), count < memory_used ? count : memory_used);
         switch_on();
     } else if (strcmp(word, "memory") == 0) {
         memory_works = number(a) != 0;

@@ -11,7 +11,7 @@ from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of_test
-from campaign.archive.reading.sound_samples import Trials, without_damaged
+from campaign.archive.reading.sound_samples import Trials, damaged_records, without_damaged
 from campaign.axis_kind import BOTH_ROTARY, Sides
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
@@ -167,13 +167,14 @@ def find(
 
     try:
         with run.held_open():
+            records = damaged_records(run, trials)
             (result, problem), trials, damaged = without_damaged(run.path, trials, analyse)
     except ArchiveError as error:
         result, problem, damaged = Result(), one_line(error), (Damage.of(run.path, error),)
     if problem == NOT_EXECUTED and (damaged or _has_unreadable(run, name)):
         problem = NOT_READABLE
     numbers = tuple(archived.trial.number for archived in trials)
-    return Found(result, numbers, unusable or problem, damaged)
+    return Found(result, numbers, unusable or problem, (*records, *damaged))
 
 
 def _has_unreadable(run: RunReader, test: str) -> bool:

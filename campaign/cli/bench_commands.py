@@ -105,6 +105,10 @@ def device(
             show_default=False,
         ),
     ] = None,
+    new_latch: Annotated[
+        bool,
+        typer.Option("--new-latch", help="First start: make the --latch FILE, not latched."),
+    ] = False,
     log: Annotated[
         Path | None,
         typer.Option(
@@ -125,6 +129,7 @@ def device(
             faults=faults or (),
             fault_seed=fault_seed,
             latch=latch,
+            new_latch=new_latch,
             log=log,
         )
     )

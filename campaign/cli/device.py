@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,7 @@ from types import FrameType
 from campaign.cli.output import print_line, print_note
 from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
 from campaign.device.faults import FaultSpec, parse_faults
+from campaign.device.latch import new_memory
 from campaign.device.line import PtyStream, TcpLine
 from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
@@ -36,6 +38,7 @@ def run_device(
     faults: Sequence[str],
     fault_seed: int,
     latch: str | None = None,
+    new_latch: bool = False,
     log: Path | None = None,
 ) -> ExitCode:
     """Serve until somebody ends the program; the first line of output is the port to use."""
@@ -43,7 +46,7 @@ def run_device(
         raise UsageError("a controller has one line: --pty or --tcp, not both")
     pace = _speed(speed)
     wanted = parse_faults(faults)
-    with _latch_file(latch) as file, closing(_log(log)) as noting:
+    with _latch_file(latch, new=new_latch) as file, closing(_log(log)) as noting:
         setup = Setup(simulable(bench), pace, log=noting, latch_file=file)
         return _serve(setup, tcp, pty, heartbeat_timeout, wanted, fault_seed)
 
@@ -76,17 +79,42 @@ def _serve(
 
 
 @contextmanager
-def _latch_file(named: str | None) -> Iterator[Path | None]:
-    """Where the latch is kept: as named, or in a file that is as old as this controller."""
+def _latch_file(named: str | None, *, new: bool) -> Iterator[Path | None]:
+    """Where the latch is kept: as named, or in a file that is as old as this controller.
+
+    new: whether this is the first start of a controller whose file is named.
+    """
+    if named in (None, "none") and new:
+        raise UsageError("--new-latch needs --latch FILE: the file that it makes")
     if named == "none":
         yield None
     elif named is not None:
-        if not Path(named).parent.is_dir():
+        file = Path(named)
+        if not file.parent.is_dir():
             raise UsageError(f"--latch {named}: there is no such folder")
-        yield Path(named)
+        if new:
+            _make(file)
+        elif not os.path.lexists(file):
+            print_note(
+                f"--latch {named}: no such file, so latched; --new-latch is for the first start"
+            )
+        yield file
     else:
         with tempfile.TemporaryDirectory(prefix="campaign-device-") as folder:
-            yield Path(folder) / "latch.json"
+            file = Path(folder) / "latch.json"
+            new_memory(file)
+            yield file
+
+
+def _make(file: Path) -> None:
+    try:
+        new_memory(file)
+    except FileExistsError:
+        raise UsageError(
+            f"--new-latch: {file} exists and may hold a stop; start without --new-latch"
+        ) from None
+    except OSError as error:
+        raise UsageError(f"--latch {file}: cannot be written: {error.strerror}") from None
 
 
 def _log(file: Path | None) -> DeviceLog:

@@ -1,12 +1,14 @@
 """The latch: once somebody else than its host has stopped the controller, nothing arms any more.
 
 It is in lasting memory, here a file, before anybody is told of it. A controller that cannot
-remember does not know whether it was stopped, so it starts latched.
+remember does not know whether it was stopped, so it starts latched. A missing file is no memory:
+only a file that says so is of a controller that was never stopped.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import math
 import os
@@ -108,14 +110,22 @@ class LatchMemory:
         self._remembered = True
 
 
+def new_memory(file: Path) -> None:
+    """Write the memory of a controller that was never stopped.
+
+    Raises FileExistsError for whatever has that name, as it may hold a stop; OSError.
+    """
+    if os.path.lexists(file):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(file))
+    _write(file, Stop())
+
+
 def _read(file: Path | None) -> Stop | None:
-    """What the file says: a new one is unlatched; None for one that cannot be understood."""
+    """What the file says; None for one that is missing or cannot be understood."""
     if file is None:
         return None
     try:
         text = file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return Stop()
     except (OSError, UnicodeDecodeError):
         return None
     try:

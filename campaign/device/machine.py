@@ -39,7 +39,8 @@ class Setup:
         busy: whether the line has enough to do for now; asked where the speed is infinite.
         now: a steady clock.
         log: is told whenever the drive goes on or off.
-        latch_file: where the latch is remembered; None: nowhere, as without lasting memory.
+        latch_file: where the latch is remembered (`new_memory` makes it); None: nowhere, as
+            without lasting memory.
     """
 
     bench: CompleteBench

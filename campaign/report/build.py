@@ -174,7 +174,9 @@ def render(
     """
     filled = Templates(packaged_templates, templates)
     at_work = at_work or Workers(run, measure_anew=measure_anew)
-    document = document_of(run, experiments, measure_anew=measure_anew, found=at_work.found)
+    document = document_of(
+        run, experiments, measure_anew=measure_anew, found=at_work.found, shown=trials
+    )
 
     def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
         # Sheets are kept as PDF where they are drawn.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.channels import TEMPERATURE
-from campaign.errors import ArchiveError, UsageError
+from campaign.errors import UsageError
 from campaign.text import pretty_unit
 from campaign.trending.members import Member
 from campaign.trending.series import Series
@@ -104,19 +104,19 @@ def _temperature(members: Sequence[Member]) -> Covariate:
 
 
 def _measured_temperature(member: Member, test: str) -> float:
-    """degC: median over the test's trials of their medians; else what a tag says."""
+    """degC: median over the test's trials of their medians; else what a tag says.
+
+    Raises ArchiveError for a temperature that is damaged; what the analyses found so is left out.
+    """
     found = []
-    for each in member.run.trials:
+    for each in (trial for one in member.tests for trial in one.trials):
         trial, completed = each.trial, each.ending.outcome is Outcome.COMPLETED
         if not completed or trial.role is not Role.MEASUREMENT or test not in ("", trial.test):
             continue
-        try:
-            unit = next((c.unit for c in each.channels() if c.name == TEMPERATURE), None)
-            if unit is None:
-                continue
-            samples = each.recording()[TEMPERATURE]
-        except ArchiveError:
+        unit = next((c.unit for c in each.channels() if c.name == TEMPERATURE), None)
+        if unit is None or each.not_kept:
             continue
+        samples = each.recording()[TEMPERATURE]
         samples = samples[np.isfinite(samples)]
         if samples.size:
             found.append(float(np.median(samples)) - (ZERO_CELSIUS if unit == "K" else 0.0))

@@ -13,6 +13,7 @@ import pytest
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.device.controller import Controller
 from campaign.device.faults import parse_faults
+from campaign.device.latch import new_memory
 from campaign.device.log import DeviceLog
 from campaign.device.machine import Setup
 from campaign.protocol.bench_file import load_bench
@@ -79,7 +80,10 @@ class Rig:
     def __init__(
         self, *faults: str, speed: float = 1.0, latch: Path | None = None, log: Path | None = None
     ) -> None:
-        """Without a file for its latch it gets one that is lost with the rig."""
+        """Without a file for its latch it gets a new one that is lost with the rig."""
+        if latch is None:
+            latch = Rig.folder / f"latch-{next(Rig.numbers)}"
+            new_memory(latch)
         self.time = 100.0
         self.said: list[tuple[int | None, Message]] = []
         setup = Setup(
@@ -88,7 +92,7 @@ class Rig:
             faults=parse_faults(faults),
             now=lambda: self.time,
             log=DeviceLog(log),
-            latch_file=latch or Rig.folder / f"latch-{next(Rig.numbers)}",
+            latch_file=latch,
         )
         self.controller = Controller(setup, lambda to, what: self.said.append((to, what)), 0.1)
         self.sequence = 500

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from campaign.cli.bench_commands import app
 from campaign.device import latch as latch_module
-from campaign.device.latch import LatchMemory
+from campaign.device.latch import LatchMemory, new_memory
+from campaign.errors import UsageError
 from campaign.wire.codes import LatchCause, NakCode, State
 from campaign.wire.device import Ack, Latch, Nak, Status
 from campaign.wire.host import Bye, Clear, Heartbeat, Hello, Safe, Start, Unlatch
@@ -109,6 +113,7 @@ def test_a_stop_is_told_to_all_and_a_hello_is_answered_with_it() -> None:
 
 def test_it_outlives_a_reset_and_the_program(tmp_path: Path) -> None:
     file = tmp_path / "latch.json"
+    new_memory(file)
     rig = Rig("reboot@trial=1@time=0.2", latch=file)
     rig.start()
     stopped(rig)
@@ -145,7 +150,9 @@ def test_the_drive_goes_off_before_it_is_remembered_and_that_before_it_is_said(
 def test_a_memory_that_cannot_be_written_latches_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "nowhere").mkdir()
     file = tmp_path / "nowhere" / "latch.json"
+    new_memory(file)
     rig = Rig(latch=file)
+    file.unlink()
     (tmp_path / "nowhere").rmdir()
     rig.start()
     stopped(rig)
@@ -165,6 +172,116 @@ def test_a_memory_that_cannot_be_read_is_no_memory(tmp_path: Path, rubbish: str)
     assert (memory.stop.count, memory.stop.cause) == (99, LatchCause.NO_MEMORY)
 
 
+def overwritten(content: Callable[[bytes], bytes]) -> Callable[[Path], object]:
+    return lambda file: file.write_bytes(content(file.read_bytes()))
+
+
+def folder_instead(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+def link_to_nothing(file: Path) -> None:
+    file.unlink()
+    file.symlink_to("nothing")
+
+
+LOSSES: dict[str, Callable[[Path], object]] = {
+    "deleted": Path.unlink,
+    "emptied": overwritten(lambda content: b""),
+    "truncated": overwritten(lambda content: content[: len(content) // 2]),
+    "zeroed": overwritten(lambda content: bytes(len(content))),
+    "erased": overwritten(lambda content: b"\xff" * len(content)),
+    "replaced by a folder": folder_instead,
+    "replaced by a link": link_to_nothing,
+    "unreadable": lambda file: None,  # whoever may read everything is not kept out by a mode
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_memory_that_is_lost_after_a_stop_keeps_the_drive_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loss: str
+) -> None:
+    file = tmp_path / "latch.json"
+    new_memory(file)
+    rig = Rig(latch=file)
+    rig.start()
+    stopped(rig)
+    LOSSES[loss](file)
+    if loss == "unreadable":
+        read = Path.read_text
+
+        def refuse(path: Path, *arguments: object, **options: object) -> str:
+            if path == file:
+                raise PermissionError(13, "Permission denied")
+            return read(path, *arguments, **options)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(Path, "read_text", refuse)
+    rig = Rig(latch=file)
+    rig.send(Hello(2, 2, OURS))
+    latch = rig.latch()
+    assert (latch.latched, latch.cause) == (True, LatchCause.NO_MEMORY)
+    assert rig.configure(trial()).code is NakCode.LATCHED
+    rig.send(Clear())
+    assert isinstance(rig.send(Start(9)), Nak)
+    assert rig.send(Unlatch(1)).code is NakCode.OTHER_STOP  # the stop that was lost
+    assert not rig.controller.machine.drive_on
+    cleared = rig.send(Unlatch(latch.count))
+    if loss == "replaced by a folder":  # which cannot be written
+        assert cleared.code is NakCode.NOT_READY
+        assert rig.latch().latched
+    else:
+        rig.send(Clear())
+        rig.start()
+        assert rig.controller.machine.drive_on
+
+
+def test_no_beginning_of_a_memory_is_a_memory(tmp_path: Path) -> None:
+    file = tmp_path / "latch.json"
+    new_memory(file)
+    whole = file.read_bytes()
+    assert not LatchMemory(file, boot=99).latched
+    for length in range(len(whole)):
+        file.write_bytes(whole[:length])
+        assert LatchMemory(file, boot=99).latched, length
+
+
+@pytest.mark.parametrize("loss", ["none", "zeroed", "replaced by a folder", "replaced by a link"])
+def test_a_new_memory_takes_the_place_of_nothing(tmp_path: Path, loss: str) -> None:
+    file = tmp_path / "latch.json"
+    new_memory(file)
+    LatchMemory(file, boot=1).set(THEIRS, "eve")
+    LOSSES.get(loss, str)(file)
+    with pytest.raises(FileExistsError):
+        new_memory(file)
+    assert LatchMemory(file, boot=2).latched
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--latch", "there"), "there exists and may hold a stop; start without --new-latch"),
+        (("--latch", "."), "may hold a stop"),
+        (("--latch", "none"), "--new-latch needs --latch FILE"),
+        ((), "--new-latch needs --latch FILE"),
+        (("--latch", "nowhere/latch"), "there is no such folder"),
+    ],
+)
+def test_a_first_start_is_refused_where_it_may_be_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("campaign.cli.device._serve", lambda *arguments: 0)  # which never ends
+    Path("there").write_text("a stop", encoding="utf-8")
+    done = CliRunner().invoke(app, ["device", "--bench", "platform", "--new-latch", *options])
+    assert isinstance(done.exception, UsageError)
+    assert int(done.exception.exit_code) == 2
+    assert told in str(done.exception)
+    assert "\n" not in str(done.exception)
+    assert Path("there").read_text(encoding="utf-8") == "a stop"
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+
+
 def test_without_lasting_memory_it_starts_latched_with_a_count_of_this_life() -> None:
     memory = LatchMemory(None, boot=4711)
     assert (memory.latched, memory.message().age) == (True, None)
@@ -175,6 +292,7 @@ def test_without_lasting_memory_it_starts_latched_with_a_count_of_this_life() ->
 
 def test_it_knows_how_long_ago_the_stop_was(tmp_path: Path) -> None:
     now = [1000.0]
+    new_memory(tmp_path / "latch")
     memory = LatchMemory(tmp_path / "latch", 1, lambda: now[0])
     memory.set(THEIRS, "eve")
     now[0] += 75.0

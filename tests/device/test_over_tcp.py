@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from campaign.device.faults import parse_faults
+from campaign.device.latch import new_memory
 from campaign.device.line import TcpLine
 from campaign.device.machine import Setup
 from campaign.device.server import Server
@@ -47,6 +48,7 @@ def serving(
     line = TcpLine("127.0.0.1:0")
     wanted = parse_faults(faults)
     folder = tempfile.mkdtemp()
+    new_memory(Path(folder) / "latch")
     setup = Setup(BENCH, speed, latch_file=Path(folder) / "latch")
     server = Server(line, setup, timeout=timeout, faults=wanted, fault_seed=3)
     thread = threading.Thread(target=server.serve)

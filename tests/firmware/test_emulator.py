@@ -178,8 +178,8 @@ class Pair:
         console.do("new", RECORDS, *past.split())
         console.now = 0
         self.file = None if past == "forgetful" else folder / f"latch-{next(PLACES)}"
-        if self.file is not None and past:
-            stop = memory.Stop(True, 3, wire.LatchCause.STOPPED, "ada")
+        if self.file is not None:
+            stop = memory.Stop(True, 3, wire.LatchCause.STOPPED, "ada") if past else memory.Stop()
             memory._write(self.file, stop)
         self.python = Rehearsal(console, self.file)
 
@@ -214,7 +214,7 @@ class Pair:
         else:
             console.do(step[0])
             if step[0] == "wipe" and self.file is not None:
-                self.file.write_text("{")
+                self.file.unlink(missing_ok=True)
             self.python.reset()
 
     def compare(self) -> None:

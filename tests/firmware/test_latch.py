@@ -398,6 +398,42 @@ def test_a_memory_that_was_lost_is_none_and_one_again_once_it_is_written(console
     assert only(wire.Latch, console.send(0, wire.Safe()))[0].count == 9
 
 
+@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize(
+    "loss", ["wipe", "cut 0", "cut 1", "cut 10", "fill 1 0", "fill 99 0", "fill 99 255"]
+)
+def test_a_memory_that_is_lost_after_a_stop_keeps_the_drive_off(
+    console: Console, loss: str, state: State
+) -> None:
+    bring_to(console, state)
+    console.send(0, wire.Safe(OTHERS, "eve"))
+    before = len(console.log)
+    console.do(*loss.split())
+    latch = latch_of(console)
+    assert (latch.latched, latch.cause) == (True, LatchCause.NO_MEMORY)
+    console.send(0, hello())
+    console.send(1, wire.Clear())
+    console.send(2, SETS[0])
+    [nak] = console.send(3, wire.Arm(CRC))
+    assert nak.code is NakCode.LATCHED
+    [nak] = console.send(4, wire.Unlatch(1, "ada"))  # the stop that was lost
+    assert nak.code is NakCode.OTHER_STOP
+    assert not asked(console)[0].drive_on
+    assert "drive on" not in console.log[before:]
+    assert only(wire.Ack, console.send(5, wire.Unlatch(latch.count, "ada")))
+    assert not latch_of(console).latched
+
+
+def test_no_beginning_of_a_memory_is_a_memory(console: Console) -> None:
+    for length in range(11):  # octets of one that says no more than that there was no stop
+        console.do("new", 16)
+        console.do("cut", length)
+        assert latch_of(console).latched, length
+    console.do("new", 16)
+    console.do("cut", 11)
+    assert not latch_of(console).latched
+
+
 def test_a_stop_of_a_device_that_knows_of_none_is_one_more(console: Console) -> None:
     console.do("new", 16, "forgetful")
     [latch] = only(wire.Latch, console.send(0, wire.Safe(OTHERS, "eve")))

@@ -28,7 +28,7 @@ from campaign.recording import (
     Recording,
     SafeState,
 )
-from campaign.report.build import build_report
+from campaign.report.build import Report, build_report
 from campaign.report.content.settings import point_settings, settings_of, task_settings
 from campaign.report.content.trial_account import _metric, _recorded
 from campaign.report.content.trial_choice import chosen_trials, stretches
@@ -118,10 +118,13 @@ def archive(made: Path, tmp_path: Path) -> Path:
     return copy
 
 
-def build(made_up: ModuleType, run: RunReader, output: Path, wanted: str, **more) -> Path:
+def report(made_up: ModuleType, run: RunReader, output: Path, wanted: str, **more) -> Report:
     options = {"experiments": made_up.EXPERIMENTS, "packaged_templates": made_up.TEMPLATES}
-    chosen = chosen_trials(run, wanted)
-    return build_report(run, output, **(options | more), trials=chosen).path.parent
+    return build_report(run, output, **(options | more), trials=chosen_trials(run, wanted))
+
+
+def build(made_up: ModuleType, run: RunReader, output: Path, wanted: str, **more) -> Path:
+    return report(made_up, run, output, wanted, **more).path.parent
 
 
 @pytest.fixture(scope="module")
@@ -381,6 +384,22 @@ def test_a_damaged_channel_is_named_and_the_others_are_shown(
     assert "does not match its checksum" in words
     assert "relative_rate" in words
     assert "Rate gyro_rate" not in words
+
+
+def test_what_is_damaged_of_a_trial_with_a_page_is_in_the_notice(
+    made_up: ModuleType, archive: Path, tmp_path: Path
+) -> None:
+    """Its page shows every channel, also those that no analysis reads."""
+    with h5py.File(archive, "r+") as file:
+        file["trial_00004/data/friction_torque"][7] += 1e-9
+    without = report(made_up, open_run(archive), tmp_path / "without", "1")
+    assert (without.damaged, without.notice) == ((), None)
+    found = report(made_up, open_run(archive), tmp_path / "out", "1,4")
+    assert [(each.trial, each.channel) for each in found.damaged] == [
+        ("trial-00004", "friction_torque")
+    ]
+    assert found.notice is not None
+    assert "trial-00004" in (tmp_path / "out" / "tables" / "damaged.csv").read_text()
 
 
 def test_a_trial_that_cannot_be_read_has_a_page_that_says_so(

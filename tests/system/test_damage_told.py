@@ -28,6 +28,7 @@ from campaign.export.run_export import export_run
 from campaign.recording import Channel, Ending, Outcome, Recording
 from tests.system import told_damage as told
 
+FIGURE = "stabilization/position-error"
 KEPT = Path(__file__).parents[1] / "archive" / "kept"
 
 
@@ -299,6 +300,19 @@ def test_a_report_says_so_above_everything_else(archive: Path, tmp_path: Path):
     listed = (tmp_path / "report" / "tables" / "damaged.csv").read_text(encoding="utf-8")
     assert listed.splitlines()[0] == "place,trial,channel,reason"
     assert len(listed.splitlines()) == 3
+
+
+def test_a_report_names_a_record_that_nothing_else_needs(archive: Path, tmp_path: Path):
+    with h5py.File(archive, "r+") as file:
+        text = file["trial_00002/record/json"][()]
+        file["trial_00002/record/json"][()] = text.replace(b"static", b"stutic")
+    for command in (("report", archive), ("report", archive, "--only-figure", FIGURE)):
+        done = told.run_campaign(*command, "--output", tmp_path / f"out-{len(command)}")
+        assert done.exit_code == 4
+        assert "trial-00002: /trial_00002/record/json: does not match its checksum" in done.stderr
+    page = (tmp_path / "out-2" / "report.html").read_text(encoding="utf-8")
+    assert "damage-heading" in page
+    assert "trial-00002 is damaged: " in page  # and not left out: the index has it again
 
 
 def decisions(run: campaign.archive.RunReader) -> list[str]:

@@ -139,7 +139,7 @@ def run_over(
     write(folder, PROTOCOL)
     log = folder / "device.log"
     log.touch()
-    options = ("--log", str(log), "--latch", str(folder / "latch.json"))
+    options = ("--log", str(log), "--latch", str(folder / "latch.json"), "--new-latch")
     patient = ("--heartbeat-timeout", "2")
     with (
         controller("--speed", "max", *options, *patient, bench="simulink") as port,

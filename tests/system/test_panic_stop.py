@@ -124,7 +124,13 @@ class Bench:
 def bench(folder: Path, *options: str, speed: str = "max", text: str = PROTOCOL) -> Iterator[Bench]:
     write(folder, text)
     (folder / "device.log").touch()
-    log = ("--log", str(folder / "device.log"), "--latch", str(folder / "latch.json"))
+    log = (
+        "--log",
+        str(folder / "device.log"),
+        "--latch",
+        str(folder / "latch.json"),
+        "--new-latch",
+    )
     # On a busy machine heartbeats are late: that is not what is tried here.
     patient = ("--heartbeat-timeout", "20")
     with controller("--speed", speed, *log, *patient, *options, bench="simulink") as port:
@@ -258,7 +264,7 @@ def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Pa
     (tmp_path / "first").mkdir()
     (tmp_path / "second").mkdir()
     log, latch = tmp_path / "device.log", tmp_path / "latch.json"
-    options = ("--log", str(log), "--latch", str(latch), "--heartbeat-timeout", "1")
+    options = ("--log", str(log), "--latch", str(latch), "--new-latch", "--heartbeat-timeout", "1")
     with controller("--speed", "1", *options, bench="simulink") as port:
         first, second = Bench(tmp_path / "first", port), Bench(tmp_path / "second", port)
         write(first.folder, text)
@@ -312,6 +318,18 @@ def test_nobody_but_a_person_clears_it(tmp_path: Path) -> None:
         assert "campaign stop" in told.reason  # whose stop it was
         assert "by --clear-stop 1" in told.reason
         assert rig.count("cleared") == 1
+
+
+def test_a_latch_that_is_lost_after_a_stop_does_not_let_the_drive_on(tmp_path: Path) -> None:
+    with bench(tmp_path) as rig:
+        rig.stop()
+    latch = tmp_path / "latch.json"
+    latch.unlink()
+    options = ("--log", str(tmp_path / "device.log"), "--latch", str(latch))
+    with controller("--speed", "max", *options, bench="simulink") as port:
+        refused = campaign(tmp_path, "run", "protocol.toml", *ON, "--port", port, code=3)
+        assert "--clear-stop" in refused.err
+        assert Bench(tmp_path, port).count("drive on") == 0
 
 
 @pytest.mark.parametrize(("answer", "code"), [("clear", 0), ("yes", 3), ("", 3)])

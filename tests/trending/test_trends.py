@@ -8,11 +8,12 @@ from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from campaign.archive import RunReader, open_run
-from campaign.errors import UsageError
+from campaign.errors import ArchiveError, UsageError
 from campaign.experiments import experiments
 from campaign.resources import templates_folder
 from campaign.trending.page import as_json, write_trends
@@ -157,6 +158,18 @@ def test_a_recorded_temperature_counts_before_a_noted_one(tmp_path: Path):
     assert followed.judged
     for each in followed.followed:
         assert each.x.tolist() == pytest.approx([20.0, 24.0, 31.0, 22.0])
+
+
+def test_a_damaged_temperature_is_refused(tmp_path: Path):
+    wanted = {
+        f"run-{n}": Wanted((), START + timedelta(days=n), (), 800 + n, (20.0 + n, "degC"))
+        for n in range(3)
+    }
+    paths = list(archived(tmp_path, wanted).values())
+    with h5py.File(paths[1], "r+") as file:
+        file["trial_00001/data/temperature"][7] += 1e-9
+    with pytest.raises(ArchiveError, match="/trial_00001/data/temperature: does not match"):
+        follow([open_run(path) for path in paths], experiments(), "temperature")
 
 
 def test_another_number_of_the_runs_may_be_followed(drift: Trends, runs: Path):

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage import Damage, DamageList
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.recording import Recording
 
@@ -61,6 +62,28 @@ def readable(path: Path, trials: Sequence[ArchivedTrial]) -> tuple[Trials, tuple
         else:
             good.append(trial)
     return tuple(good), tuple(damaged)
+
+
+def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
+    """Damage of the records that stand with the samples of a sealed run; no sample is read.
+
+    The index has every record again, and opening a run looks there alone. In the folder of a run in
+    progress there is no index: whatever opens that has looked at them.
+    """
+    from campaign.archive.reading import guarded
+
+    # Empty before format 3. Of a damaged journal some are missing, and that is told already.
+    digests = {each.trial: each.record for each in run.story.finished.values() if each.record}
+    wanted = [t for t in trials if t.trial.number in digests and not t.not_kept]
+    if not run.sealed or not wanted:
+        return ()
+    damaged = DamageList(run.path)
+    with damaged.noting(), guarded.open_file(run.path) as file:
+        for each in wanted:
+            with damaged.noting(), guarded.guarded(run.path, f"/{each.entry}/record"):
+                record = guarded.inner_group(guarded.inner_group(file, each.entry), "record")
+                guarded.text_at(record, "json", digests[each.trial.number])
+    return tuple(damaged.found)
 
 
 def without_damaged(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from campaign.access.analysis import (
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
+from campaign.archive.reading.sound_samples import readable
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import Published
@@ -113,16 +114,19 @@ def document_of(
     *,
     measure_anew: bool = False,
     found: Mapping[str, Found] | None = None,
+    shown: Collection[int] = (),
 ) -> Document:
     """Analyse a run and say what there is to say of it.
 
-    `measure_anew`, `found`: as for `analyse_run`.
+    `measure_anew`, `found`: as for `analyse_run`. `shown`: trials that have pages of their own,
+    with all of their samples.
     """
     happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
     of_tests = (damage for test in tests for damage in test.damaged)
-    damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged)))
+    _, of_pages = readable(run.path, [t for t in run.trials if t.trial.number in shown])
+    damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
     predictions = predicted(run, tests)
