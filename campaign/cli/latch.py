@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
+from campaign.backends import calls
 from campaign.backends.interface import Backend, StoppedOutside
 from campaign.cli.ask import read_line, somebody_is_there
 from campaign.cli.output import print_note
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution import foreign
 from campaign.execution.display import clock
 from campaign.recording import PanicStop
 
@@ -35,7 +35,7 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
     """
     if not isinstance(backend, StoppedOutside):
         return ""
-    found = foreign.panic_stop(backend)
+    found = calls.panic_stop(backend)
     if found is None:
         if seen is not None:
             print_note(f"--clear-stop {seen}: the bench is not stopped")
@@ -51,7 +51,7 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
             "nothing was moved"
         )
     try:
-        foreign.called(backend, "clear_stop", seen)
+        calls.called(backend, "clear_stop", seen)
     except BackendError as error:  # another stop has come meanwhile, say
         raise StillStoppedError(f"{error}; nothing was moved") from None
     print_note(f"stop {seen} is cleared; the bench may move")

@@ -13,12 +13,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from campaign.archive import find_run
-from campaign.backends import backends
+from campaign.backends import backends, calls
 from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
 from campaign.channels import explained, missing
 from campaign.cli.damage import archive_of
 from campaign.errors import ArchiveError, ProtocolError, UsageError
-from campaign.execution import foreign
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
@@ -132,7 +131,7 @@ def open_backend(
     Raises UsageError when it does not, or is known not to record what one of them requires;
     ArchiveError when it does not and the run that it serves is damaged.
     """
-    backend = foreign.opened(kind, options)
+    backend = calls.opened(kind, options)
     if isinstance(backend, SimulatesTruth):
         backend.simulate_instead(truths or {})
     elif kind.source is not Source.RECORDING and (named := [t for t in trials if t.truth]):
@@ -169,7 +168,7 @@ def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]
 
 
 def _refused(kind: BackendKind, backend: Backend, trial: Trial) -> str:
-    why = foreign.refusal(backend, trial)
+    why = calls.refusal(backend, trial)
     named = f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label})"
     return f"{named}: {why}" if why else ""
 
@@ -182,7 +181,7 @@ def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial])
     for trial in trials:
         if not trial.requires:
             continue
-        known = foreign.channels(backend, trial)
+        known = calls.channels(backend, trial)
         if known is not None and (names := missing(trial.requires, known)):
             raise UsageError(_not_recorded(kind, trial, names))
 
@@ -216,7 +215,7 @@ def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, .
     """By test, the channels that its analysis can use and that are known not to be recorded."""
     found: dict[str, dict[str, None]] = {}
     for trial in trials:
-        known = foreign.channels(backend, trial) if trial.can_use else None
+        known = calls.channels(backend, trial) if trial.can_use else None
         if known is not None and (names := missing(trial.can_use, known)):
             found.setdefault(trial.test, {}).update(dict.fromkeys(names))
     return {test: tuple(names) for test, names in found.items()}

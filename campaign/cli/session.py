@@ -13,6 +13,7 @@ from pathlib import Path
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialsFollowed
+from campaign.backends import calls
 from campaign.backends.interface import (
     Backend,
     BackendKind,
@@ -28,7 +29,6 @@ from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
-from campaign.execution import foreign
 from campaign.execution.display import clock, progress_display
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
@@ -138,7 +138,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     if isinstance(session.backend, Introduced):
-        foreign.called(session.backend, "introduce", session.folder.stem)
+        calls.called(session.backend, "introduce", session.folder.stem)
     if isinstance(session.backend, Timed):
         session.backend.timing = session.timing
     try:

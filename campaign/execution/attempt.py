@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
+from campaign.backends import calls
+from campaign.backends.calls import HEARTBEAT, Call
 from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.errors import ArchiveError, CampaignError
-from campaign.execution import foreign
-from campaign.execution.foreign import HEARTBEAT
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
@@ -60,12 +59,11 @@ def execute_once(trial: Trial, conditions: Conditions) -> Executed:
     supervision = conditions.supervision
     with supervision.timing.span(Work.SAMPLES):  # less what is told to be something else
         attempt = _Attempt.begin(trial, conditions)
-        if supervision.live:
-            with HEARTBEAT.expected():
-                executed = _attended(attempt, supervision)
-            return attempt.archive(executed)
-        attempt.run()
-        return attempt.archive(attempt.concluded())
+        if not supervision.live:
+            return attempt.archive(attempt.concluded(attempt.execute()))
+        with HEARTBEAT.expected():
+            executed = _attended(attempt, supervision)
+        return attempt.archive(executed)
 
 
 def execute_together(
@@ -94,21 +92,21 @@ def _execute_together(
 
     def end(place: int, executed: Executed) -> None:
         attempt = attempts.pop(place)
-        tell(attempt.trial, attempt.archive(attempt.concluding(executed)))
+        tell(attempt.trial, attempt.archive(attempt.concluded(executed)))
 
     recorders = [attempt.recorder for attempt in attempts.values()]
     stops = [attempt.stop for attempt in attempts.values()]
     untold = Ending(Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED)
     left = Executed(untold, gave_up=True)
     try:
-        for place, ending in foreign.called(backend, "execute_together", trials, recorders, stops):
+        for place, ending in calls.called(backend, "execute_together", trials, recorders, stops):
             if place not in attempts:
                 raise LookupError(f"no trial is at place {place!r}, or it has ended")
-            end(place, Executed(foreign.checked_ending(ending, backend)))
+            end(place, Executed(calls.checked_ending(ending, backend)))
             if not attempts:
                 break
     except BaseException as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
-        left = _failed(foreign.as_fault(error, backend, "execute_together"))
+        left = _failed(calls.as_fault(error, backend, "execute_together"))
     for place in tuple(attempts):
         end(place, left)
 
@@ -126,12 +124,9 @@ class _Attempt:
         measure: Measure | None,
     ) -> None:
         self.trial, self.backend, self.recorder, self.stop = trial, backend, recorder, stop
-        self.over = threading.Event()
         self._file = file
         self._measure = measure
         self._started = utc_now()
-        self._executed: Executed | None = None
-        self._error: BaseException | None = None
 
     @classmethod
     def begin(cls, trial: Trial, conditions: Conditions) -> _Attempt:
@@ -140,25 +135,15 @@ class _Attempt:
         recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
         return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
 
-    def run(self) -> None:
-        """Execute; raises nothing."""
+    def execute(self) -> Executed:
+        """What the backend says of it. Raises what the archive raises."""
         try:
-            self._executed = self._execute()
-        except BaseException as error:  # noqa: BLE001 - from the archive, for whoever waits
-            self._error = error
-        finally:
-            self.over.set()
+            return Executed(calls.execute(self.backend, self.trial, self.recorder, self.stop))
+        except Exception as error:  # noqa: BLE001 - likewise
+            return _failed(error)
 
-    def concluded(self, *, forced: bool = False) -> Executed:
-        """What came of it, once it is over. Raises what the archive raised."""
-        if self._error is not None:
-            raise self._error
-        if self._executed is None:
-            raise RuntimeError("not over yet")
-        return self.concluding(self._executed, forced=forced)
-
-    def concluding(self, executed: Executed, *, forced: bool = False) -> Executed:
-        """How it ended as the recorder has seen it, once the backend has said so."""
+    def concluded(self, executed: Executed, *, forced: bool = False) -> Executed:
+        """How it ended as the recorder has seen it."""
         ending = self.recorder.conclude(executed.ending, forced=forced)
         return replace(executed, ending=ending)
 
@@ -174,12 +159,6 @@ class _Attempt:
         """It did not come back, although the bench was made safe over its head."""
         ending = Ending(Outcome.FAULT, "it did not come back from the trial", safe_state)
         return Executed(self.recorder.conclude(ending, forced=True), gave_up=True)
-
-    def _execute(self) -> Executed:
-        try:
-            return Executed(foreign.execute(self.backend, self.trial, self.recorder, self.stop))
-        except Exception as error:  # noqa: BLE001 - likewise
-            return _failed(error)
 
 
 def _failed(error: BaseException) -> Executed:
@@ -200,13 +179,12 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
     """
     patience, clock = supervision.patience, supervision.clock
     recorder = attempt.recorder
-    thread = threading.Thread(target=attempt.run, name="bench", daemon=True)
     silence = SilenceWatch(patience.asleep, clock())
-    thread.start()
+    call = Call(attempt.execute, "bench")
     found: float | None = None  # when the trial turned out to be over
     forced: float | None = None  # when the bench had been made safe over the backend's head
     safe_state = SafeState.NOT_CONFIRMED
-    while not attempt.over.wait(patience.tick):
+    while not call.has_ended(patience.tick):
         HEARTBEAT.beat()
         silent = silence.look(clock(), recorder.heard)
         if recorder.verdict is None and silent > _allowed(attempt, supervision):
@@ -220,7 +198,7 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
             safe_state = _made_safe(attempt.backend)
         elif forced is not None and clock() - forced > patience.giving_up:
             return attempt.abandoned(safe_state)
-    executed = attempt.concluded(forced=forced is not None)
+    executed = attempt.concluded(call.answer(), forced=forced is not None)
     if recorder.verdict is None:
         if executed.ending.safe_state is not SafeState.CONFIRMED:
             # Measuring and archiving take their time. The ending stays as the backend told it:
@@ -241,6 +219,6 @@ def _allowed(attempt: _Attempt, supervision: Supervision) -> float:
 
 def _made_safe(backend: Backend) -> SafeState:
     try:
-        return foreign.make_safe(backend)
+        return calls.make_safe(backend)
     except Exception:  # noqa: BLE001 - not seen safe; the runner asks again, and says why
         return SafeState.NOT_CONFIRMED

@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from itertools import islice
 
+from campaign.backends.calls import called
 from campaign.backends.interface import Backend, ExecutesTogether
-from campaign.execution.foreign import called
 from campaign.trial import Trial
 
 LOOK_AHEAD = 512

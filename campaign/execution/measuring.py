@@ -7,15 +7,16 @@ disk before: nothing that goes wrong here costs it, and an analysis measures wha
 from __future__ import annotations
 
 import math
-import threading
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import campaign
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.measured import Measured
 from campaign.axis_kind import sides_in, speaking_of, words_here
+from campaign.backends.calls import Call
 from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
@@ -54,18 +55,10 @@ class Measuring:
 
     def _in_time(self, data: ArchivedTrial) -> Measured:
         """In a thread of its own, since nothing else can be left behind when it hangs."""
-        found: list[Measured] = []
-
-        def work() -> None:
-            found.append(self._measured(data))
-
-        working = threading.Thread(target=work, name="measuring", daemon=True)
-        working.start()
-        working.join(self.limit)
-        if found:
-            return found[0]
-        hangs = f"measuring did not end within {self.limit:g} s"
-        return Measured(problem=hangs if working.is_alive() else "measuring broke off")
+        call = Call(partial(self._measured, data), "measuring")
+        if call.has_ended(self.limit):
+            return call.answer()
+        return Measured(problem=f"measuring did not end within {self.limit:g} s")
 
     def _measured(self, data: ArchivedTrial) -> Measured:
         try:

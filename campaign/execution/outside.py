@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from campaign.backends import calls
 from campaign.backends.interface import Backend, StoppedOutside
-from campaign.execution import foreign
 from campaign.execution.safety import describe
 from campaign.execution.stop import StopSwitch
 from campaign.recording import PanicStop
@@ -50,7 +50,7 @@ class OutsideWatch:
         if self._bench is None or self.stop is not None:
             return
         try:
-            stop = foreign.panic_stop(self._bench)
+            stop = calls.panic_stop(self._bench)
         except Exception as error:  # noqa: BLE001 - who cannot be asked may have been stopped
             self._switch.request(f"the bench, which cannot be asked: {describe(error)}")
             return

@@ -7,13 +7,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from campaign.backends import calls
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution import foreign
 from campaign.execution.naming import how_to_go_on
 from campaign.recording import SafeState
 
 SAFE = "safe state confirmed: the bench is at rest with its drive off"
+LET_GO = "the backend could not let go of the bench"
 NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
 
 
@@ -67,14 +68,10 @@ def safe_afterwards(backend: Backend, ended: Ended) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        make_safe(backend, ended)
         go_on = f"; {how_to_go_on(ended.kept)}" if ended.kept else ""
         kept = f"; the finished trials are in {ended.kept}" if ended.kept else ""
         raise AbortedError(f"stopped at once{kept}{go_on}") from None
-    except BaseException:
-        make_safe(backend, ended)
-        raise
-    else:
+    finally:
         make_safe(backend, ended)
 
 
@@ -98,22 +95,22 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
     its error goes on and `tell` is told of the other.
     """
     try:
-        entered = foreign.connect(backend)
-    except foreign.HangsError:
+        entered = calls.connect(backend)
+    except calls.HangsError:
         with safe_when_broken_off(backend):  # it may have begun to move
             raise
     try:
         yield entered
     except BaseException as error:
         try:
-            foreign.leave(backend, error)
+            calls.leave(backend, error)
         except Exception as second:  # noqa: BLE001 - the first one says more
-            tell(f"and {_let_go(second)}")
+            tell(f"and {LET_GO}: {describe(second)}")
         raise
     try:
-        foreign.leave(backend, None)
+        calls.leave(backend, None)
     except Exception as error:
-        raise BackendError(_let_go(error)) from error
+        raise BackendError(f"{LET_GO}: {describe(error)}") from error
 
 
 def safe_at_once(backend: Backend) -> ExitCode:
@@ -128,7 +125,7 @@ def make_safe(backend: Backend, ended: Ended) -> None:
     ended.safe_state = SafeState.NOT_CONFIRMED
     ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off
     try:
-        ended.safe_state = foreign.make_safe(backend)
+        ended.safe_state = calls.make_safe(backend)
     except KeyboardInterrupt:
         ended.unsafe = "making the bench safe was interrupted"
         raise
@@ -146,11 +143,7 @@ def describe(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
-def _let_go(error: Exception) -> str:
-    return f"the backend could not let go of the bench: {describe(error)}"
-
-
 def _why(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "the run was stopped at once"
-    return str(error) if isinstance(error, CampaignError) else f"internal error: {describe(error)}"
+    return f"{'' if isinstance(error, CampaignError) else 'internal error: '}{describe(error)}"

@@ -19,11 +19,11 @@ from campaign.archive.layout.followed import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.axis_kind import each_speaking_of
+from campaign.backends import calls
 from campaign.backends.interface import Backend
 from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
 from campaign.estimate import Estimate
-from campaign.execution import foreign
 from campaign.execution.safety import describe
 from campaign.experiments.interface import (
     Experiment,
@@ -197,9 +197,9 @@ def refusal_of(backend: Backend) -> Refusal:
     """Why `backend`, once it is connected, does not execute a trial."""
 
     def why(trial: Trial) -> str:
-        if reason := foreign.refusal(backend, trial):
+        if reason := calls.refusal(backend, trial):
             return reason
-        known = foreign.channels(backend, trial) if trial.requires else None
+        known = calls.channels(backend, trial) if trial.requires else None
         lacking = () if known is None else missing(trial.requires, known)
         return f"it requires {', '.join(lacking)}, and that is not recorded" if lacking else ""
 

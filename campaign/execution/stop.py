@@ -20,15 +20,17 @@ from types import FrameType
 from typing import NoReturn
 
 from campaign import interrupts
+from campaign.backends.calls import HEARTBEAT
 from campaign.backends.interface import BackendKind
 from campaign.errors import ExitCode, UsageError
-from campaign.execution.foreign import HEARTBEAT
 from campaign.execution.guardian import (
+    BEAT,
     CONNECTED,
     LEAVING,
     MAKING_SAFE,
     NOTE,
     OURS,
+    REST,
     STOPPER,
     VARIABLE,
     Asked,
@@ -159,7 +161,7 @@ class StopSwitch:
             if guardian:
                 self._tell(bytes((CONNECTED,)))
                 stack.callback(self._tell, bytes((LEAVING,)))
-                HEARTBEAT.tell = self._tell
+                HEARTBEAT.tell = lambda more: self._tell(bytes((BEAT if more else REST,)))
             if os.name == "posix":
                 to = guardian.tell if guardian else back
                 before_it = signal.set_wakeup_fd(to, warn_on_full_buffer=False)

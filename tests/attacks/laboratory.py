@@ -211,7 +211,7 @@ class Here:
 
     def limit(self, name: str, seconds: float = 0.2) -> None:
         """How long a call of foreign code may take."""
-        self._monkeypatch.setattr(f"campaign.execution.foreign.{name}", seconds)
+        self._monkeypatch.setattr(f"campaign.backends.calls.{name}", seconds)
 
     def attacked(
         self, at: str, do: str, backend: str = "hostile", protocol: str = "moves.toml"

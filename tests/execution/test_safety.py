@@ -11,8 +11,9 @@ from types import TracebackType
 
 import pytest
 
+from campaign.backends import calls
+from campaign.backends.interface import BackendKind, Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
-from campaign.execution import foreign
 from campaign.execution.safety import (
     NOT_SAFE,
     AbortedError,
@@ -26,6 +27,7 @@ from campaign.execution.safety import (
     safe_when_broken_off,
     unsafe_first,
 )
+from campaign.options import Options
 from campaign.recording import SafeState
 from tests.execution.fakes import FakeBackend
 
@@ -264,7 +266,7 @@ def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Hanging]]
         return made[-1]
 
     for limit in ("CONNECTING", "MAKING_SAFE", "LEAVING"):
-        monkeypatch.setattr(f"campaign.execution.foreign.{limit}", 0.05)
+        monkeypatch.setattr(f"campaign.backends.calls.{limit}", 0.05)
     yield make
     for each in made:
         each.let_go.set()
@@ -305,13 +307,25 @@ def test_a_backend_that_does_not_let_go_is_left_behind(hanging: Callable[..., Ha
         pass
 
 
-@pytest.mark.parametrize("method", ["execute", "make_safe", "refuses", "channels"])
+@pytest.mark.parametrize("method", ["execute", "make_safe", "refuses", "__exit__"])
 def test_a_backend_that_lacks_a_method_is_refused_by_name(method: str) -> None:
     lacking = type("Lacking", (FakeBackend,), {method: None})()
-    with pytest.raises(BackendError, match=rf"the backend 'tx1' .*Lacking lacks {method}\(\)"):
-        foreign.opened(lacking, "tx1")
+    kind = BackendKind("tx1", "a drive", Options, lambda options: lacking, Source.HARDWARE)
+    with pytest.raises(BackendError, match=rf"^open\(\) of tests.*: it lacks {method}\(\)$"):
+        calls.opened(kind, Options())
 
 
 def test_an_exception_is_its_type_and_what_it_says() -> None:
     assert describe(ValueError("no")) == "ValueError: no"
     assert describe(ValueError()) == "ValueError"
+
+
+def test_what_hangs_is_not_called_again_until_it_has_ended(hanging: Callable[..., Hanging]) -> None:
+    backend = hanging("make safe")
+    assert safe_at_once(backend) is ExitCode.NOT_SAFE
+    assert safe_at_once(backend) is ExitCode.NOT_SAFE
+    assert backend.log == ["make safe"]
+    backend.let_go.set()
+    while safe_at_once(backend) is ExitCode.NOT_SAFE:
+        pass
+    assert backend.log.count("make safe") == 2

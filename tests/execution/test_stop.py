@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.execution.foreign import HEARTBEAT
+from campaign.backends.calls import HEARTBEAT
 from campaign.execution.guardian import OURS, SILENCE, Guardian
 from campaign.execution.safety import NOT_SAFE
 from campaign.execution.stop import GuardianPipes, StopSwitch
@@ -235,7 +235,7 @@ class FakeGuardian:
 def guardian() -> Iterator[FakeGuardian]:
     one = FakeGuardian()
     yield one
-    HEARTBEAT.tell = lambda data: None
+    HEARTBEAT.tell = lambda more: None
     for end in (one.back, one.told, one.pipes.tell):
         with suppress(OSError):
             os.close(end)

@@ -12,12 +12,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, Generic, TypeVar
 
 from campaign.backends.interface import Backend, BackendKind, StopFlag, StoppedOutside
 from campaign.entry_points import blamed, one_line, provider
 from campaign.errors import BackendError, CampaignError
-from campaign.execution.guardian import BEAT, REST
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, SafeState
@@ -41,42 +41,45 @@ class HangsError(BackendError):
 
 
 class Heartbeat:
-    """Signs of life to the guardian from the loops that watch a bench. Each sends its own: a thread
-    beside them would send while they hang.
+    """Signs of life from the loops that watch a bench. Each sends its own: a thread beside them
+    would send while they hang.
+
+    Attributes:
+        interval: s between two.
+        tell: where they go; False for the last one until a loop begins again.
     """
 
     interval = 0.5
-    """s between two."""
 
     def __init__(self) -> None:
-        self.tell: Callable[[bytes], None] = lambda data: None
+        self.tell: Callable[[bool], None] = lambda more: None
         self._loops, self._due = 0, 0.0
         self._counting = threading.Lock()
 
     @contextmanager
     def expected(self) -> Iterator[None]:
-        """Inside the block the guardian expects `beat`."""
+        """Inside the block somebody expects `beat`."""
         with self._counting:
             self._loops += 1
-            self.tell(bytes((BEAT,)))
+            self.tell(True)
         try:
             yield
         finally:
             with self._counting:
                 self._loops -= 1
                 if not self._loops:
-                    self.tell(bytes((REST,)))
+                    self.tell(False)
 
     def beat(self) -> None:
         """One turn of a loop; most turns send nothing."""
         now = time.monotonic()
         if now >= self._due:
             self._due = now + self.interval
-            self.tell(bytes((BEAT,)))
+            self.tell(True)
 
 
 HEARTBEAT = Heartbeat()
-"""Of this process, which has one guardian at most."""
+"""Of this process."""
 
 
 def opened(kind: BackendKind, options: Options) -> Backend:
@@ -172,29 +175,53 @@ def _asked(backend: Backend, method: str, trial: Trial) -> Any:
     return _within(LOOKING, backend, method, trial)
 
 
-def _within(limit: float, backend: object, method: str, *arguments: object) -> Any:
-    answers: list[Any] = []
-    errors: list[BaseException] = []
-    done = threading.Event()
+class Call(Generic[T]):
+    """A function at work in a thread that is left behind when it hangs."""
 
-    def work() -> None:
+    def __init__(self, work: Callable[[], T], name: str) -> None:
+        self._answers: list[T] = []
+        self._error: BaseException | None = None
+        self._done = threading.Event()
+        threading.Thread(target=self._run, args=(work,), name=name, daemon=True).start()
+
+    def _run(self, work: Callable[[], T]) -> None:
         try:
-            answers.append(called(backend, method, *arguments))
-        except BaseException as error:  # noqa: BLE001 - for whoever waits
-            errors.append(error)
+            self._answers.append(work())
+        except BaseException as error:  # noqa: BLE001 - for whoever asks for the answer
+            self._error = error
         finally:
-            done.set()
+            self._done.set()
 
-    threading.Thread(target=work, name=method, daemon=True).start()
+    def has_ended(self, timeout: float) -> bool:
+        """Wait for the end for so long (s)."""
+        return self._done.wait(timeout)
+
+    def answer(self) -> T:
+        """Once it has ended. Raises what the function raised."""
+        if self._error is not None:
+            raise self._error
+        return self._answers[0]
+
+
+_HANGING: dict[tuple[int, str], Call[Any]] = {}
+"""By backend and method: calls that exceeded their limit; each keeps its backend."""
+
+
+def _within(limit: float, backend: object, method: str, *arguments: object) -> Any:
+    """The answer of a method in time. One that hangs is not called again until it has ended."""
+    late = HangsError(f"{method}() of {_named(backend)} did not end within {limit:g} s")
+    hung = _HANGING.get((id(backend), method))
+    if hung is not None and not hung.has_ended(0.0):
+        raise late
+    call = Call(partial(called, backend, method, *arguments), method)
     end = time.monotonic() + limit
     with HEARTBEAT.expected():
-        while not done.wait(TICK):
+        while not call.has_ended(TICK):
             HEARTBEAT.beat()
             if time.monotonic() > end:
-                raise HangsError(f"{method}() of {_named(backend)} did not end within {limit:g} s")
-    if errors:
-        raise errors[0]
-    return answers[0]
+                _HANGING[id(backend), method] = call
+                raise late
+    return call.answer()
 
 
 def _typed(value: Any, wanted: type[T], backend: object, method: str) -> T:
