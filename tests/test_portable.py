@@ -57,7 +57,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("campaign/report/formats/pdf.py", "_end_all"): 'os.name == "posix"',
     ("campaign/device/line.py", "PtyStream.__init__"): "this system has no pseudo-terminals",
     ("campaign/execution/guardian.py", "main"): "POSIX",
-    ("campaign/execution/stop.py", "StopSwitch._guarded"): "POSIX",
+    ("campaign/execution/guardian.py", "_signals"): "POSIX",
 }
 """Where they are used all the same, and by which words one sees that it is known."""
 

@@ -123,7 +123,7 @@ class Guardian:
 
 
 def main(command: list[str]) -> int:
-    """Start `command` and watch until it has ended; the exit code."""
+    """Start `command` and watch until it has ended; the exit code. POSIX only."""
     come, back = os.pipe()
     told, tell = os.pipe()
     heard = _signals()
@@ -163,7 +163,7 @@ def main(command: list[str]) -> int:
 
 
 def _signals() -> int:
-    """Where the numbers of signals can be read from now on."""
+    """Where the numbers of signals can be read from now on. POSIX: Windows has no SIGCHLD."""
     numbers = [*ASKING, signal.SIGCHLD]
     if HANG_UP is not None and signal.getsignal(HANG_UP) is not signal.SIG_IGN:
         numbers.append(HANG_UP)
