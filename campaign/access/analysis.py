@@ -294,7 +294,7 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
         return result_of(experiment, data), ""
     except ArchiveError:
         raise
-    except Exception as error:  # noqa: BLE001 (one bad analysis must not cost the other tests)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 (must not cost the other tests)
         hint = MEASURE_ANEW if any(trial.estimates for trial in data.trials) else ""
         return Result(), f"the analysis failed: {one_line(error)}{hint}"
 

@@ -144,7 +144,7 @@ class Stages:
             found = self._follow(stage)
         except (TooMuchError, CampaignError) as error:
             reason = str(error)
-        except Exception as error:  # noqa: BLE001 - a bug in an experiment must not cost the run
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - must not cost the run
             reason = describe(error)
         what = (stage.test, stage.number, stage.name, stage.point)
         entry = trials_followed(utc_now(), *what, found.trials, found.refused, reason)

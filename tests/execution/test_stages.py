@@ -248,6 +248,16 @@ def test_a_stage_that_raises_costs_itself_and_is_told_and_kept() -> None:
     assert run.executed == [1, 2, 3, 5, 6, 7, 4, 8, 9, 10], "the stage after it is asked"
 
 
+def test_a_stage_that_leaves_the_program_costs_itself() -> None:
+    def leaves(data: TestData) -> Iterator[TrialRequest]:
+        raise SystemExit(0)
+
+    run = Run(asked=(leaves, three))
+    assert run().status is RunStatus.FAILED_TRIALS
+    assert run.archive.stages[0].reason == "SystemExit: 0"
+    assert run.executed[-1] == 10, "the stage after it is asked"
+
+
 def test_a_stage_without_end_is_left_as_soon_as_it_asks_for_too_much() -> None:
     taken: list[int] = []
 

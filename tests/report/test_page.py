@@ -259,6 +259,20 @@ def test_a_failing_analysis_is_one_line_and_costs_nobody_else(report: Report, pa
     assert "Friction torque over rate" in text
 
 
+def test_an_analysis_that_leaves_the_program_costs_its_test_only(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    def analyse(data: TestData) -> Result:
+        raise SystemExit(0)
+
+    kind = dataclasses.replace(made_up.EXPERIMENTS["velocity_map"], analyse=analyse)
+    run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
+    found = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind})
+    assert [each.partition(": ")[2] for each in found.problems] == [
+        "the analysis failed: SystemExit: 0"
+    ]
+
+
 def test_failed_trials_are_shown_with_their_reasons(page: Page) -> None:
     text = " ".join(page.words)
     assert text.count("current 93.1 A is over the limit of 90 A") == 3 + 1  # and on top, once
