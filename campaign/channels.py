@@ -331,7 +331,13 @@ def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[Channe
     """
     known = VOCABULARY.get(channel.name)
     unit = info(channel.name, mode, axis=axis_of(channel.name, sides)).unit if known else ""
-    if not unit or channel.unit == unit:  # none: also of a command in a mode that has no unit
+    # What a command is depends on the loop that was closed, in a recording perhaps another one.
+    of_commands = {UNITS[sides.load][quantity][0] for quantity, _, _ in COMMANDS.values()}
+    if (
+        not unit
+        or channel.unit == unit
+        or (channel.name == COMMAND and channel.unit in of_commands)
+    ):
         return channel, 1.0
     try:
         times = factor(channel.unit, unit)

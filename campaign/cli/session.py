@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, closing, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -137,6 +137,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     outcome: RunOutcome | None = None
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
+    here = Path.cwd()
     if isinstance(session.backend, Introduced):
         calls.called(session.backend, "introduce", session.folder.stem)
     if isinstance(session.backend, Timed):
@@ -144,10 +145,11 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
         with (
-            chdir("."),  # and back, wherever a plug-in has gone
+            chdir(here),  # and back, wherever a plug-in has gone
             StopSwitch(session.guardian).on_signals() as stop,
             connected(session.backend, print_warning) as backend,
         ):
+            os.chdir(here)
             stop.make_safe = partial(safe_at_once, backend)
             stopper = backend.stop_command if isinstance(backend, StoppedByCommand) else ()
             keep = partial(
@@ -169,8 +171,6 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             keep()
             with closing(writer), _saying_what_is_kept(writer.folder):
                 outcome = _execute(session, backend, writer, stop)
-                archive = session.folder.with_name(outcome.archive.name)
-                outcome = replace(outcome, archive=archive)  # as it was typed
     except BackendError as error:
         if outcome is None:
             raise

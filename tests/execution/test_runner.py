@@ -302,6 +302,7 @@ def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
     assert bench.archive.sealed is None
 
 
+@pytest.mark.usefixtures("heeding_ctrl_c")
 def test_a_stop_while_the_bench_is_made_safe_is_not_taken_for_safe():
     def interrupted() -> SafeState:
         _thread.interrupt_main()

@@ -86,6 +86,7 @@ def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState],
     assert ended.unsafe == why
 
 
+@pytest.mark.usefixtures("heeding_ctrl_c")
 def test_who_interrupts_making_safe_leaves_the_bench_unsafe() -> None:
     def interrupted() -> SafeState:
         _thread.interrupt_main()

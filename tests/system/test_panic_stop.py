@@ -29,7 +29,7 @@ from campaign.errors import ExitCode
 from campaign.wire.codes import Kind
 from tests.link.controllers import controller
 from tests.link.proxy import proxy
-from tests.system.user import campaign, command, environment, write
+from tests.system.user import campaign, children, command, environment, program_of, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -228,9 +228,10 @@ def test_while_the_host_hangs(tmp_path: Path, on: int) -> None:
     with bench(tmp_path, speed="1") as rig:
         process = rig.run()
         wait_for(lambda: rig.count("drive on") >= on, process)
-        os.kill(process.pid, signal.SIGSTOP)
+        program = program_of(process)
+        os.kill(program, signal.SIGSTOP)
         rig.stop()
-        os.kill(process.pid, signal.SIGCONT)
+        os.kill(program, signal.SIGCONT)
         rig.judged(process, began=True)
 
 
@@ -272,13 +273,14 @@ def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Pa
         sleeper = first.run()
         lines = iter(sleeper.stderr.readline, "")
         assert any("the bench rests" in line for line in lines)
-        relays = [int(text) for text in children(sleeper.pid)]
-        for pid in (sleeper.pid, *relays):
+        program = program_of(sleeper)
+        pids = (sleeper.pid, program, *children(program))
+        for pid in pids:
             os.kill(pid, signal.SIGSTOP)
         time.sleep(2.0)  # longer than the controller waits for a heartbeat
         other = second.run()
         wait_for(lambda: log.read_text().count("drive on") == 2, other)
-        for pid in (sleeper.pid, *relays):
+        for pid in pids:
             os.kill(pid, signal.SIGCONT)
         sleeper.send_signal(signal.SIGINT)
         sleeper.communicate(timeout=PATIENCE)
@@ -288,10 +290,6 @@ def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Pa
         other.send_signal(signal.SIGINT)
         out, err = other.communicate(timeout=PATIENCE)
         assert open_run(second.folder / out.splitlines()[-1]).reason == "stopped by Ctrl-C", err
-
-
-def children(pid: int) -> list[str]:
-    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
 
 
 # What is done about it
@@ -361,9 +359,10 @@ def test_a_second_host_is_told_who_holds_it_and_disturbs_nothing(tmp_path: Path)
         process = rig.run()
         wait_for(lambda: rig.count("drive on") == 1, process)
         second = campaign(tmp_path, "run", "protocol.toml", *ON, "--port", rig.port, code=3)
-        assert f"pid {process.pid}" in second.err
+        program = program_of(process)
+        assert f"pid {program}" in second.err
         status = campaign(tmp_path, "status", "--port", rig.port).out
-        assert f"pid {process.pid}, run " in status
+        assert f"pid {program}, run " in status
         assert rig.count("drive off") == 0
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
@@ -412,11 +411,12 @@ def at_random(rig: Bench, how: str, chance: random.Random) -> None:
     if process.poll() is not None:
         process.communicate(timeout=PATIENCE)
         return
+    program = program_of(process)
     if how == "hang":
-        os.kill(process.pid, signal.SIGSTOP)
+        os.kill(program, signal.SIGSTOP)
         time.sleep(chance.uniform(0.0, 0.5))
     rig.stop()
-    os.kill(process.pid, signal.SIGCONT)
+    os.kill(program, signal.SIGCONT)
     out, err = process.communicate(timeout=PATIENCE)
     rig.never_on_after_a_stop()
     assert process.returncode in (130, 0), (out, err)

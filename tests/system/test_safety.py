@@ -21,7 +21,7 @@ from campaign.link.safe import SafeWatch, is_safe, query_frame
 from campaign.recording import Outcome
 from campaign.wire.messages import State, Status
 from tests.link.controllers import controller
-from tests.system.user import campaign, command, environment, write
+from tests.system.user import campaign, command, environment, program_of, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -133,20 +133,36 @@ def test_ctrl_c_ends_in_the_safe_state(tmp_path: Path) -> None:
 
 def test_a_killed_host_leaves_a_safe_bench(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
+        os.kill(program_of(process), signal.SIGKILL)
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, out) == (5, ""), err
+        assert "\nthe program died: signal 9\nSAFE STATE NOT CONFIRMED" in err
+        assert err.endswith("\nsafe state confirmed\n"), "what `campaign stop` says"
+        assert is_safe(status_of(port))
+        (partial,) = (tmp_path / "results").glob("*.partial")
+        again = ("resume", partial.stem, "--yes")
+        assert "campaign stop" in campaign(tmp_path, *again, code=3).err
+        campaign(tmp_path, *again, "--clear-stop", "1")
+
+
+def test_a_host_whose_guardian_is_killed_stops_in_order(tmp_path: Path) -> None:
+    with controller(*PATIENT) as port, running(tmp_path, port) as process:
         process.kill()
-        process.wait()
-        deadline = time.monotonic() + 10
-        while not is_safe(status_of(port)):
-            assert time.monotonic() < deadline
+        out, err = process.communicate(timeout=60)  # the program has the pipes still
+        run = open_run(tmp_path / out.splitlines()[-1])
+        assert run.reason == "stopped by the death of its guardian process", err
+        assert run.safe_state.value == "confirmed"
+        assert is_safe(status_of(port))
 
 
 def test_the_panic_stop_works_while_the_host_hangs(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
-        os.kill(process.pid, signal.SIGSTOP)
+        program = program_of(process)
+        os.kill(program, signal.SIGSTOP)
         assert campaign(tmp_path, "stop", "--port", port).out == "safe state confirmed\n"
         # In state FAULT on a machine so busy that heartbeats were late, which is as safe.
         assert is_safe(status_of(port))
-        os.kill(process.pid, signal.SIGCONT)
+        os.kill(program, signal.SIGCONT)
         out, err = process.communicate(timeout=60)
         assert process.returncode == 130, err  # somebody stood there
         run = open_run(tmp_path / out.splitlines()[-1])

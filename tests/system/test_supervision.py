@@ -17,7 +17,7 @@ from campaign.recording import Fault, Outcome, SafeState
 from campaign.wire.messages import State
 from tests.link.controllers import controller
 from tests.system.test_safety import status_of
-from tests.system.user import command, environment, write
+from tests.system.user import command, environment, program_of, write
 
 WILD = """
 import threading, time
@@ -146,9 +146,10 @@ def test_a_host_that_sleeps_does_not_take_that_for_the_silence_of_the_bench(tmp_
                 assert process.poll() is None, process.stderr.read()
                 assert time.monotonic() < deadline
             time.sleep(1.0)
-            os.kill(process.pid, signal.SIGSTOP)
+            program = program_of(process)
+            os.kill(program, signal.SIGSTOP)
             time.sleep(6.5)
-            os.kill(process.pid, signal.SIGCONT)
+            os.kill(program, signal.SIGCONT)
             out, err = process.communicate(timeout=60)
         finally:
             process.kill()

@@ -69,3 +69,14 @@ def write(folder: Path, text: str, name: str = "protocol.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def children(pid: int) -> list[int]:
+    """Processes that `pid` has begun."""
+    return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def program_of(process: subprocess.Popen[str]) -> int:
+    """The program that moves a bench: what was begun is its guardian."""
+    (program,) = children(process.pid)
+    return program

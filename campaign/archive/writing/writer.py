@@ -47,7 +47,8 @@ class RunWriter:
         from campaign.archive.writing.sealing import Sealer
 
         self.timing: Timing = UNTIMED
-        self._folder = folder
+        self._shown = folder  # as it was typed
+        self._folder = folder.absolute()  # whatever folder a plug-in goes to
         self._journal = journal
         self._run_lock = lock
         self._lock = threading.Lock()
@@ -55,7 +56,7 @@ class RunWriter:
         self._last: dict[int, TrialFinished] = {}
         self._measured: dict[str, TrialMeasured] = {}
         self._told: tuple[Entry, ...] = ()
-        self._sealer = Sealer(folder)
+        self._sealer = Sealer(self._folder)
 
     @classmethod
     def create(
@@ -68,7 +69,7 @@ class RunWriter:
         Raises:
             UsageError: the folder cannot be made or written, or has a run of that name.
         """
-        folder = results.absolute() / f"{header.name}{PARTIAL}"
+        folder = results / f"{header.name}{PARTIAL}"
         try:
             results.mkdir(parents=True, exist_ok=True)
             lock = lock or RunLock.acquire(results, header.name)
@@ -111,7 +112,7 @@ class RunWriter:
             UsageError: there is nothing to go on with, or another process writes the run.
             ArchiveError: the run is damaged, named by file, or cannot be written. It is as it was.
         """
-        folder, story, journal, lock = reopen(path.absolute())
+        folder, story, journal, lock = reopen(path)
         writer = cls(folder, journal, lock)
         writer._last = dict(story.finished)
         for finished in story.files:
@@ -136,7 +137,7 @@ class RunWriter:
     @property
     def folder(self) -> Path:
         """Where the run lies while it is in progress."""
-        return self._folder
+        return self._shown
 
     @property
     def finished(self) -> Mapping[int, Outcome]:
@@ -214,7 +215,7 @@ class RunWriter:
             self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
             with self.timing.span(Work.SEALING):
-                return self._sealer.seal()
+                return self._shown.with_name(self._sealer.seal().name)
         finally:
             self.close()
 
