@@ -78,7 +78,7 @@ def under_guardian(kind: BackendKind) -> GuardianPipes | None:
         pipes = GuardianPipes(*map(int, given.split(",")))
         for end in (pipes.come, pipes.back, pipes.tell):
             os.set_inheritable(end, False)
-        os.set_blocking(pipes.tell, False)
+        os.set_blocking(pipes.tell, False)  # POSIX: no other system has a guardian
         return pipes
     if interrupts.is_program():
         _begin_anew(kind)
@@ -153,7 +153,6 @@ class StopSwitch:
         guardian = self._guardian
         with ExitStack() as stack:
             come, back = (guardian.come, guardian.back) if guardian else os.pipe()
-            os.set_blocking(back, False)
             watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
             watcher.start()
             stack.callback(watcher.join, _ENDING if guardian else None)
@@ -163,6 +162,7 @@ class StopSwitch:
                 stack.callback(self._tell, bytes((LEAVING,)))
                 HEARTBEAT.tell = lambda more: self._tell(bytes((BEAT if more else REST,)))
             if os.name == "posix":
+                os.set_blocking(back, False)
                 to = guardian.tell if guardian else back
                 before_it = signal.set_wakeup_fd(to, warn_on_full_buffer=False)
                 stack.callback(signal.set_wakeup_fd, before_it)
