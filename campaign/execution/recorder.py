@@ -115,23 +115,12 @@ class SupervisingRecorder:
 
     def lost(self, time: Array) -> None:
         """Samples that the backend names as lost: NaN, an event, and no `undefined`."""
-        time = np.asarray(time, dtype=np.float64)
-        if not len(time):
-            return
-        with self._writing:
-            if self._is_over():
-                return
-            self._file.event(lost_samples(self._samples, time))
-        self._lost += len(time)
         self._hand_over(time, None)
 
     def event(self, event: Event) -> None:
         with self._writing:
             if not self._closed:
-                at = float(event.time)
-                event = Event(at if math.isfinite(at) else 0.0, storable(event.text))
-                self._events.append(event)
-                self._file.event(event)
+                self._note(event)
 
     # What the runner calls
 
@@ -197,10 +186,19 @@ class SupervisingRecorder:
             self._pace.handed_over(self.heard, float(time[0]), float(time[-1]))
             good = self._judge(time, samples, was_lost=block is None)
             time, samples = time[:good], samples[:, :good]
+            if block is None and good:
+                self._note(lost_samples(self._samples, time))
+                self._lost += good
             self._file.append(time, samples)
             self._samples += good
             self._tell(time, samples)
         self.heard = self._supervision.clock()  # the disk's time is not the bench's
+
+    def _note(self, event: Event) -> None:
+        at = float(event.time)
+        event = Event(at if math.isfinite(at) else 0.0, storable(event.text))
+        self._events.append(event)
+        self._file.event(event)
 
     def _is_over(self) -> bool:
         return self.verdict is not None or self._closed

@@ -460,7 +460,9 @@ def test_when_the_archive_fails_the_other_trials_end_before_the_bench_is_made_sa
     before = set(threading.enumerate())
     with pytest.raises(ArchiveError, match="no space left"):
         bench.run(workers=2)
-    assert not set(threading.enumerate()) - before
+    for idle in set(threading.enumerate()) - before:
+        idle.join(10)
+        assert not idle.is_alive()
     assert bench.backend.log == ["trial-00001", "ended", "made safe"]
 
 
