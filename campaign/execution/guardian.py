@@ -141,9 +141,7 @@ def main(command: list[str]) -> int:
         if now - looked > 3 * TURN:
             guardian.slept(now)
         looked = now
-        moved, signals = guardian.moves, guardian.feed(_read(told), now)
-        if moved and not guardian.moves:
-            os.close(back)  # the end of what is handed on
+        signals = guardian.feed(_read(told), now)
         sent = [number for number in _read(heard) if number != signal.SIGCHLD]
         if guardian.moves:
             signals += b"".join(guardian.hear(OURS + number, now) for number in sent)

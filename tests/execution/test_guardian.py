@@ -241,6 +241,20 @@ def test_who_owes_none_may_take_its_time(before: str) -> None:
 
 
 @on_posix
+def test_the_sleep_of_both_is_no_silence() -> None:
+    """A signal stops them together, as a laptop that is closed does."""
+    does = "say(CONNECTED, BEAT); ready(); sys.stdin.readline(); say(LEAVING)"
+    watched = Watched(does, SILENCE=2.0, TURN=0.1)
+    watched.until_ready()
+    os.killpg(watched.process.pid, signal.SIGSTOP)
+    time.sleep(2.3)
+    os.killpg(watched.process.pid, signal.SIGCONT)
+    time.sleep(0.3)
+    watched.process.stdin.write("\n")
+    assert watched.end() == (0, "", "")
+
+
+@on_posix
 def test_the_controller_of_a_program_that_died_is_stopped_by_its_own_command() -> None:
     stopper = [sys.executable, "-c", "import sys; print('stopped', sys.argv[1:])", "a b", "c"]
     does = f"note(STOPPER, b'\\0'.join({[each.encode() for each in stopper]!r}))"

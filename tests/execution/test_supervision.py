@@ -12,6 +12,7 @@ import pytest
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.measured import Measure, Measured
+from campaign.backends.calls import HEARTBEAT
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
@@ -135,6 +136,41 @@ def test_a_good_live_trial_is_left_alone(lab: Callable[..., Lab]) -> None:
     assert bench.run().status is RunStatus.COMPLETE
     assert bench.backend.log == ["begins", "returns", "made safe"]
     assert bench.archive.endings[1].telemetry["longest_gap_s"] == 0.0
+
+
+@pytest.fixture
+def signs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Signs of life as they are sent: whether another one follows."""
+    sent: list[bool] = []
+    monkeypatch.setattr(HEARTBEAT, "tell", sent.append)
+    monkeypatch.setattr(HEARTBEAT, "interval", 0.0)
+    return sent
+
+
+def test_the_loop_that_watches_a_trial_sends_signs_of_life(
+    lab: Callable[..., Lab], signs: list[bool]
+) -> None:
+    def waits(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        hand_over(recorder, 0, 20)
+        first = len(signs)
+        for _ in range(5000):
+            if len(signs) >= first + 3:
+                return COMPLETED
+            live.released.wait(0.001)
+        return INTERRUPTED
+
+    assert lab(waits, 1).run().status is RunStatus.COMPLETE
+    assert signs[-1] is False
+
+
+def test_so_does_one_that_waits_for_an_answer(
+    lab: Callable[..., Lab], signs: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("campaign.backends.calls.MAKING_SAFE", 1.0)
+    bench = lab(lambda live, recorder, stop: hand_over(recorder, 0, 20) or COMPLETED, 1)
+    monkeypatch.setattr(bench.backend, "make_safe", lambda: bench.backend.released.wait() and None)
+    assert bench.run().exit_code is ExitCode.NOT_SAFE
+    assert signs[-4:] == [True, True, True, False]
 
 
 @pytest.mark.parametrize("breaks", [False, True])
