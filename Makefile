@@ -74,6 +74,7 @@ $(NPM)/.package-lock.json: tests/browser/package.json tests/browser/package-lock
 	@touch $@
 
 $(VENV)/installed-mutants: $(VENV)/installed-test
+	$(PIP) install $(PINNED) wheel  # what an old setuptools needs to build one of them
 	$(PIP) install $(PINNED) --no-build-isolation --editable ".[mutants]"
 	@touch $@
 

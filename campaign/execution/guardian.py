@@ -141,7 +141,9 @@ def main(command: list[str]) -> int:
         if now - looked > 3 * TURN:
             guardian.slept(now)
         looked = now
-        signals = guardian.feed(_read(told), now)
+        moved, signals = guardian.moves, guardian.feed(_read(told), now)
+        if moved and not guardian.moves:
+            os.close(back)  # the end of what is handed on
         sent = [number for number in _read(heard) if number != signal.SIGCHLD]
         if guardian.moves:
             signals += b"".join(guardian.hear(OURS + number, now) for number in sent)

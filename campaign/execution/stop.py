@@ -48,6 +48,8 @@ _PIECE = 4096
 """bytes read at a time."""
 _OWN = 128
 """Added to a signal's number by our own handler; the C handler of Python writes the plain ones."""
+_ENDING = 1.0
+"""s in which a guardian that runs lets go of its end of the pipe."""
 
 
 @dataclass(frozen=True)
@@ -153,8 +155,7 @@ class StopSwitch:
             come, back = (guardian.come, guardian.back) if guardian else os.pipe()
             watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
             watcher.start()
-            if not guardian:  # which has this end as well, and hands nothing on after `LEAVING`
-                stack.callback(watcher.join)
+            stack.callback(watcher.join, _ENDING if guardian else None)
             stack.callback(os.close, back)  # the watcher ends by it
             if guardian:
                 self._tell(bytes((CONNECTED,)))

@@ -12,7 +12,8 @@ import pytest
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.measured import Measure, Measured
-from campaign.backends.calls import HEARTBEAT
+from campaign.backends import calls
+from campaign.backends.calls import HEARTBEAT, Heartbeat
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
@@ -171,6 +172,25 @@ def test_so_does_one_that_waits_for_an_answer(
     monkeypatch.setattr(bench.backend, "make_safe", lambda: bench.backend.released.wait() and None)
     assert bench.run().exit_code is ExitCode.NOT_SAFE
     assert signs[-4:] == [True, True, True, False]
+
+
+def test_signs_of_life_end_with_the_last_loop_and_are_not_sent_at_every_turn() -> None:
+    sent: list[bool] = []
+    one = Heartbeat()
+    one.tell, one.interval = sent.append, LONG
+    with one.expected():
+        with one.expected():
+            for _ in range(3):
+                one.beat()
+        assert sent == [True, True, True]
+    assert sent == [True, True, True, False]
+
+
+def test_whatever_hangs_is_told_within_40_s() -> None:
+    waits = Patience()
+    trial = max(waits.first, waits.silence, waits.closing, waits.grace) + waits.giving_up
+    assert trial + calls.MAKING_SAFE + calls.LEAVING <= 40
+    assert calls.CONNECTING + calls.MAKING_SAFE + calls.LEAVING <= 40
 
 
 @pytest.mark.parametrize("breaks", [False, True])
