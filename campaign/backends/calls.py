@@ -15,7 +15,13 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from campaign.backends.interface import Backend, BackendKind, StopFlag, StoppedOutside
+from campaign.backends.interface import (
+    Backend,
+    BackendKind,
+    StopFlag,
+    StoppedByCommand,
+    StoppedOutside,
+)
 from campaign.entry_points import blamed, one_line, provider
 from campaign.errors import BackendError, CampaignError
 from campaign.options import Options
@@ -84,19 +90,15 @@ HEARTBEAT = Heartbeat()
 
 def opened(kind: BackendKind, options: Options) -> Backend:
     """A backend of `kind`. This and all below raise BackendError."""
-    try:
-        backend: object = kind.open(options)
-    except BaseException as error:
-        raise as_fault(error, kind.open, "open") from error
+    backend = _blaming(lambda: kind.open(options), kind.open, "open")
     if kind.stopped_outside:
         _typed(backend, StoppedOutside, kind.open, "open")  # type: ignore[type-abstract]
     return _typed(backend, Backend, kind.open, "open")  # type: ignore[type-abstract]
 
 
-def connect(backend: Backend) -> Backend:
-    """Enter `backend`. Raises HangsError, too."""
-    entered = _within(CONNECTING, backend, "__enter__")
-    return _typed(entered, Backend, backend, "__enter__")  # type: ignore[type-abstract]
+def connect(backend: Backend) -> None:
+    """Enter `backend`, which stays the same, whatever that returns. Raises HangsError, too."""
+    _within(CONNECTING, backend, "__enter__")
 
 
 def leave(backend: Backend, error: BaseException | None) -> None:
@@ -117,8 +119,16 @@ def panic_stop(backend: StoppedOutside) -> PanicStop | None:
         return None
     stop = _typed(stop, PanicStop, backend, "panic_stop")
     count = _typed(stop.count, int, backend, "panic_stop")
-    age = stop.age if isinstance(stop.age, float) and math.isfinite(stop.age) else None
-    return PanicStop(count, storable(stop.by), age)
+    known = isinstance(stop.age, int | float) and math.isfinite(stop.age)
+    return PanicStop(count, storable(stop.by), stop.age if known else None)
+
+
+def stop_command(backend: Backend) -> tuple[str, ...]:
+    """What stops the bench when this program has died; empty where nothing does."""
+    if not isinstance(backend, StoppedByCommand):
+        return ()
+    command = _typed(_within(LOOKING, backend, "stop_command"), tuple, backend, "stop_command")
+    return tuple(_typed(word, str, backend, "stop_command") for word in command)
 
 
 def refusal(backend: Backend, trial: Trial) -> str:
@@ -149,8 +159,12 @@ def checked_ending(ending: Any, backend: object) -> Ending:
 
 def called(backend: object, method: str, *arguments: object) -> Any:
     """The answer of a method that needs no limit."""
+    return _blaming(lambda: getattr(backend, method)(*arguments), backend, method)
+
+
+def _blaming(work: Callable[[], Any], backend: object, method: str) -> Any:
     try:
-        return getattr(backend, method)(*arguments)
+        return work()
     except BaseException as error:
         if (fault := as_fault(error, backend, method)) is error:
             raise
@@ -214,14 +228,13 @@ def _within(limit: float, backend: object, method: str, *arguments: object) -> A
     if hung is not None and not hung.has_ended(0.0):
         raise late
     call = Call(partial(called, backend, method, *arguments), method)
-    end = time.monotonic() + limit
     with HEARTBEAT.expected():
-        while not call.has_ended(TICK):
+        for _ in range(round(limit / TICK)):  # the sleep of this program does not count
+            if call.has_ended(TICK):
+                return call.answer()
             HEARTBEAT.beat()
-            if time.monotonic() > end:
-                _HANGING[id(backend), method] = call
-                raise late
-    return call.answer()
+    _HANGING[id(backend), method] = call
+    raise late
 
 
 def _typed(value: Any, wanted: type[T], backend: object, method: str) -> T:

@@ -98,7 +98,6 @@ class StoppedOutside(Introduced, Protocol):
 class StoppedByCommand(Protocol):
     """What a backend has besides when another process can stop its bench, should this one die."""
 
-    @property
     def stop_command(self) -> tuple[str, ...]:
         """The program and its arguments. It ends within some seconds and says what it saw."""
 

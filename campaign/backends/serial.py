@@ -103,7 +103,6 @@ class SerialBackend:
     def __exit__(self, *exception: object) -> None:
         self._disconnect()
 
-    @property
     def stop_command(self) -> tuple[str, ...]:
         """`campaign stop`, which needs no session."""
         baud = str(self._options.baud)

@@ -73,7 +73,11 @@ def _run() -> None:
 
 def _check_texts() -> None:
     """Raise UsageError where a name cannot be kept: archives and pages are UTF-8."""
-    for text in (*sys.argv[1:], str(Path.cwd())):
+    try:
+        here = str(Path.cwd())
+    except FileNotFoundError:
+        raise UsageError("the current folder was removed; change into another one") from None
+    for text in (*sys.argv[1:], here):
         try:
             text.encode()
         except UnicodeEncodeError:

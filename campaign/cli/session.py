@@ -18,7 +18,6 @@ from campaign.backends.interface import (
     Backend,
     BackendKind,
     Introduced,
-    StoppedByCommand,
     Timed,
 )
 from campaign.cli.ask import attendance_of
@@ -147,30 +146,29 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
         with (
             chdir(here),  # and back, wherever a plug-in has gone
             StopSwitch(session.guardian).on_signals() as stop,
-            connected(session.backend, print_warning) as backend,
         ):
-            os.chdir(here)
-            stop.make_safe = partial(safe_at_once, backend)
-            stopper = backend.stop_command if isinstance(backend, StoppedByCommand) else ()
+            stop.make_safe = partial(safe_at_once, session.backend)
             keep = partial(
                 stop.kept,
-                partial(_what_is_kept, session.folder),
+                partial(_what_is_kept, session.folder.absolute()),
                 moves=session.kind.live,
-                stopper=stopper,
+                stopper=calls.stop_command(session.backend),
             )
-            keep()  # there may be a folder before it is opened
-            with safe_when_broken_off(backend):
-                check_connected(session.kind, backend, session.left)
-                cleared = clear_stop(backend, session.clear_stop, stop)
-                writer = open_archive()
-                writer.timing = session.timing
-                if cleared:
-                    writer.decision("stop cleared", cleared)
-                if source:
-                    note_damaged(writer, source)
-            keep()
-            with closing(writer), _saying_what_is_kept(writer.folder):
-                outcome = _execute(session, backend, writer, stop)
+            keep()  # the bench may move from here on
+            with connected(session.backend, print_warning) as backend:
+                os.chdir(here)
+                with safe_when_broken_off(backend):
+                    check_connected(session.kind, backend, session.left)
+                    cleared = clear_stop(backend, session.clear_stop, stop)
+                    writer = open_archive()
+                    writer.timing = session.timing
+                    if cleared:
+                        writer.decision("stop cleared", cleared)
+                    if source:
+                        note_damaged(writer, source)
+                keep()
+                with closing(writer), _saying_what_is_kept(writer.folder):
+                    outcome = _execute(session, backend, writer, stop)
     except BackendError as error:
         if outcome is None:
             raise

@@ -182,7 +182,7 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
     silence = SilenceWatch(patience.asleep, clock())
     call = Call(attempt.execute, "bench")
     found: float | None = None  # when the trial turned out to be over
-    forced: float | None = None  # when the bench had been made safe over the backend's head
+    given_up: float | None = None  # when it is left behind: make_safe was called over its head
     safe_state = SafeState.NOT_CONFIRMED
     while not call.has_ended(patience.tick):
         HEARTBEAT.beat()
@@ -193,12 +193,13 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
             continue
         found = clock() if found is None else found
         waited = 0.0 if recorder.verdict.kind == "silence" else patience.grace
-        if forced is None and clock() - found >= waited:
-            forced = clock()
+        if given_up is None and clock() - found >= waited:
+            given_up = clock() + patience.giving_up
             safe_state = _made_safe(attempt.backend)
-        elif forced is not None and clock() - forced > patience.giving_up:
+            given_up = max(given_up, clock() + patience.grace)
+        elif given_up is not None and clock() > given_up:
             return attempt.abandoned(safe_state)
-    executed = attempt.concluded(call.answer(), forced=forced is not None)
+    executed = attempt.concluded(call.answer(), forced=given_up is not None)
     if recorder.verdict is None:
         if executed.ending.safe_state is not SafeState.CONFIRMED:
             # Measuring and archiving take their time. The ending stays as the backend told it:

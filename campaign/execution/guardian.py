@@ -164,7 +164,7 @@ def main(command: list[str]) -> int:
 
 def _signals() -> int:
     """Where the numbers of signals can be read from now on. POSIX: Windows has no SIGCHLD."""
-    numbers = [*ASKING, signal.SIGCHLD]
+    numbers = [*ASKING, signal.SIGCHLD, signal.SIGQUIT]  # Ctrl-\ ends the program, and not us
     if HANG_UP is not None and signal.getsignal(HANG_UP) is not signal.SIG_IGN:
         numbers.append(HANG_UP)
     heard, woken = os.pipe()
@@ -193,18 +193,26 @@ def _ended(status: int | None, guardian: Guardian, killed: str) -> int:
                 signal.signal(-status, signal.SIG_DFL)
             os.kill(os.getpid(), -status)
         return status
-    died = f"exit code {status}" if (status or 0) >= 0 else f"signal {-(status or 0)}"
-    os.write(2, f"\nthe program {killed or f'died: {died}'}\n".encode() + guardian.note + b"\n")
+    number = status or 0  # None: it was killed
+    died = f"exit code {number}" if number >= 0 else f"signal {-number}"
+    _say(f"\nthe program {killed or f'died: {died}'}\n".encode() + guardian.note)
     if not guardian.stopper:
-        os.write(2, b"the backend could not be asked to make the bench safe\n")
+        _say(b"the backend could not be asked to make the bench safe")
         return NOT_SAFE
     command = guardian.stopper.split(b"\0")
-    os.write(2, b"stopping the controller: " + b" ".join(command) + b"\n")
-    with suppress(OSError, subprocess.TimeoutExpired):
+    _say(b"stopping the controller: " + b" ".join(command))
+    try:
         subprocess.run(  # noqa: S603 - the program's own command, no shell
-            command, stdin=subprocess.DEVNULL, stdout=2, timeout=STOPPING
+            command, stdin=subprocess.DEVNULL, stdout=2, timeout=STOPPING, start_new_session=True
         )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        _say(f"the controller was not stopped: {error}".encode())
     return NOT_SAFE
+
+
+def _say(line: bytes) -> None:
+    with suppress(OSError):  # nobody may be there to read it
+        os.write(2, line + b"\n")
 
 
 if __name__ == "__main__":

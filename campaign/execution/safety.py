@@ -9,6 +9,7 @@ from pathlib import Path
 
 from campaign.backends import calls
 from campaign.backends.interface import Backend
+from campaign.entry_points import one_line
 from campaign.errors import BackendError, CampaignError, ExitCode
 from campaign.execution.naming import how_to_go_on
 from campaign.recording import SafeState
@@ -95,12 +96,12 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
     its error goes on and `tell` is told of the other.
     """
     try:
-        entered = calls.connect(backend)
+        calls.connect(backend)
     except calls.HangsError:
         with safe_when_broken_off(backend):  # it may have begun to move
             raise
     try:
-        yield entered
+        yield backend
     except BaseException as error:
         try:
             calls.leave(backend, error)
@@ -138,9 +139,7 @@ def make_safe(backend: Backend, ended: Ended) -> None:
 
 def describe(error: BaseException) -> str:
     """An exception by its type and what it says; a message for the user as it is."""
-    if isinstance(error, CampaignError):
-        return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return str(error) if isinstance(error, CampaignError) else one_line(error)
 
 
 def _why(error: BaseException) -> str:

@@ -140,9 +140,8 @@ class StopSwitch:
         """
         self._note, self._moves = note, moves
         text = f"{NOT_SAFE if moves else ''}\n{note()}".strip()
-        for kind, said in ((NOTE, text), (STOPPER, "\0".join(stopper))):
-            data = said.encode(errors="replace")[:_LONGEST]
-            self._tell(bytes((kind,)) + len(data).to_bytes(2) + data)
+        self._tell_text(NOTE, text)
+        self._tell_text(STOPPER, "\0".join(stopper))
 
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
@@ -158,6 +157,7 @@ class StopSwitch:
             stack.callback(watcher.join, _ENDING if guardian else None)
             stack.callback(os.close, back)  # the watcher ends by it
             if guardian:
+                self._tell_text(NOTE, NOT_SAFE)  # until more is known
                 self._tell(bytes((CONNECTED,)))
                 stack.callback(self._tell, bytes((LEAVING,)))
                 HEARTBEAT.tell = lambda more: self._tell(bytes((BEAT if more else REST,)))
@@ -180,6 +180,10 @@ class StopSwitch:
                     if handler is not None:  # None: not set from Python, and not ours to put back
                         signal.signal(number, handler)
 
+    def _tell_text(self, kind: int, text: str) -> None:
+        data = text.encode(errors="replace")[:_LONGEST]
+        self._tell(bytes((kind,)) + len(data).to_bytes(2) + data)
+
     def _tell(self, data: bytes) -> None:
         if self._guardian is not None:
             try:
@@ -198,15 +202,14 @@ class StopSwitch:
     def _watch(self, come: int) -> None:
         """Count what each of those has heard who listen: the largest number is true."""
         heard = {0: Asked(), OURS: Asked(), _OWN: Asked()}
-        with suppress(OSError):
-            while data := os.read(come, _PIECE):
-                for byte in data:
-                    number = byte % OURS
-                    if number in _stopping_signals():  # others may have handlers, too
-                        heard[byte - number].add(number)
-                        self._ask(number)
-                if max(asked.times for asked in heard.values()) > 1:
-                    self._leave()
+        while data := os.read(come, _PIECE):
+            for byte in data:
+                number = byte % OURS
+                if number in _stopping_signals():  # others may have handlers, too
+                    heard[byte - number].add(number)
+                    self._ask(number)
+            if max(asked.times for asked in heard.values()) > 1:
+                self._leave()
         os.close(come)
 
     def _leave(self) -> NoReturn:
@@ -216,7 +219,10 @@ class StopSwitch:
         unsafe = code is ExitCode.NOT_SAFE
         state = f"{NOT_SAFE if unsafe else SAFE}\n" if unsafe or self._moves else ""
         cursor = _SHOW_CURSOR if sys.stderr is not None and sys.stderr.isatty() else ""
-        note = printable(self._note(), keep="\n")
+        try:
+            note = printable(self._note(), keep="\n")
+        except OSError as error:  # the disk of the results is gone
+            note = f"what was kept cannot be looked at: {error}"
         _say(f"{cursor}\n{state}{note}\n")
         self._tell(bytes((LEAVING,)))
         os._exit(code)

@@ -29,7 +29,8 @@ class Patience:
         silence: between two hand-overs of samples.
         closing: for `execute` to return once nothing more is to come: braking, coming to rest.
         grace: for `execute` to return once its stop flag was set, until `make_safe` is called.
-        giving_up: for `execute` to return once `make_safe` was called, until the trial is given up.
+        giving_up: for `execute` to return once `make_safe` was called, and at least `grace` after
+            its answer, until the trial is given up.
         tick: between two looks at the clock.
         asleep: a look that comes so late says that this program itself did not run: what was not
             heard meanwhile is nobody's silence.

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -262,6 +263,30 @@ def test_the_controller_of_a_program_that_died_is_stopped_by_its_own_command() -
     assert (code, out) == (5, "")
     assert err.endswith("\nstopped ['a b', 'c']\n")
     assert "could not be asked" not in err
+
+
+@on_posix
+def test_nothing_at_the_terminal_keeps_the_controller_from_being_stopped(tmp_path: Path) -> None:
+    """Standard error is gone; Ctrl-C does not reach the command."""
+    told = tmp_path / "told"
+    code = f"import os; open({str(told)!r}, 'w').write(str(os.getsid(0) == os.getpid()))"
+    does = f"note(STOPPER, b'\\0'.join([sys.executable.encode(), b'-c', {code.encode()!r}]))"
+    watched = Watched(f"{does}; say(CONNECTED); ready(); sys.stdin.readline(); os._exit(0)")
+    watched.until_ready()
+    watched.process.stderr.close()
+    watched.process.stdin.write("\n")
+    watched.process.stdin.close()
+    assert watched.process.wait(60) == 5
+    watched.process.stdout.close()
+    assert told.read_text(encoding="utf-8") == "True"
+
+
+@on_posix
+def test_a_program_that_quits_leaves_its_guardian_to_say_so() -> None:
+    watched = Watched("say(CONNECTED); ready(); time.sleep(60)")
+    watched.until_ready()
+    os.killpg(watched.process.pid, signal.SIGQUIT)
+    assert watched.end() == (5, "", DIED.format("signal 3"))
 
 
 @on_posix

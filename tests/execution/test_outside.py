@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import pytest
+
+from campaign.backends import calls
 from campaign.execution.outside import INTERVAL, OutsideWatch
 from campaign.execution.stop import StopSwitch
 from campaign.recording import PanicStop
@@ -96,3 +99,10 @@ def test_a_bench_that_nobody_else_can_switch_off_is_not_asked() -> None:
     assert watch.stop is None
     switch.request("Ctrl-C")
     assert watch()
+
+
+@pytest.mark.parametrize(("age", "known"), [(5, 5), (1.5, 1.5), (float("nan"), None), ("5", None)])
+def test_the_age_of_a_stop_is_a_number_or_not_known(age: object, known: float | None) -> None:
+    stop = PanicStop(3, "eve", age)  # type: ignore[arg-type]
+    backend = type("Stopped", (), {"panic_stop": lambda self: stop})()
+    assert calls.panic_stop(backend) == PanicStop(3, "eve", known)

@@ -29,7 +29,7 @@ from campaign.execution.safety import (
 )
 from campaign.options import Options
 from campaign.recording import SafeState
-from tests.execution.fakes import FakeBackend
+from tests.execution.fakes import FakeBackend, make_trials
 
 RUN = Path("results/run.partial")
 
@@ -330,3 +330,29 @@ def test_what_hangs_is_not_called_again_until_it_has_ended(hanging: Callable[...
     while safe_at_once(backend) is ExitCode.NOT_SAFE:
         pass
     assert backend.log.count("make safe") == 2
+
+
+@pytest.mark.parametrize(("command", "why"), [("stop it", "'str'"), (("stop", Path()), "Path'")])
+def test_a_command_that_is_none_is_a_fault_by_name(command: object, why: str) -> None:
+    backend = type("Stops", (FakeBackend,), {"stop_command": lambda self: command})()
+    with pytest.raises(BackendError, match=rf"^stop_command\(\) of tests.*{why}"):
+        calls.stop_command(backend)
+
+
+def test_a_backend_without_such_a_command_has_none() -> None:
+    assert calls.stop_command(FakeBackend()) == ()
+
+
+def test_a_bug_of_our_own_is_not_its_own_cause() -> None:
+    bug = ValueError("a bug")
+    backend = type("Own", (FakeBackend,), {"__module__": "campaign.own", "refuses": _raise(bug)})()
+    with pytest.raises(ValueError, match="a bug") as caught:
+        calls.refusal(backend, make_trials(1)[0])
+    assert caught.value.__cause__ is None
+
+
+def _raise(error: Exception) -> Callable[..., None]:
+    def method(*arguments: object) -> None:
+        raise error
+
+    return method

@@ -245,6 +245,7 @@ def guardian() -> Iterator[FakeGuardian]:
 def test_the_guardian_knows_that_a_bench_is_connected_and_what_is_kept(guardian: FakeGuardian):
     with StopSwitch(guardian.pipes).on_signals() as stop:
         assert guardian.heard().moves
+        assert guardian.heard().note == NOT_SAFE.encode()  # if it dies while it connects
         stop.kept(lambda: "kept \udcff", moves=True, stopper=("stop", "--port", "x"))
         assert guardian.heard().note == f"{NOT_SAFE}\nkept ?".encode()
         assert guardian.heard().stopper == b"stop\0--port\0x"
@@ -272,6 +273,23 @@ def test_what_guardian_and_program_have_both_heard_is_one(
     with StopSwitch(again.pipes).on_signals():
         os.write(again.back, bytes((OURS + signal.SIGINT, OURS + signal.SIGTERM)))
         assert left.wait(60)
+
+
+def test_who_insists_leaves_although_nobody_can_look_at_what_is_kept(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    def stale() -> str:
+        raise OSError("stale file handle")
+
+    left = threading.Event()
+    monkeypatch.setattr(os, "_exit", lambda code: left.set())
+    with StopSwitch().on_signals() as stop:
+        stop.kept(lambda: "", moves=False)
+        stop._note = stale
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert left.wait(60)
+    assert "cannot be looked at: stale file handle" in capfd.readouterr().err
 
 
 @on_posix

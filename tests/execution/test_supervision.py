@@ -241,7 +241,7 @@ def test_a_backend_that_does_not_come_back_ends_the_run_in_order(lab: Callable[.
         return COMPLETED
 
     bench = lab(once(never), 3)
-    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.1))
+    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1))
     assert bench.backend.log == ["begins", "made safe", "made safe"]
     assert list(bench.archive.endings) == [1]
     ending = bench.archive.endings[1]
@@ -255,6 +255,23 @@ def test_a_backend_that_does_not_come_back_ends_the_run_in_order(lab: Callable[.
     assert bench.archive.samples == {1: 0}
 
 
+def test_a_bench_that_comes_to_rest_slowly_leaves_its_backend_time_to_return(
+    lab: Callable[..., Lab], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def waits(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
+        assert live.made_safe.wait(LONG)
+        live.released.wait(0.1)
+        return COMPLETED
+
+    bench = lab(once(waits))
+    make_safe = bench.backend.make_safe
+    slowly = lambda: bench.backend.released.wait(0.3) or make_safe()  # noqa: E731
+    monkeypatch.setattr(bench.backend, "make_safe", slowly)
+    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.2, grace=LONG))
+    assert "did not come back" not in bench.archive.endings[1].reason
+    assert run.status is RunStatus.FAILED_TRIALS
+
+
 def test_an_unsafe_bench_under_a_stuck_backend_has_its_exit_code(lab: Callable[..., Lab]) -> None:
     def never(live: Live, recorder: Recorder, stop: Callable[[], bool]) -> Ending:
         assert live.released.wait(LONG)
@@ -262,7 +279,10 @@ def test_an_unsafe_bench_under_a_stuck_backend_has_its_exit_code(lab: Callable[.
 
     bench = lab(once(never))
     bench.backend.state = SafeState.NOT_CONFIRMED
-    assert bench.run(replace(PATIENT, first=0.1, giving_up=0.1)).exit_code is ExitCode.NOT_SAFE
+    assert (
+        bench.run(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1)).exit_code
+        is ExitCode.NOT_SAFE
+    )
     assert bench.archive.endings[1].safe_state is SafeState.NOT_CONFIRMED
 
 
@@ -337,7 +357,7 @@ def test_a_stuck_backend_is_given_up_after_one_ctrl_c(lab: Callable[..., Lab]) -
         return INTERRUPTED
 
     bench = lab(once(never))
-    run = bench.run(replace(PATIENT, closing=0.1, giving_up=0.1))
+    run = bench.run(replace(PATIENT, closing=0.1, giving_up=0.1, grace=0.1))
     assert run.status is RunStatus.INTERRUPTED
     assert bench.archive.endings[1].fault is Fault.LOST_CONNECTION
 
@@ -386,7 +406,7 @@ def test_a_disk_that_hangs_leaves_no_bench_running(
 
     bench.archive.begin = begin_on_a_slow_disk  # type: ignore[method-assign]
     with pytest.raises(ArchiveError, match="takes no samples"):
-        bench.run(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1))
+        bench.run(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1, grace=0.1))
     assert bench.backend.log == ["begins", "made safe", "made safe"]
     assert bench.archive.endings == {}
 
