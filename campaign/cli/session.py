@@ -150,7 +150,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             stop.make_safe = partial(safe_at_once, session.backend)
             keep = partial(
                 stop.kept,
-                partial(_what_is_kept, session.folder.absolute()),
+                partial(_what_is_kept, session.folder),
                 moves=session.kind.live,
                 stopper=calls.stop_command(session.backend),
             )
