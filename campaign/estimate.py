@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal, Self
 
+from campaign.reason import NONE, Reason
+
 ROUNDING = 1e-9
 """Share of a number by which it may lie outside of its interval: unit conversions round."""
 
@@ -28,13 +30,16 @@ class Systematic:
     """One cause that shifts all repetitions alike, so that no repetition can show it.
 
     Attributes:
-        source: e.g. `torque constant`, `inertia`, `alignment`, `ramp rate`.
+        source: a code, declared where it is raised: `torque constant`, `inertia`, `ramp rate` ...
+            It is the same for every kind of axis; a page shows it in words of the axis.
         standard_uncertainty: what it does to the value (1 sigma, in the value's unit); None when
-            nobody has said how uncertain the source is.
+            the uncertainty of the source is not known.
+        of_rig: whether it is one and the same for all recordings of a rig, as a constant is.
     """
 
     source: str
     standard_uncertainty: float | None = None
+    of_rig: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ class Estimate:
     high: float | None = None
     level: float | None = None
     method: str = ""
-    reason: str = ""
+    reason: Reason = NONE
     origin: Origin = Origin.MEASURED
     kind: Kind = "number"
     standard_error: float | None = None
@@ -87,7 +92,7 @@ class Estimate:
             raise ValueError(f"{self.name}: {self.value} lies outside of its interval, {ends}")
 
     @classmethod
-    def without_interval(cls, name: str, value: float, unit: str, reason: str, **more: Any) -> Self:
+    def without_interval(cls, name: str, value: float, unit: str, reason: Reason, **more: Any) -> Self:
         """A number that has no interval, and why; NaN makes it `not determined`."""
         if math.isnan(value):
             more = {**more, "origin": Origin.NOT_DETERMINED}

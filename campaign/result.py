@@ -16,8 +16,12 @@ from numpy.typing import NDArray
 from pydantic import InstanceOf
 
 from campaign.estimate import Estimate, Origin
+from campaign.reason import NONE, Cause, Reason
 
 Array = Annotated[NDArray[np.float64], InstanceOf()]
+NOT_FOUND = Cause("not found", "the analysis did not find it")
+NO_INTERVAL = Cause("no interval given", "the analysis gives no interval")
+
 Value = float | int | str | bool | None
 Cell = Value | Estimate
 """What stands in a cell of a table: an estimate where it is a number that was found."""
@@ -73,7 +77,7 @@ class Finding:
                 self.quantity,
                 math.nan,
                 self.unit,
-                reason="the analysis did not find it",
+                reason=NOT_FOUND(),
                 origin=Origin.NOT_DETERMINED,
                 kind=kind,
             )
@@ -81,7 +85,7 @@ class Finding:
             self.quantity,
             self.value,
             self.unit,
-            reason="the analysis gives no interval",
+            reason=NO_INTERVAL(),
             kind=kind,
         )
 
@@ -151,7 +155,7 @@ class Column:
     unit: str = ""
     display: str = ""
     exact: bool = False
-    reason: str = ""
+    reason: Reason = NONE
     quantity: str = ""
     decimals: int = 0
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from campaign.access.analysis import AnalysedTest
-from campaign.axis_kind import speaking_of, words_here
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.physics.known import number_at
 from campaign.physics.truth import value_at
@@ -37,8 +36,7 @@ def shared_sources(
         and _known(one, path) == _known(other, path)
         and _true(one, path, plants) == _true(other, path, other_plants)
     ]
-    with speaking_of(one.sides):  # as the estimates of its analysis call them
-        return frozenset(map(words_here, shared))
+    return frozenset(shared)
 
 
 def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:
@@ -71,10 +69,8 @@ def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
     """
     if not test.source or test.bench is None:
         return {}
-    found = {
+    return {
         source: repr((test.source, test.bench.name, known, sorted(_true(test, path, plants))))
         for path, source in SOURCES.items()
         if (known := _known(test, path)) is not None
     }
-    with speaking_of(test.sides):
-        return {words_here(source): told for source, told in found.items()}

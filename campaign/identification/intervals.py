@@ -171,7 +171,9 @@ def judged(estimate: Estimate, useless: float = USELESS) -> Estimate:
     return replace(estimate, origin=Origin.NOT_DETERMINED, reason=reason)
 
 
-def shifted_by(estimate: Estimate, source: str, standard_uncertainty: float | None) -> Estimate:
+def shifted_by(
+    estimate: Estimate, source: str, standard_uncertainty: float | None, *, of_rig: bool = False
+) -> Estimate:
     """The estimate with one more systematic part (1 sigma in its unit; None: not known)."""
-    part = Systematic(source, standard_uncertainty)
+    part = Systematic(source, standard_uncertainty, of_rig)
     return replace(estimate, systematic=(*estimate.systematic, part))

@@ -23,8 +23,6 @@ from campaign.protocol.problems import find_faults
 FRICTION = "friction."
 WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
 """Tables that a bench has with all of these keys, or not at all."""
-SOURCE = "constant"
-"""Systematic parts whose source begins so are one and the same for recordings of one rig."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +305,7 @@ def _compared(
 
 def _shared(estimate: Estimate) -> list[str]:
     """What is the same for both runs of one rig."""
-    return [part.source for part in estimate.systematic if SOURCE in part.source]
+    return [part.source for part in estimate.systematic if part.of_rig]
 
 
 def _adjusted(sections: Sequence[Section]) -> Iterator[Section]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from campaign.axis_kind import is_linear, unit_here, words_here
 from campaign.estimate import Estimate
+from campaign.reason import Reason
 from campaign.result import (
     Amount,
     Axis,
@@ -46,16 +47,16 @@ def estimate_here(estimate: Estimate) -> Estimate:
     """An estimate with the unit and in the words of the axis that is meant."""
     if not is_linear():
         return estimate
-    systematic = tuple(
-        replace(part, source=words_here(part.source)) for part in estimate.systematic
-    )
     return replace(
         estimate,
         unit=estimate.unit if _is_phase(estimate.name) else unit_here(estimate.unit),
         method=words_here(estimate.method),
-        reason=words_here(estimate.reason),
-        systematic=systematic,
+        reason=_reason(estimate.reason),
     )
+
+
+def _reason(reason: Reason) -> Reason:
+    return replace(reason, text=words_here(reason.text))
 
 
 def _is_phase(*names: str) -> bool:
@@ -106,7 +107,7 @@ def _column(column: Column, phase: bool) -> Column:
         label=words_here(column.label),
         unit=column.unit if phase else unit_here(column.unit),
         display=column.display if phase else unit_here(column.display),
-        reason=words_here(column.reason),
+        reason=_reason(column.reason),
     )
 
 

@@ -41,7 +41,7 @@ def with_systematic(estimate: Estimate, bench: Bench, path: str, effect: float) 
     """
     relative = known_uncertainty(bench, path)
     part = None if relative is None else abs(effect) * relative
-    return shifted_by(estimate, SOURCES.get(path, path), part)
+    return shifted_by(estimate, SOURCES.get(path, path), part, of_rig=path == TORQUE_CONSTANT)
 
 
 def shared_parts(found: Iterable[Estimate]) -> tuple[Systematic, ...]:
