@@ -22,6 +22,7 @@ class Origin(StrEnum):
     ASSUMED = "assumed"  # a rule or a guess stands in for a measurement
     GIVEN = "given"  # a document or a data sheet says so
     AT_BOUND = "at its bound"  # the data would have it beyond what is physically possible
+    CONTRADICTED = "model contradicted"  # by the data: no parameter of a rig
     NOT_DETERMINED = "not determined"  # the data say nothing, or too little to be of use
 
 
@@ -92,7 +93,9 @@ class Estimate:
             raise ValueError(f"{self.name}: {self.value} lies outside of its interval, {ends}")
 
     @classmethod
-    def without_interval(cls, name: str, value: float, unit: str, reason: Reason, **more: Any) -> Self:
+    def without_interval(
+        cls, name: str, value: float, unit: str, reason: Reason, **more: Any
+    ) -> Self:
         """A number that has no interval, and why; NaN makes it `not determined`."""
         if math.isnan(value):
             more = {**more, "origin": Origin.NOT_DETERMINED}

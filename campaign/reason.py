@@ -32,7 +32,7 @@ class Reason:
     @classmethod
     def _of_an_older_archive(cls, given: Any) -> Any:
         """Formerly a reason was its text."""
-        return {"code": "text" if given else "", "text": given} if isinstance(given, str) else given
+        return {"code": OLDER if given else "", "text": given} if isinstance(given, str) else given
 
     def __bool__(self) -> bool:
         return bool(self.code)
@@ -42,6 +42,8 @@ class Reason:
 
 
 NONE = Reason()
+OLDER = "text"
+"""Code of a reason that an older archive has in words."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class Cause:
         return Reason(self.code, text, tuple((name, _plain(it)) for name, it in values.items()))
 
     def __contains__(self, reason: Reason) -> bool:
-        """Whether a reason is of this kind."""
-        return reason.code == self.code
+        """Whether a reason is of this kind; one of an older archive is known by its text."""
+        return reason.code == self.code or (reason.code == OLDER and reason.text == self.text)
 
 
 def _plain(value: Any) -> float | int | str | bool | None:

@@ -19,7 +19,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.reason import NONE, Cause, Reason
 
 Array = Annotated[NDArray[np.float64], InstanceOf()]
-NOT_FOUND = Cause("not found", "the analysis did not find it")
+NOT_FOUND = Cause("not found by analysis", "the analysis did not find it")
 NO_INTERVAL = Cause("no interval given", "the analysis gives no interval")
 
 Value = float | int | str | bool | None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import tomllib
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from campaign.axis_kind import (
@@ -22,11 +24,12 @@ from campaign.axis_kind import (
     words_here,
 )
 from campaign.backends.serial import _info
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.preparing.of_its_axis import of_its_axis
 from campaign.experiments.shared.hull_motion import SeriesMotion, ShipMotion
 from campaign.experiments.shared.motion_series import kind_of
+from campaign.identifying.tables import systematic
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import facts_of
@@ -35,6 +38,10 @@ from campaign.physics.limit_watch import LimitWatch
 from campaign.physics.limits import margins
 from campaign.protocol.limit_check import in_display_units
 from campaign.protocol.problems import find_faults
+from campaign.reason import Reason
+from campaign.report.content.opening import _answer
+from campaign.report.content.tables import remarks
+from campaign.report.content.truth import _bias
 from campaign.resources import protocols_folder
 from campaign.result import Amount, Axis, Column, Conclusion, Figure, Panel, Result, Table
 from campaign.trial import Task
@@ -270,6 +277,25 @@ def test_a_linear_motor_has_a_force_constant() -> None:
         assert words_here("torque constant") == "force constant"
 
 
+def test_a_page_calls_a_source_as_its_axis_does() -> None:
+    """In data it has one code for every axis."""
+    found = Estimate("f", 3.0, "N", 2.0, 4.0, 0.95, systematic=(Systematic("torque constant"),))
+    table = Table("t", "T", (Column("f", "F", "N"),), ({"f": found},))
+    said = Result(conclusions=(Conclusion(("F is ", Amount(found, "N"), ".")),))
+    test = SimpleNamespace(
+        name="t", title="T", kind="k", problem="", trials=(), failed=(), result=said, sides=DIRECT
+    )
+    remark = "Of unknown size, and in no interval: force constant."
+    assert _answer(test, None, None).remarks == (remark,)  # type: ignore[arg-type]
+    with speaking_of(DIRECT):
+        assert list(remarks(table)) == [remark]
+        assert systematic(found) == "force constant unknown"
+        assert "(largest systematic part: force constant)" in _bias(
+            "f", np.array([1.0, 2.0, 3.0]), "torque constant"
+        )
+    assert systematic(found) == "torque constant unknown"
+
+
 def test_who_is_spoken_of_ends_with_what_was_said() -> None:
     def told() -> Any:
         for _ in range(2):
@@ -281,8 +307,8 @@ def test_who_is_spoken_of_ends_with_what_was_said() -> None:
 
 
 def test_a_result_is_told_in_its_axis_units_and_phases_stay_angles() -> None:
-    torque = Estimate("coulomb_torque", 3.0, "N m", reason="torque is one reading")
-    margin = Estimate("phase_margin", 1.0, "rad", reason="one")
+    torque = Estimate("coulomb_torque", 3.0, "N m", reason=Reason("test", "torque is one reading"))
+    margin = Estimate("phase_margin", 1.0, "rad", reason=Reason("test", "one"))
     columns = (
         Column("torque", "Torque", "N m", "N m"),
         Column("phase_margin", "Phase margin", "rad", "deg"),
@@ -302,7 +328,7 @@ def test_a_result_is_told_in_its_axis_units_and_phases_stay_angles() -> None:
     ]
     cell = own.rows[0]["torque"]
     assert isinstance(cell, Estimate)
-    assert (cell.name, cell.value, cell.unit, cell.reason) == (
+    assert (cell.name, cell.value, cell.unit, str(cell.reason)) == (
         *("coulomb_torque", 3.0, "N"),
         "force is one reading",
     )

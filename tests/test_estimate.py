@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from campaign.estimate import Estimate, Kind, Origin, Systematic
+from campaign.reason import Reason
 
 KT = Systematic("torque constant", 0.3)
 J = Systematic("inertia", 0.4)
@@ -67,6 +68,6 @@ def test_a_value_may_lie_at_an_end_or_off_it_by_rounding() -> None:
 
 
 def test_nothing_known_is_not_determined() -> None:
-    told = Estimate.without_interval("torque", math.nan, "N m", "no ramp slid")
+    told = Estimate.without_interval("torque", math.nan, "N m", Reason("test", "no ramp slid"))
     assert told.origin is Origin.NOT_DETERMINED
     assert told.says_enough

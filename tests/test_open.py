@@ -17,6 +17,7 @@ from campaign.access.estimates import findings_table
 from campaign.archive import open_run
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
+from campaign.reason import Cause
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Finding
 from tests.archives import archived, plan_of, simulated_run
@@ -192,8 +193,11 @@ BOTH_PARTS = Estimate(
 )
 
 
+SINGLE = Cause("single trial", "a single trial")
+
+
 def test_findings_are_one_table_with_intervals_reasons_and_conditions():
-    alone = Estimate.without_interval("lag", 0.5, "s", "a single trial")
+    alone = Estimate.without_interval("lag", 0.5, "s", SINGLE(count=1))
     findings = [
         Finding.of(BOTH_PARTS, CONDITIONS),
         Finding.of(alone, {"frequency": 2.0}),
@@ -218,6 +222,8 @@ def test_findings_are_one_table_with_intervals_reasons_and_conditions():
         "the analysis gives no interval",
         "the analysis did not find it",
     ]
+    assert list(table["reason_code"]) == ["", "single trial", "no interval given", "not found"]
+    assert list(table["reason_values"]) == [{}, {"count": 1}, {}, {}]
     assert np.isnan(table["low"].iloc[1:].to_numpy()).all()
     assert table["origin"].iloc[3] == "not determined"
     assert (table.dtypes[["value", "low", "high", "scatter_high"]] == "float64").all()

@@ -29,12 +29,15 @@ COLUMNS = (
     "scatter_low",
     "scatter_high",
     "systematic",
+    "reason_code",
+    "reason_values",
 )
 """What is said of every estimate.
 
 `low` and `high` are the interval as tables and CSV have it, systematic parts included;
 `scatter_low` and `scatter_high` are what scatter alone leaves; `systematic` is a dict of the parts,
-source to standard uncertainty (None: not known).
+source to standard uncertainty (None: not known). `reason` is for people; `reason_code` says which
+one it is, and `reason_values`, a dict, what the text has in it, by name.
 """
 NUMBERS = ("value", "low", "high", "standard_error", "freedom", "scatter_low", "scatter_high")
 
@@ -69,12 +72,15 @@ def row_of(estimate: Estimate) -> dict[str, object]:
     said = {name: getattr(estimate, name, None) for name in COLUMNS}
     return said | {
         "quantity": estimate.name,
+        "reason": str(estimate.reason),
         "origin": estimate.origin.value,
         "low": low,
         "high": high,
         "scatter_low": estimate.low,
         "scatter_high": estimate.high,
         "systematic": {part.source: part.standard_uncertainty for part in estimate.systematic},
+        "reason_code": estimate.reason.code,
+        "reason_values": dict(estimate.reason.values),
     }
 
 

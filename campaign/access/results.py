@@ -23,6 +23,7 @@ from campaign.archive.reading.damage_words import in_words
 from campaign.errors import ArchiveError
 from campaign.experiments import experiments
 from campaign.published.scoreboard import Line, Scoreboard, score
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Figure, Finding, Table
 from campaign.source_hash import digest, sources_of
 
@@ -201,8 +202,10 @@ def _of_test(test: AnalysedTest) -> ResultsOfTest:
 
 
 NUMBERS = ("published", "reproduced", "low", "high", "deviation")
-_PRINTED = "a number of a document"
-_ENDS = "the interval of the number before it"
+_PRINTED = Cause("printed", "a number of a document")
+_ENDS = Cause("interval ends", "the interval of the number before it")
+_BESIDE = Cause("interval beside", "low and high are its interval")
+_FROM_PRINTED = Cause("from printed", "from what is printed")
 
 
 def scoreboard_table(scoreboard: Scoreboard) -> Table:
@@ -212,11 +215,11 @@ def scoreboard_table(scoreboard: Scoreboard) -> Table:
         Column("row", "Row"),
         Column("column", "Column"),
         Column("unit", "Unit"),
-        Column("published", "Published", reason=_PRINTED),
-        Column("reproduced", "Reproduced", reason="low and high are its interval"),
-        Column("low", "Low", reason=_ENDS),
-        Column("high", "High", reason=_ENDS),
-        Column("deviation", "Deviation", "percent", reason="from what is printed"),
+        Column("published", "Published", reason=_PRINTED()),
+        Column("reproduced", "Reproduced", reason=_BESIDE()),
+        Column("low", "Low", reason=_ENDS()),
+        Column("high", "High", reason=_ENDS()),
+        Column("deviation", "Deviation", "percent", reason=_FROM_PRINTED()),
         Column("verdict", "Verdict"),
         Column("status", "Status"),
         Column("test", "Test"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identification.stabilization_error import NO_SCATTER
 from campaign.result import Amount, Conclusion, Factor
@@ -53,10 +54,10 @@ def remarks(conclusions: Iterable[Conclusion]) -> Iterator[str]:
     """
     parts = [p for each in conclusions for p in each.parts if not isinstance(p, str)]
     found = [part.estimate for part in parts if _measured(part.estimate)]
-    without = dict.fromkeys(e.reason for e in found if not _bounded(e) and e.reason)
+    without = dict.fromkeys(str(e.reason) for e in found if not _bounded(e) and e.reason)
     if without:
         yield f"Without an interval: {'; '.join(without)}."
-    for reason in dict.fromkeys(e.reason for e in found if e.has_interval and e.reason):
+    for reason in dict.fromkeys(str(e.reason) for e in found if e.has_interval and e.reason):
         yield f"{reason[:1].upper()}{reason[1:]}."
     if any(_narrow(each) for each in found if each.has_interval):
         yield "Where a number stands without an interval, that is narrower than its digits."
@@ -73,7 +74,7 @@ def of_unknown_size(estimates: Iterable[Estimate]) -> Iterator[str]:
         if each.standard_uncertainty is None
     )
     if unknown:
-        yield f"Of unknown size, and in no interval: {', '.join(unknown)}."
+        yield f"Of unknown size, and in no interval: {', '.join(map(words_here, unknown))}."
 
 
 def is_decided(factor: Factor) -> bool:
@@ -154,7 +155,7 @@ def _factor(part: Factor) -> str:
     if not estimate.value > 0:
         return f"a ratio of {interval(estimate.value, low, high)}"
     if not _bounded(estimate):
-        if NO_SCATTER in estimate.reason:
+        if estimate.reason in NO_SCATTER:
             return _without_noise(part)
         return f"a ratio of {number(estimate.value, 3)}{NO_INTERVAL}"
     if side == 0:

@@ -188,6 +188,12 @@ def _tell(section: Section) -> None:
         for each in section.parameters
     ]
     print_table(("parameter", "value, 95 %", "unit", "key of the bench"), rows)
+    reasons: dict[str, list[str]] = {}
+    for each in section.parameters:
+        if each.estimate.reason:
+            reasons.setdefault(str(each.estimate.reason), []).append(words(each.estimate.name))
+    for reason, names in reasons.items():
+        _wrapped(f"{', '.join(names)}: {reason}.")
     for remark in of_unknown_size(each.estimate for each in section.parameters):
         _wrapped(remark)
 

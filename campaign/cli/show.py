@@ -78,7 +78,7 @@ def _print_metrics(run: RunReader) -> None:
 
 def _metric(found: Estimate) -> tuple[str, ...]:
     value = interval(found.value, *found.combined)
-    return found.name, value, pretty_unit(found.unit), found.reason
+    return found.name, value, pretty_unit(found.unit), str(found.reason)
 
 
 def _section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

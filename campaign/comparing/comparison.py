@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from campaign.access.analysis import AnalysedTest, analyse_run, source_of, title_of
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.axis_kind import BOTH_ROTARY, speaking_of, words_here
 from campaign.comparing.circumstances import Change, changes
 from campaign.comparing.judging import Pair, Verdict, judged, pairs_of
 from campaign.comparing.pairing import Pairing, pair_tests
-from campaign.comparing.shared import shared_sources
+from campaign.comparing.shared import shared_sources, source_called
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.experiments.shared.systematic import SOURCES
@@ -127,18 +128,26 @@ def compare_runs(
     Raises UsageError when runs are not several ones, or have nothing in common.
     """
     _check(runs)
-    for source in exchanged:
-        if source not in SOURCES.values():
-            known = ", ".join(SOURCES.values())
-            raise UsageError(f"--exchanged {source!r}: is none of {known}")
     sides = tuple(
         Side(letter, run, analyse_run(run, experiments))
         for letter, run in zip(LETTERS, runs, strict=False)
     )
-    found = [_against(sides[0], other, exchanged) for other in sides[1:]]
+    others = [_exchanged(sides[0], name) for name in exchanged]
+    found = [_against(sides[0], other, others) for other in sides[1:]]
     verdicts = iter(judged([pair for each in found for pair in each.pairs]))
     against = (replace(each, pairs=tuple(next(verdicts) for _ in each.pairs)) for each in found)
     return Comparison(sides, tuple(against))
+
+
+def _exchanged(reference: Side, name: str) -> str:
+    """The source of this name. Raises UsageError for one that there is not."""
+    axis = next((test.sides for test in reference.tests if test.bench), BOTH_ROTARY)
+    source = source_called(name, SOURCES.values(), axis)
+    if source is None:
+        with speaking_of(axis):
+            known = ", ".join(map(words_here, SOURCES.values()))
+        raise UsageError(f"--exchanged {name!r}: is none of {known}")
+    return source
 
 
 def _check(runs: Sequence[RunReader]) -> None:

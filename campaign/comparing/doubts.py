@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from campaign.access.analysis import AnalysedTest
 from campaign.comparing.pairing import same_value
 from campaign.estimate import Origin
+from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Outcome
 from campaign.result import Finding
 from campaign.text import interval
@@ -24,28 +25,34 @@ from campaign.trial import Role
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
 """Quantities that are functions of other numbers of the same test."""
-FOLLOWS = "it follows from other numbers of the same test, which are compared themselves"
+FOLLOWS = Cause(
+    "follows from others",
+    "it follows from other numbers of the same test, which are compared themselves",
+)
 REPEAT = "how trials scatter is not in the interval; `repeat = 3` would show it"
-WRONG_MODEL = "its interval is that of a model that the data contradict"
+ONE_TRIAL_EACH = Cause("one trial each", f"one trial each: {REPEAT}")
+ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT}")
+WRONG_MODEL = Cause(
+    "contradicted model", "{held}; its interval is that of a model that the data contradict"
+)
 
 
-def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> str:
-    """Why two findings are not judged although both have intervals; empty when they are.
+def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> Reason:
+    """Why two findings are not judged although both have intervals; `NONE` when they are.
 
     sides, findings: of the reference and of the other run.
     """
     if findings[0].quantity in DERIVED:
-        return FOLLOWS
+        return FOLLOWS()
     names = ("the reference", "the other")
     own = list(zip(names, sides, findings, strict=True))
     alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]
     if alone:
-        told = "one trial each" if len(alone) == 2 else f"{alone[0]} is of one trial"
-        return f"{told}: {REPEAT}"
+        return ONE_TRIAL_EACH() if len(alone) == 2 else ONE_OF_ONE_TRIAL(side=alone[0])
     for name, test, finding in own:
         for held in contradicted(test, finding):
-            return f"{name}: {held}; {WRONG_MODEL}"
-    return ""
+            return WRONG_MODEL(held=f"{name}: {held}")
+    return NONE
 
 
 def trials_behind(test: AnalysedTest, finding: Finding) -> int:

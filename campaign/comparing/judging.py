@@ -20,6 +20,7 @@ from campaign.comparing.pairing import PairedTest
 from campaign.comparing.words import display_unit
 from campaign.estimate import Estimate, Origin
 from campaign.identification.difference import BOUNDS, Difference, difference_of
+from campaign.reason import NONE, Reason
 from campaign.result import Value
 
 RATE = 0.05
@@ -57,7 +58,7 @@ class Pair:
     found: Difference
     verdict: Verdict
     display: str = ""
-    reason: str = ""
+    reason: Reason = NONE
     adjusted: float | None = None
 
     @property
@@ -91,7 +92,7 @@ def pairs_of(tested: PairedTest, shared: Collection[str] = ()) -> Iterator[Pair]
         reference, other = one.known, another.known
         found = difference_of(reference, other, shared)
         derived = one.quantity in DERIVED
-        reason = FOLLOWS if derived else found.reason or doubt(sides, (one, another))
+        reason = FOLLOWS() if derived else found.reason or doubt(sides, (one, another))
         bound = found.difference.kind in BOUNDS and not derived
         beyond = bound and _excludes_zero(found.difference)
         yield Pair(

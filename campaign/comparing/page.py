@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from campaign.access.analysis import one_line
+from campaign.axis_kind import speaking_of, words_here
 from campaign.comparing.comparison import Against, Comparison
 from campaign.comparing.judging import RATE, Pair, Verdict
 from campaign.comparing.overlays import Letters, overlays
@@ -209,13 +210,15 @@ def _tests(against: Against, letters: Letters, prefix: str, making: _Making) -> 
             for table in tables
         ]
         figures, notes = _figures(tested, pairs, letters, f"{prefix}{name}", making)
+        with speaking_of(tested.reference.sides):
+            cancelled = sorted(map(words_here, against.shared.get(name, ())))
         yield ShownTest(
             anchor=f"{letters.other.lower()}-test-{place}",
             title=title,
             judged=shown[0],
             rest=shown[1],
             not_judged=tuple(not_judged(rest)),
-            cancelled=tuple(sorted(against.shared.get(name, ()))),
+            cancelled=tuple(cancelled),
             figures=figures,
             notes=notes,
         )

@@ -9,9 +9,10 @@ independent, which adds them in squares.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from campaign.access.analysis import AnalysedTest
+from campaign.axis_kind import Sides, speaking_of, words_here
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.physics.known import number_at
 from campaign.physics.truth import value_at
@@ -37,6 +38,12 @@ def shared_sources(
         and _true(one, path, plants) == _true(other, path, other_plants)
     ]
     return frozenset(shared)
+
+
+def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None:
+    """The source that a page of such a rig calls so, or that has this code; None for none."""
+    with speaking_of(sides):
+        return next((each for each in sources if name in (each, words_here(each))), None)
 
 
 def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:

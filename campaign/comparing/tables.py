@@ -103,7 +103,7 @@ def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
 
 def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
     """`12 of one trial each: ...`: each reason once, the most frequent first."""
-    told = Counter(pair.reason for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
+    told = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
     for reason, count in told.most_common():
         yield f"{count}: {reason}"
 
@@ -223,7 +223,7 @@ def _row(pair: Pair) -> Mapping[str, Cell]:
         "change": found.change,
         "p": pair.adjusted,
         "verdict": str(pair.verdict),
-        "reason": pair.reason,
+        "reason": str(pair.reason),
     }
 
 

@@ -34,8 +34,10 @@ from campaign.experiments.interface import (
 )
 from campaign.protocol.follow import Followed, Refusal, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
+from campaign.reason import Cause
 from campaign.trial import Role, Trial, canonical_json
 
+NOTHING_TOLD = Cause("nothing told", "the recording tells nothing")
 TOLD = 3
 """Refused trials of a stage that are told one by one; the journal has them all."""
 
@@ -50,7 +52,7 @@ class StageArchive(Protocol):
         """Note a stage's trials. Raises ArchiveError."""
 
 
-UNKNOWN = Estimate.without_interval("nothing", math.nan, "", "the recording tells nothing")
+UNKNOWN = Estimate.without_interval("nothing", math.nan, "", NOTHING_TOLD())
 """Metrics of a recording that could not be measured."""
 
 

@@ -21,7 +21,7 @@ from campaign.experiments.interface import Experiment, TestData, TrialData, benc
 from campaign.experiments.results.breakaway_figures import position_figure, ramp_figure
 from campaign.experiments.results.breakaway_means import Ramps, means_of, with_comparisons
 from campaign.experiments.results.breakaway_remarks import remarks
-from campaign.experiments.results.breakaway_tables import findings_of, table_of, window_table
+from campaign.experiments.results.breakaway_tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
@@ -34,6 +34,7 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
+from campaign.reason import Cause
 from campaign.recording import Array
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
@@ -53,6 +54,15 @@ from campaign.units import (
 STOP_FACTOR = 4.0
 """Rate that ends the trial, over the rate that counts as sliding: enough to see it slide."""
 WAYS = {"positive": 1.0, "negative": -1.0}
+OF_INERTIA = Cause("part of the inertia", "it serves the inertia's part alone")
+ASSUMED_RATIO = Cause(
+    "assumed damping ratio",
+    "it follows from an assumed damping ratio; a ramp carries no information on it",
+)
+FOR_ORIENTATION = Cause(
+    "for orientation", "torque over stiffness of the strongest interface, for orientation"
+)
+BY_CRITERION = Cause("chosen by a criterion", "chosen by the Bayesian information criterion")
 OWN = ("measurement", "position", "direction")
 """What distinguishes the ramps of one group."""
 
@@ -192,7 +202,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
     torque = _by_torque_constant(torque, bench)
     acceleration = Estimate.without_interval(
-        "peak_acceleration", found.acceleration, "rad/s^2", "it serves the inertia's part alone"
+        "peak_acceleration", found.acceleration, "rad/s^2", OF_INERTIA()
     )
     try:
         curve = curve_of(data, found.torque.value)
@@ -217,18 +227,15 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
         "bristle_damping",
         damping,
         "N m s/rad",
-        "it follows from an assumed damping ratio; a ramp carries no information on it",
+        ASSUMED_RATIO(),
         origin=Origin.ASSUMED,
         method="Equation 4.12",
     )
-    chord = "a chord through a curve: too low by far more than any scatter"
-    yield Estimate.without_interval("chord", curve.chord, "N m/rad", chord)
+    yield Estimate.without_interval("chord", curve.chord, "N m/rad", CHORD())
     span = curve.interfaces[0].torque / curve.interfaces[0].stiffness
-    told = "torque over stiffness of the strongest interface, for orientation"
-    yield Estimate.without_interval("presliding_span", span, "rad", told)
-    chosen = "chosen by the Bayesian information criterion"
+    yield Estimate.without_interval("presliding_span", span, "rad", FOR_ORIENTATION())
     count = float(len(curve.interfaces))
-    yield Estimate.without_interval("interfaces", count, "", chosen, kind="count")
+    yield Estimate.without_interval("interfaces", count, "", BY_CRITERION(), kind="count")
     for share, own in curve.by_window.items():
         yield Estimate(**{**vars(own), "name": f"bristle_stiffness_to_{share:g}"})
 

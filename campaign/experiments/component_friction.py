@@ -36,6 +36,7 @@ from campaign.physics.complete import inertia_of
 from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
+from campaign.reason import Cause
 from campaign.result import (
     Cell,
     Column,
@@ -54,6 +55,7 @@ STOP_FACTOR = 4.0
 REACH = 2.0
 """The ramp ends at this many times the friction that the bench describes."""
 OWN = ("component", "measurement")
+STILL_ROSE = Cause("friction that still rose", "friction still rose at the end of some readings")
 
 
 class ComponentFrictionOptions(Options):
@@ -228,8 +230,9 @@ def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
     return components
 
 
-def _open_ended(estimate: Estimate, reason: str) -> Estimate:
-    return replace(estimate, low=None, high=None, standard_error=None, reason=reason)
+def _open_ended(estimate: Estimate) -> Estimate:
+    """Without an interval, because friction still rose."""
+    return replace(estimate, low=None, high=None, standard_error=None, reason=STILL_ROSE())
 
 
 def _statistics(readings: list[Reading]) -> dict[str, Estimate]:
@@ -239,9 +242,8 @@ def _statistics(readings: list[Reading]) -> dict[str, Estimate]:
     mean = mean_of_readings("breakaway_torque", torques, "N m", count)
     deviation = deviation_of_readings("breakaway_torque", torques, "N m", count)
     if any(reading.torque.kind == "at least" for reading in readings):
-        reason = "friction still rose at the end of some readings"
-        mean = replace(_open_ended(mean, reason), kind="at least")
-        deviation = _open_ended(deviation, reason)
+        mean = replace(_open_ended(mean), kind="at least")
+        deviation = _open_ended(deviation)
     return {"mean": mean, "standard deviation": deviation}
 
 

@@ -60,6 +60,7 @@ from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate
+from campaign.reason import Cause
 from campaign.result import Conclusion, Figure, Finding, Result, Table
 from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
 from campaign.units import (
@@ -71,6 +72,7 @@ from campaign.units import (
     Torque,
 )
 
+AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
 NYQUIST_SHARE = 0.4
 """of the controller's sample rate: the highest frequency that can be told."""
 MOST_FREQUENCIES = 10_000
@@ -251,7 +253,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     parts = (("response_real", point.response.real), ("response_imag", point.response.imag))
     return (
         *(with_error(name, part, unit, point.error, math.inf, method) for name, part in parts),
-        Estimate("coherence", point.coherence, "", reason="it describes the recording at hand"),
+        Estimate("coherence", point.coherence, "", reason=AT_HAND()),
     )
 
 

@@ -29,7 +29,8 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.identification.intervals import judged, of_repeats, shifted_by
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -169,7 +170,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
 
 
 def _lost(name: str) -> Estimate:
-    return Estimate.without_interval(name, math.nan, METRICS[name], LOST)
+    return Estimate.without_interval(name, math.nan, METRICS[name], LOST())
 
 
 def _mean(name: str, values: Array, unit: str, error: float) -> Estimate:
@@ -203,7 +204,7 @@ def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
     cut = trials[0].recording().window(*trials[0].trial.task.window)
     rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
     return Loop(
-        frequency, rate, friction, *(judged(found.get(name) or _lost(name)) for name in METRICS)
+        frequency, rate, friction, *(admitted(found.get(name) or _lost(name)) for name in METRICS)
     )
 
 

@@ -21,9 +21,12 @@ from campaign.experiments.preparing.unusable import Doubt, doubt, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED
+from campaign.reason import Cause
 from campaign.recording import Ending, Recording
 from campaign.result import Result
 from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
+
+NOT_TOLD = Cause("not told by the recording", "the recording does not tell it")
 
 _Options = TypeVar("_Options", bound=Options)
 
@@ -215,7 +218,7 @@ class Metrics(dict[str, Estimate]):
     """Metrics by name; those that a recording does not tell are not determined."""
 
     def __missing__(self, name: str) -> Estimate:
-        return Estimate.without_interval(name, math.nan, "", "the recording does not tell it")
+        return Estimate.without_interval(name, math.nan, "", NOT_TOLD())
 
 
 def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:

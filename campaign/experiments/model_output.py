@@ -43,6 +43,7 @@ from campaign.experiments.shared.friction_models import (
 from campaign.identification.sampled import LOST, at_sample, bracketed, named, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.result import (
     Array,
     Cell,
@@ -61,6 +62,8 @@ VARIED = ("parameter", "factor")
 METRICS = ("peak", "at_amplitude", "at_reversal")
 JUMP = 20.0
 """times the step of the torque from sample to sample beside it."""
+NO_REVERSAL = Cause("no reversal", "the rate does not fall through zero, or {why}")
+JUMPS = Cause("torque that jumps", "the torque jumps where the rate changes its sign")
 CYCLES = 2
 """of the prescribed rate; the first brings the bristles into their cycle, the last is shown."""
 
@@ -214,7 +217,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
 
 
 def _not_found(name: str) -> Estimate:
-    reason = f"the rate does not fall through zero, or {LOST}" if name == "at_reversal" else LOST
+    reason = NO_REVERSAL(why=LOST()) if name == "at_reversal" else LOST()
     return Estimate.without_interval(f"model_{name}", math.nan, "N m", reason)
 
 
@@ -230,14 +233,13 @@ def _at_reversal(rate: Array, torque: Array) -> Iterator[Estimate]:
     value = float(torque[at])
     near = torque[max(at - 2, 0) : at + 5]
     if not np.all(np.isfinite(near)):
-        yield Estimate.without_interval("at_reversal", math.nan, "N m", LOST)
+        yield Estimate.without_interval("at_reversal", math.nan, "N m", LOST())
         return
     steps = np.abs(np.diff(near))
     if np.max(steps) > JUMP * np.median(steps):
         # A sine's zero is not quite zero, and a jump goes through it.
         middle = 0.0 if abs(value) < 1e-9 * float(np.nanmax(torque)) else value
-        reason = "the torque jumps where the rate changes its sign"
-        yield Estimate.without_interval("at_reversal", middle, "N m", reason)
+        yield Estimate.without_interval("at_reversal", middle, "N m", JUMPS())
         return
     ends = value, float(torque[at + 1])
     yield bracketed("at_reversal", value, "N m", ends, "between the samples around it")

@@ -32,7 +32,7 @@ from campaign.experiments.results.motion_tables import (
     line_table,
     summary_table,
 )
-from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
 from campaign.identification.steady_sliding import steady_sliding
 from campaign.identification.steady_stretches import FEWEST, SHORTEST_TIME, steady_stretches
 from campaign.options import Options
@@ -53,8 +53,6 @@ CAN_USE = {
 """Further channels, and what there is none of without them."""
 MOST_SAMPLES = 10_000_000
 """of a recording that is looked at in one: at 1 kHz some three hours."""
-OF_ALL = "it describes this recording"
-"""Why some metrics have no interval."""
 
 
 class MotionOptions(Options):
@@ -109,8 +107,8 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     chosen = np.unique(np.linspace(0, len(every) - 1, MOST_STRETCHES).astype(int))
     found = [
         *_extremes(recording),
-        Estimate("lost", float(lost.sum()), "", kind="count", reason="counted"),
-        Estimate("stretches_found", float(len(every)), "", kind="count", reason="counted"),
+        Estimate("lost", float(lost.sum()), "", kind="count", reason=COUNTED()),
+        Estimate("stretches_found", float(len(every)), "", kind="count", reason=COUNTED()),
     ]
     number = 0
     for first, stop in (every[place] for place in chosen if every):
@@ -127,7 +125,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
             _plain(f"last_{number}", float(recording.time[there[-1]]), "s"),
         ]
         found += [_plain(f"normal_load_{number}", float(np.mean(each)), "N") for each in load]
-    found.append(Estimate("stretches", float(number), "", kind="count", reason="counted"))
+    found.append(Estimate("stretches", float(number), "", kind="count", reason=COUNTED()))
     return found
 
 
@@ -161,7 +159,7 @@ def _extremes(recording: Recording) -> Iterator[Estimate]:
 
 
 def _plain(name: str, value: float, unit: str) -> Estimate:
-    return Estimate.without_interval(name, value, unit, OF_ALL)
+    return Estimate.without_interval(name, value, unit, OF_RECORDING())
 
 
 def _analyse(data: TestData) -> Result:

@@ -48,12 +48,14 @@ from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, limits_of
 from campaign.physics.stability import growth_rate
+from campaign.reason import Cause
 from campaign.recording import Outcome
 from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularAcceleration, Frequency, Time, Torque
 
+ALL_STABLE = Cause("stable at every gain", "stable at every gain that was tried")
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
 SETTLE = 2.0
 """s; at least, before a disturbance or noise is measured."""
@@ -267,8 +269,8 @@ def _limit_found(gains: list[Gain]) -> Iterator[Finding]:
         limit = Estimate(name, first.corner, "Hz", below, first.corner, LEVEL, method)
         yield Finding.of(limit, {})
     elif stable:
-        reason = "stable at every gain that was tried"
-        yield Finding.of(Estimate(name, max(stable), "Hz", kind="at least", reason=reason), {})
+        limit = Estimate(name, max(stable), "Hz", kind="at least", reason=ALL_STABLE())
+        yield Finding.of(limit, {})
 
 
 def _first_unstable(gains: list[Gain]) -> Gain | None:
@@ -327,7 +329,7 @@ def _table(gains: list[Gain]) -> Table:
             Column("error", "Error (1σ)", "rad", "mrad"),
             Column("error_theory", "by Eq. 5.4", "rad", "mrad"),
             Column("noise", "Rate from noise (1σ)", "rad/s", "deg/s"),
-            Column("noise_theory", "by Eq. 5.5", "rad/s", "deg/s", reason=BY_THEORY),
+            Column("noise_theory", "by Eq. 5.5", "rad/s", "deg/s", reason=BY_THEORY()),
             Column("worst", "|ω/T| over Eq. 5.4, worst"),
             Column("state", "Loop"),
         ),

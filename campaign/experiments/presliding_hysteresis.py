@@ -26,6 +26,7 @@ from campaign.experiments.shared.friction_models import Place, in_models, places
 from campaign.identification.intervals import shifted_by
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.result import (
     Array,
     Axis,
@@ -114,7 +115,9 @@ def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
     return Polyline(times=tuple(map(float, times)), values=tuple(map(float, rate)))
 
 
-NOISELESS = "a computed loop has no noise; how nearly it closes is its systematic part"
+NOISELESS = Cause(
+    "noiseless", "a computed loop has no noise; how nearly it closes is its systematic part"
+)
 UNITS = {"peak": "N m", "hysteresis_energy": "J", "loss_factor": ""}
 
 
@@ -159,7 +162,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     before, last = (_loop(data, window).sizes(_amplitude_of(data)) for window in _windows(data))
     return [
         shifted_by(
-            Estimate.without_interval(name, last[name], unit, NOISELESS),
+            Estimate.without_interval(name, last[name], unit, NOISELESS()),
             "loop not closed",
             abs(last[name] - before[name]),
         )

@@ -203,7 +203,7 @@ def _conclusion(joint: dict[str, Estimate], largest: float) -> Conclusion:
     told = [joint[name] for name in QUANTITIES if name in joint]
     shaken = ("Shaken by torques of up to ", setting(largest, "N m"))
     if len(told) < len(QUANTITIES) or not all(e.has_interval and determined(e) for e in told):
-        reason = next((each.reason for each in told if each.reason), "the fit gives no number")
+        reason = next((str(e.reason) for e in told if e.reason), "the fit gives no number")
         return conclusion(*shaken, ", the load tells not all of its small motions: ", reason)
     return conclusion(
         *shaken,

@@ -41,6 +41,7 @@ from campaign.identification.intervals import of_repeats
 from campaign.identification.scatter import relative_scatter
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.identification.velocity_map import doubts
+from campaign.reason import Cause
 from campaign.result import (
     Array,
     Cell,
@@ -52,6 +53,8 @@ from campaign.result import (
 )
 from campaign.trial import canonical_json
 
+DOUBTFUL = Cause("doubtful values", "{doubtful} of {values} values are {origins}")
+LARGEST = Cause("largest of several", "the largest of several: each has its own interval")
 SCORED = tuple(name for name in PARAMETERS if name != "stribeck_exponent")
 """Parameters of Table 4.4; the exponent is fitted beside them, and scatters most."""
 
@@ -148,13 +151,12 @@ def _flagged(told: Estimate, found: Sequence[Estimate]) -> Estimate:
     if not doubtful or math.isnan(told.value):
         return told
     origins = " or ".join(dict.fromkeys(str(each.origin) for each in doubtful))
-    reason = f"{len(doubtful)} of {len(found)} values are {origins}"
     return Estimate(
         told.name,
         told.value,
         told.unit,
         origin=Origin.NOT_DETERMINED,
-        reason=reason,
+        reason=DOUBTFUL(doubtful=len(doubtful), values=len(found), origins=origins),
         systematic=told.systematic,
     )
 
@@ -173,8 +175,7 @@ def _findings(sets: Sequence[MapSet]) -> Iterator[Finding]:
             yield Finding.of(deviation, {"statistic": "relative standard deviation"})
     if known := [each for each in deviations if each.origin is not Origin.NOT_DETERMINED]:
         worst = max(known, key=lambda each: each.value)
-        reason = "the largest of several: each has its own interval"
-        told = Estimate.without_interval("relative_standard_deviation", worst.value, "", reason)
+        told = Estimate.without_interval("relative_standard_deviation", worst.value, "", LARGEST())
         yield Finding.of(told, {"parameters": "worst"})
 
 

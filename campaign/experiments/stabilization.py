@@ -50,11 +50,13 @@ from campaign.experiments.shared.pointing_error import (
     windows_of,
 )
 from campaign.identification.place import of_next
-from campaign.identification.stabilization_error import BLOCKS, LOST, over_trials, whole_cycles
+from campaign.identification.sampled import LOST
+from campaign.identification.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import pointing_high_pass
+from campaign.reason import Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.signals import Sine
@@ -64,7 +66,12 @@ from campaign.units import AngularAcceleration, Frequency
 SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
 LARGEST = "largest_error"
-OF_A_RECORD = "the largest of its record: a longer one holds a larger"
+OF_A_RECORD = Cause(
+    "largest of its record", "the largest of its record: a longer one holds a larger"
+)
+SPREAD = Cause(
+    "spread of the trials", "the standard deviation of the trials about the error before it"
+)
 STUCK = "time_stuck"
 SHOW_STUCK = (BASE_RATE, RELATIVE_ANGLE, GYRO_RATE)
 """Channels of the rate of the hull and of what resolves the rate relative to it."""
@@ -162,7 +169,7 @@ def _measure(data: TrialData) -> list[Estimate]:
     if len(recording.time) < 2:
         raise ValueError("nothing was recorded in the window that is measured")
     peak = largest_of(recording[POINTING_ERROR])
-    largest = Estimate.without_interval(LARGEST, peak, "rad", OF_A_RECORD, kind="quantile")
+    largest = Estimate.without_interval(LARGEST, peak, "rad", OF_A_RECORD(), kind="quantile")
     error = error_of(recording, data.trial.task)
     return found([error, largest, *_time_stuck(recording, data.trial)])
 
@@ -241,9 +248,9 @@ def _row(group: Sequence[TrialData]) -> dict[str, Cell]:
     stuck = over_recordings(of_each(group, _measure, STUCK))
     shown = any(not missing(SHOW_STUCK, data.channel_names()) for data in group)
     row: dict[str, Cell] = {
-        "error": over_trials(errors) if errors else _nothing("stabilization_error", LOST),
-        "peak": over_trials(peaks) if peaks else _nothing(LARGEST, LOST),
-        "stuck": stuck or (_nothing(STUCK, UNRESOLVED) if shown else None),
+        "error": over_trials(errors) if errors else _nothing("stabilization_error", LOST()),
+        "peak": over_trials(peaks) if peaks else _nothing(LARGEST, LOST()),
+        "stuck": stuck or (_nothing(STUCK, UNRESOLVED()) if shown else None),
         "repeats": len(group),
     }
     if len(errors) > 1:
@@ -253,7 +260,7 @@ def _row(group: Sequence[TrialData]) -> dict[str, Cell]:
     return row
 
 
-def _nothing(name: str, reason: str) -> Estimate:
+def _nothing(name: str, reason: Reason) -> Estimate:
     return Estimate.without_interval(name, math.nan, "", reason)
 
 
@@ -276,10 +283,9 @@ def _table(rows: Sequence[Mapping[str, Cell]], extra: Sequence[str], remark: str
     if any(row["stuck"] is not None for row in rows):
         columns.append(Column("stuck", "Time stuck", "", "percent"))
     if any(row["repeats"] != 1 for row in rows):
-        spread = "the standard deviation of the trials about the error before it"
         columns += [
             Column("repeats", "Repeats", exact=True),
-            Column("spread", "Spread (1σ)", "rad", "mrad", reason=spread),
+            Column("spread", "Spread (1σ)", "rad", "mrad", reason=SPREAD()),
             Column("next", "One more trial", "rad", "mrad"),
         ]
     return Table(

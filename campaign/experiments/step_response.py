@@ -35,6 +35,7 @@ from campaign.identification.step_response import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.recording import Recording
 from campaign.result import Finding, Result
 from campaign.signals import Polyline
@@ -164,14 +165,14 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     return tuple(
         rise
         if rise is not None and name == rise.name
-        else Estimate(name, value, unit, reason=ONE_STEP)
+        else Estimate(name, value, unit, reason=ONE_STEP())
         for name, value, unit in values
         if math.isfinite(value)
     )
 
 
-ONE_STEP = "it is of one step: repeats would show how it scatters"
-NOT_SEEN = "not every step was seen to do that"
+ONE_STEP = Cause("of one step", "it is of one step: repeats would show how it scatters")
+NOT_SEEN = Cause("not seen in every step", "not every step was seen to do that")
 
 
 def _without_friction(bench: Bench) -> Tree:
@@ -186,7 +187,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
     found = dict(metrics(data, _measure))
     for name, unit in QUANTITIES:
         if name not in found:
-            reason = again.reasons.get(name, NOT_SEEN)
+            reason = again.reasons.get(name, NOT_SEEN())
             found[name] = Estimate.without_interval(name, math.nan, unit, reason)
     rate, start = recording[GYRO_RATE], _answer(data.trial).start
     before = rate[(recording.time < start) & np.isfinite(rate)]
@@ -258,7 +259,7 @@ def _notes(step: Step) -> Iterator[str]:
         reason = step.found[name].reason
         if math.isfinite(step.value(name)):
             continue
-        if reason == NOT_SETTLED:
+        if reason in NOT_SETTLED:
             band = f"{100 * step.options.band:g} %"
             yield f"{label}: the rate does not stay within {band} of the step."
         else:
@@ -278,8 +279,9 @@ def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
         return repeats[0].found[name]
     values = [step.value(name) for step in repeats]
     if not all(map(math.isfinite, values)):
-        reasons = {step.found[name].reason for step in repeats if math.isnan(step.value(name))}
-        why = reasons.pop() if len(reasons) == 1 else NOT_SEEN
+        unseen = [step.found[name].reason for step in repeats if math.isnan(step.value(name))]
+        # Told where all read alike: their values may differ by less than a text shows.
+        why = unseen[0] if len(set(map(str, unseen))) == 1 else NOT_SEEN()
         return Estimate.without_interval(name, math.nan, unit, why)
     return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
 

@@ -19,7 +19,7 @@ from campaign.experiments.conclusions.behaviour import stick_slip_conclusions
 from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
-from campaign.experiments.shared.common import failures_note
+from campaign.experiments.shared.common import COUNTED, failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     Place,
@@ -33,6 +33,7 @@ from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.recording import Recording
 from campaign.result import (
     Array,
@@ -90,6 +91,7 @@ UNITS = {"first_slip": "s", "period": "s", "peak_torque": "N m", "top_rate": "ra
 """What a pull shows: time of the first slip, mean time between slips (without the first, whose
 spring began unstretched), largest torque of the spring, and largest rate of the load."""
 OF_SLIPS = ("first_slip", "period")
+TOO_FEW_SLIPS = Cause("too few slips", "there were too few slips")
 PREFIX = "stick_slip_"
 
 
@@ -103,7 +105,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
         return simulated(replace(each, name=PREFIX + each.name) for each in peaks)
     times, before = upward_crossings(recording.time, rate, options.slip_rate)
     step = 1.0 / data.trial.task.sample_rate
-    slips = Estimate("slips", float(len(times)), "", kind="count", reason="counted")
+    slips = Estimate("slips", float(len(times)), "", kind="count", reason=COUNTED())
     found = [slips, *peaks]
     if len(times):
         ends = float(before[0]), float(before[0]) + step
@@ -188,8 +190,8 @@ def _shown(place: Place) -> dict[str, Estimate]:
     counted = "slips" in found
     for name, unit in {"slips": "", **UNITS}.items():
         if name not in found:
-            reason = "there were too few slips" if counted and name in OF_SLIPS else LOST
-            found[name] = Estimate.without_interval(name, math.nan, unit, reason)
+            cause = TOO_FEW_SLIPS if counted and name in OF_SLIPS else LOST
+            found[name] = Estimate.without_interval(name, math.nan, unit, cause())
     return found
 
 

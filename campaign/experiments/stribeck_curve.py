@@ -34,6 +34,7 @@ from campaign.identification.sampled import largest, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
+from campaign.reason import Cause
 from campaign.result import (
     Array,
     Axis,
@@ -52,7 +53,7 @@ from campaign.text import number
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
-OF_THE_MODEL = "worked out from the model of the bench, and not measured"
+OF_THE_MODEL = Cause("from the model", "worked out from the model of the bench, and not measured")
 OWN = ("speed",)
 RAMP = 0.1
 """s, from rest to the speed."""
@@ -193,7 +194,7 @@ def _analyse(data: TestData) -> Result:
             *found[0][0].columns,
             Column("rate", "Rate", "rad/s", "deg/s"),
             Column("torque", "Friction torque", "N m", "N m"),
-            Column("curve", "Stribeck curve", "N m", "N m", reason=OF_THE_MODEL),
+            Column("curve", "Stribeck curve", "N m", "N m", reason=OF_THE_MODEL()),
         ),
         rows=tuple(rows),
         note="Measured torque and curve agree within "

@@ -14,6 +14,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import Array, errors_of
 from campaign.identification.intervals import student, with_error
+from campaign.reason import Cause
 
 DEGREE = 5
 """of the polynomial that the rate is around the maximum."""
@@ -29,6 +30,10 @@ SMOOTH = 0.95
 """AR(1) coefficient of the residuals from which on they are the polynomial's own error: no noise of
 a gyro lasts that long against a bin."""
 METHOD = "line through the torque less inertia times the slope of a quintic through the rate"
+STILL_RISING = Cause("friction still rising", "friction was still rising when the recording ended")
+TOO_LITTLE_NOISE = Cause(
+    "error of the polynomial", "noise is so small that the polynomial's own error is larger"
+)
 
 
 @dataclass(frozen=True)
@@ -93,13 +98,12 @@ class _Peak:
     def estimate(self) -> Estimate:
         more = {"standard_error": self.error, "freedom": self.freedom, "method": METHOD}
         if self.fall <= student(self.freedom) * self.fall_error:
-            reason = "friction was still rising when the recording ended"
             low = self.value - student(self.freedom) * self.error
             return Estimate.without_interval(
-                "breakaway_torque", low, "N m", reason, kind="at least", **more
+                "breakaway_torque", low, "N m", STILL_RISING(), kind="at least", **more
             )
         if self.correlation >= SMOOTH:
-            reason = "noise is so small that the polynomial's own error is larger"
+            reason = TOO_LITTLE_NOISE()
             return Estimate.without_interval("breakaway_torque", self.value, "N m", reason, **more)
         return with_error("breakaway_torque", self.value, "N m", self.error, self.freedom, METHOD)
 

@@ -19,7 +19,9 @@ import numpy as np
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.frequency_response import Array, Response
-from campaign.identification.intervals import LEVEL, judged, student
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import LEVEL, student
+from campaign.reason import NONE, Cause
 
 UPPER_PARTS = (0.4, 0.3, 0.2)
 """The sweep above these shares of its highest frequency tells how the response goes on ..."""
@@ -35,6 +37,7 @@ ORDERS = ((2, 2), (1, 1), (2, 3))
 FEWEST = 6
 """Points that the highest order needs."""
 DECIBEL = 20.0 / np.log(10.0)
+NOT_ALL_CROSS = Cause("not all fits cross", "not all fits of the upper sweep cross -180 deg")
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,7 @@ def gain_margin_beyond(loop: Response, crossover: float, half_turn: float) -> Be
     first = found[0] or told[0]
     closed = len(told) == len(found)
     method = "hull of nine fits of an integrator with a delay to the upper sweep"
-    reason = "" if closed else "not all fits of the upper sweep cross -180 deg"
+    reason = NONE if closed else NOT_ALL_CROSS()
 
     def hull(name: str, unit: str, k: int) -> Estimate:
         low = min(each[k] - each[k + 1] for each in told)
@@ -182,7 +185,7 @@ def gain_margin_beyond(loop: Response, crossover: float, half_turn: float) -> Be
     margin = hull("gain_margin", "dB", 2)
     if not closed:
         margin = replace(margin, origin=Origin.NOT_DETERMINED)
-    return Beyond(hull("phase_crossover", "Hz", 0), judged(margin))
+    return Beyond(hull("phase_crossover", "Hz", 0), admitted(margin))
 
 
 def _of_order(

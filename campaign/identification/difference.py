@@ -12,12 +12,30 @@ from dataclasses import dataclass, replace
 from campaign.estimate import Estimate, Origin
 from campaign.identification.contrast import Contrast, contrast, left_over, ratio_ends
 from campaign.identification.intervals import LEVEL
+from campaign.reason import NONE, Cause, Reason
 from campaign.units import factor
 
 DIFFERENCE = "difference"
 CHANGE = "change"
 BOUNDS = ("at least", "at most")
-NOT_A_MEAN = "it is a range of single values, not how well one number is known"
+NOT_A_MEAN = Cause("not a mean", "it is a range of single values, not how well one number is known")
+OPEN_SIDE = Cause("open on one side", "its interval is open on one side")
+AROUND_ZERO = Cause(
+    "reference around zero", "the interval of the reference holds 0, so no share of it has one"
+)
+ZERO = Cause("reference of zero", "the reference is 0")
+SIGN_CHANGE = Cause("sign change", "its sign changes")
+NOT_FOUND = Cause("not found", "{whose}: not found{why}")
+OTHER_LEVEL = Cause(
+    "interval of another level",
+    "{whose} has an interval of another level ({percent:g} %)",
+)
+GIVEN_IN_BOTH = Cause("given in both", "given in both, not measured{why}")
+NO_INTERVAL = Cause("no interval in a pair", "{whose}: no interval{why}")
+ALIKE_BOUNDS = Cause("bounds on the same side", "both are bounds on the same side")
+BOUND_ALONE = Cause("bound without interval", "a bound, and no interval")
+OF_A_BOUND = Cause("share of a bound", "the reference is a bound")
+WITH_A_BOUND = Cause("difference of bounds", "a bound takes part")
 
 
 @dataclass(frozen=True)
@@ -29,13 +47,13 @@ class Difference:
         change: the difference as a share of the size of the reference (1 is 100 %); NaN where the
             reference is 0 or the sign changes.
         p: two-sided, of "no difference"; None where nothing can be tested, and `reason` says why.
-        reason: why there is no p value; empty when there is one.
+        reason: why there is no p value; none when there is one.
     """
 
     difference: Estimate
     change: Estimate
     p: float | None = None
-    reason: str = ""
+    reason: Reason = NONE
 
 
 def difference_of(reference: Estimate, other: Estimate, shared: Collection[str] = ()) -> Difference:
@@ -60,7 +78,7 @@ def difference_of(reference: Estimate, other: Estimate, shared: Collection[str] 
     change = _change(reference, other, shared)
     if not (told.low is None or told.high is None):
         return Difference(told, change, found.p)
-    return Difference(told, change, None, "its interval is open on one side")
+    return Difference(told, change, None, OPEN_SIDE())
 
 
 def in_unit(estimate: Estimate, unit: str) -> Estimate:
@@ -114,9 +132,7 @@ def _change(reference: Estimate, other: Estimate, shared: Collection[str]) -> Es
     low, high = ratio_ends(other, reference, shared)
     value = _share(other.value / reference.value, reference)
     if low is None and high is None:
-        return Estimate.without_interval(
-            CHANGE, value, "", "the interval of the reference holds 0, so no share of it has one"
-        )
+        return Estimate.without_interval(CHANGE, value, "", AROUND_ZERO())
     ends = [None if end is None else _share(end, reference) for end in (low, high)]
     if reference.value < 0:
         ends.reverse()
@@ -125,11 +141,11 @@ def _change(reference: Estimate, other: Estimate, shared: Collection[str]) -> Es
     )
 
 
-def _no_share(reference: Estimate, other: Estimate) -> str:
-    """Why the difference is no share of the reference; empty where it is one."""
+def _no_share(reference: Estimate, other: Estimate) -> Reason:
+    """Why the difference is no share of the reference; none where it is one."""
     if not reference.value:
-        return "the reference is 0"
-    return "its sign changes" if reference.value * other.value < 0 else ""
+        return ZERO()
+    return SIGN_CHANGE() if reference.value * other.value < 0 else NONE
 
 
 def _share(ratio: float, reference: Estimate) -> float:
@@ -137,7 +153,7 @@ def _share(ratio: float, reference: Estimate) -> float:
     return math.copysign(1.0, reference.value) * (ratio - 1.0)
 
 
-def _untold(reference: Estimate, other: Estimate, value: float, reason: str) -> Difference:
+def _untold(reference: Estimate, other: Estimate, value: float, reason: Reason) -> Difference:
     """Without interval, and why."""
     share = math.nan if _no_share(reference, other) else value / abs(reference.value)
     return Difference(
@@ -148,27 +164,32 @@ def _untold(reference: Estimate, other: Estimate, value: float, reason: str) -> 
     )
 
 
-def _why_none(reference: Estimate, other: Estimate) -> str:
+def _why_none(reference: Estimate, other: Estimate) -> Reason:
     whose = _whose(math.isnan(reference.value), math.isnan(other.value))
     own = (reference if math.isnan(reference.value) else other).reason
-    return f"{whose}: not found" + (f" ({own})" if own else "")
+    return NOT_FOUND(whose=whose, why=_in_brackets(own))
 
 
-def _why_without(reference: Estimate, other: Estimate) -> str:
-    """Why the difference of two numbers has no interval; empty where it has one."""
+def _why_without(reference: Estimate, other: Estimate) -> Reason:
+    """Why the difference of two numbers has no interval; none where it has one."""
     for each, alone in ((reference, "the reference"), (other, "the other")):
         if each.kind == "quantile":
-            return NOT_A_MEAN
+            return NOT_A_MEAN()
         if each.has_interval and each.level is not None and each.level != LEVEL:
-            return f"{alone} has an interval of another level ({100 * each.level:g} %)"
+            return OTHER_LEVEL(whose=alone, percent=100 * each.level)
     missing = [not reference.has_interval, not other.has_interval]
     if not any(missing):
-        return ""
+        return NONE
     own = (reference if missing[0] else other).reason
     given = [each.origin is Origin.GIVEN for each in (reference, other)]
     if all(given):
-        return f"given in both, not measured ({own})" if own else "given in both, not measured"
-    return f"{_whose(*missing)}: no interval" + (f" ({own})" if own else "")
+        return GIVEN_IN_BOTH(why=_in_brackets(own))
+    return NO_INTERVAL(whose=_whose(*missing), why=_in_brackets(own))
+
+
+def _in_brackets(reason: Reason) -> Reason:
+    """As an aside behind another text; none stays none."""
+    return replace(reason, text=f" ({reason})") if reason else reason
 
 
 def _whose(of_reference: bool, of_other: bool) -> str:
@@ -186,7 +207,7 @@ def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
     value = other.value - reference.value
     if low is None and high is None:
         alike = reference.kind == other.kind
-        reason = "both are bounds on the same side" if alike else "a bound, and no interval"
+        reason = ALIKE_BOUNDS() if alike else BOUND_ALONE()
         return _untold(reference, other, value, reason)
     end, kind = (high, "at most") if low is None else (low, "at least")
     told = Estimate(
@@ -199,8 +220,8 @@ def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
     share = replace(told, name=CHANGE, unit="", value=told.value / abs(reference.value or math.nan))
     if not (reference.value and reference.kind not in BOUNDS):
         # Over a bound a share would not be one.
-        share = Estimate.without_interval(CHANGE, math.nan, "", "the reference is a bound")
-    return Difference(told, share, None, "a bound takes part")
+        share = Estimate.without_interval(CHANGE, math.nan, "", OF_A_BOUND())
+    return Difference(told, share, None, WITH_A_BOUND())
 
 
 def _reach(estimate: Estimate) -> tuple[float | None, float | None]:

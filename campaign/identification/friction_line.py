@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import errors_of
-from campaign.identification.intervals import with_error
+from campaign.identification.intervals import SINGLE_VALUE, with_error
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:
     """Mean of what stretches show, shape (n,), in order of time; t with n - 1."""
     mean, count = float(np.mean(values)), len(values)
     if count < 2:
-        reason = "a single steady stretch: others would show how it scatters"
+        reason = SINGLE_VALUE(what="steady stretch", others="others")
         return Estimate.without_interval(name, mean, unit, reason)
     covariance, freedom = _covariance(np.ones((count, 1)), values - mean)
     return with_error(name, mean, unit, float(np.sqrt(covariance[0, 0])), freedom, OF_MEAN)

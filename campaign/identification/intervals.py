@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimate import Estimate, Systematic
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 
@@ -22,8 +23,14 @@ LEVEL = 0.95
 BATCHES = 10
 """into which a recording is cut: enough for a deviation, few enough that neighbours hardly know of
 each other (AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""
-USELESS = 0.5
-"""Half-width over value from which on a parameter counts as not determined."""
+TORQUE_CONSTANT = "torque constant"
+"""Source of the systematic part that all numbers in N m of a drive share."""
+NO_FREEDOM = Cause("no degrees of freedom", "nothing is left over to judge its scatter by")
+SINGLE_VALUE = Cause("single value", "a single {what}: {others} would show how it scatters")
+TOO_FEW_SAMPLES = Cause("too few samples", "{samples} samples are too few for {batches} batches")
+NO_STANDARD_ERROR = Cause("no standard error", "one of {whom} has no standard error")
+NOT_POSITIVE = Cause("not positive", "a ratio of numbers that are not positive")
+MODEL_MISFIT = Cause("model misfit", "misfit: {why}")
 
 
 def student(freedom: float, level: float = LEVEL) -> float:
@@ -42,8 +49,7 @@ def with_error(
     No interval, and the reason, where there are no degrees of freedom or the error is not finite.
     """
     if not freedom > 0 or not math.isfinite(error) or not math.isfinite(value):
-        reason = "nothing is left over to judge its scatter by"
-        return Estimate.without_interval(name, value, unit, reason, method=method, **more)
+        return Estimate.without_interval(name, value, unit, NO_FREEDOM(), method=method, **more)
     half = student(freedom) * error
     return Estimate(
         name,
@@ -66,8 +72,9 @@ def of_repeats(
     found = np.asarray(values, dtype=float)
     mean = float(np.mean(found))
     if len(found) < 2:
-        reason = f"a single value: {what} would show how it scatters"
-        return Estimate.without_interval(name, mean, unit, reason, **more)
+        return Estimate.without_interval(
+            name, mean, unit, SINGLE_VALUE(what="value", others=what), **more
+        )
     error = float(np.std(found, ddof=1)) / math.sqrt(len(found))
     method = f"mean of {len(found)} {what}, Student's t"
     return with_error(name, mean, unit, error, len(found) - 1, method, **more)
@@ -112,7 +119,7 @@ def of_series(
     """
     if len(samples) < 2 * batches:
         mean = float(np.mean(samples)) if len(samples) else math.nan
-        reason = f"{len(samples)} samples are too few for {batches} batches"
+        reason = TOO_FEW_SAMPLES(samples=len(samples), batches=batches)
         return Estimate.without_interval(name, mean, unit, reason, **more)
     used = len(samples) // batches * batches
     means = samples[:used].reshape(batches, -1).mean(axis=1)
@@ -126,7 +133,7 @@ def difference(name: str, one: Estimate, other: Estimate, unit: str, **more: Any
     value = one.value - other.value
     errors = (one.standard_error, other.standard_error)
     if errors[0] is None or errors[1] is None:
-        reason = one.reason or other.reason or "one of the two has no standard error"
+        reason = one.reason or other.reason or NO_STANDARD_ERROR(whom="the two")
         return Estimate.without_interval(name, value, unit, reason, **more)
     error = math.hypot(errors[0], errors[1])
     freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
@@ -136,11 +143,10 @@ def difference(name: str, one: Estimate, other: Estimate, unit: str, **more: Any
 def ratio(name: str, one: Estimate, other: Estimate, unit: str = "", **more: Any) -> Estimate:
     """Quotient `one` / `other` of independent positive estimates, in the logarithm (Welch)."""
     if not (one.value > 0 and other.value > 0):
-        reason = "a ratio of numbers that are not positive"
-        return Estimate.without_interval(name, math.nan, unit, reason, **more)
+        return Estimate.without_interval(name, math.nan, unit, NOT_POSITIVE(), **more)
     value = one.value / other.value
     if one.standard_error is None or other.standard_error is None:
-        reason = one.reason or other.reason or "one of the two has no standard error"
+        reason = one.reason or other.reason or NO_STANDARD_ERROR(whom="the two")
         return Estimate.without_interval(name, value, unit, reason, **more)
     errors = (one.standard_error / one.value, other.standard_error / other.value)
     freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
@@ -157,18 +163,6 @@ def welch(*parts: tuple[float, float | None]) -> float:
     total = sum(error**2 for error, _ in parts)
     own = sum(error**4 / freedom for error, freedom in parts if freedom is not None)
     return total**2 / own if own > 0 else math.inf
-
-
-def judged(estimate: Estimate, useless: float = USELESS) -> Estimate:
-    """The estimate, called `not determined` where its interval is too wide to be of use.
-
-    Value and interval stay: who reads them sees how little they say.
-    """
-    half = estimate.half_width
-    if estimate.origin is not Origin.MEASURED or not half > useless * abs(estimate.value):
-        return estimate
-    reason = f"its interval is wider than ±{100 * useless:.0f} % of it"
-    return replace(estimate, origin=Origin.NOT_DETERMINED, reason=reason)
 
 
 def shifted_by(

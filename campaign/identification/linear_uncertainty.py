@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, student
+from campaign.identification.intervals import LEVEL, NO_FREEDOM, student
 from campaign.identification.least_squares import covariance, profile_limit
 from campaign.identification.losses import Loss, weights
 from campaign.identification.unknowns import Unknown
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 Bound = Literal["", "lower", "upper"]
@@ -29,6 +30,14 @@ NEGLIGIBLE = 1e-6
 MOST_STEPS = 100
 """of one bounded linear fit; it needs about as many as there are parameters."""
 METHOD = "least squares, linearised at the optimum"
+INTERRUPTED = Cause("fit interrupted", "the fit was interrupted")
+NO_LIMIT = Cause(
+    "no limit from its bound",
+    "the data give no limit between its {side} bound and the other one",
+)
+NOT_DETERMINED = Cause(
+    "not determined within bounds", "not determined by these data within its bounds"
+)
 
 
 @dataclass(frozen=True)
@@ -157,13 +166,13 @@ def estimate_of(
     """
     name, value = unknown.name, unknown.value(share)
     if certainty is None:
-        return Estimate.without_interval(name, value, unit, "the fit was interrupted")
+        return Estimate.without_interval(name, value, unit, INTERRUPTED())
     half, limit = float(certainty.half_width[index]), float(certainty.limit[index])
     side, freedom = certainty.bound[index], certainty.freedom
     if side:
         method = f"{METHOD}; one-sided by its profile at the {side} bound, t({freedom})"
         if math.isnan(limit):
-            reason = f"the data give no limit between its {side} bound and the other one"
+            reason = NO_LIMIT(side=side)
             origin = Origin.AT_BOUND
             return Estimate.without_interval(
                 name, value, unit, reason, method=METHOD, origin=origin
@@ -175,9 +184,7 @@ def estimate_of(
     if at_bounds:
         method += "; those at a bound anywhere up to their limits"
     if certainty.open[index] or math.isnan(half):
-        reason = "not determined by these data within its bounds"
-        if freedom <= 0:
-            reason = "nothing is left over to judge its scatter by"
+        reason = NO_FREEDOM() if freedom <= 0 else NOT_DETERMINED()
         origin = Origin.NOT_DETERMINED
         return Estimate.without_interval(name, value, unit, reason, method=method, origin=origin)
     return Estimate(

@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 from campaign.estimate import Estimate
 from campaign.identification.intervals import LEVEL, exponential, student
 from campaign.identification.sampled import where_it_scatters
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
+
+TOO_FEW_POSITIVE = Cause("too few positive values", "it takes two positive values or more")
 
 
 def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
@@ -28,7 +31,7 @@ def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
     found = np.asarray(values, dtype=float)
     if len(found) < 2 or not np.all(found > 0):
         mean = float(np.mean(found)) if len(found) else math.nan
-        return Estimate.without_interval(name, mean, unit, "it takes two positive values or more")
+        return Estimate.without_interval(name, mean, unit, TOO_FEW_POSITIVE())
     logs = np.log(found)
     mean, spread, freedom = float(np.mean(logs)), float(np.std(logs, ddof=1)), len(found) - 1
     error = spread * math.sqrt(1.0 + 1.0 / len(found))

@@ -25,9 +25,11 @@ from campaign.identification.bristle_fit import (
     one_interface,
     two_interfaces,
 )
-from campaign.identification.intervals import exponential, judged, shifted_by, student, with_error
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import exponential, shifted_by, student, with_error
 from campaign.identification.presliding_curve import Interface
 from campaign.identification.torque_ramp import Ramp, ramp_of
+from campaign.reason import Cause
 
 WINDOWS = (0.5, 0.65, 0.8, 0.9)
 """Shares of the breakaway torque at which the fitted window may end, to see how much that does."""
@@ -47,6 +49,12 @@ APART = 2.0
 """How much further the stronger interface must give way than the weaker: what is nearer is the
 model's own error, cut out of one curve."""
 METHOD = "curve of bristles fitted to the gyro rate, its bias and the asymptote free"
+WINDOW = "window"
+"""Source of the systematic part of where the fitted window ends."""
+OFF_THE_CURVE = Cause(
+    "off the curve of bristles",
+    "the rate leaves the curve of bristles by more than its noise explains",
+)
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,7 @@ def fit_presliding(
     own = _stiffness(best)
     by_window = {share: own, **_by_window(ramp, smallest, breakaway, best, share)}
     return Presliding(
-        stiffness=_shifted(own, "window", _window_shift(share, by_window)),
+        stiffness=_shifted(own, WINDOW, _window_shift(share, by_window)),
         stiffness_at_rest=_shifted(_at_rest(best), "more interfaces than two", _split_shift(best)),
         interfaces=best.interfaces,
         bias=best.bias,
@@ -154,9 +162,8 @@ def _of_logarithm(fit: BristleFit, name: str, value: float, row: Array) -> Estim
     inner = with_error(name, float(np.log(value)), "", error, fit.errors.freedom, METHOD)
     found = exponential(inner, "N m/rad")
     if fit.errors.misfit <= MISFIT:
-        return judged(found)
-    reason = "the rate leaves the curve of bristles by more than its noise explains"
-    return replace(found, low=None, high=None, level=None, reason=reason)
+        return admitted(found)
+    return replace(found, low=None, high=None, level=None, reason=OFF_THE_CURVE())
 
 
 def _by_window(

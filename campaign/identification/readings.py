@@ -15,10 +15,15 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.identification.intervals import LEVEL, of_repeats, shifted_by
+from campaign.reason import Cause
 
 DITHERED = 0.5
 """Deviation over count from which rounding errors of readings are independent of each other."""
 RESOLUTION = "sensor resolution"
+SINGLE_READING = Cause("single reading", "a single reading has no deviation")
+WITHIN_A_COUNT = Cause(
+    "below one count", "less than one count of the sensor: from zero up to a bound"
+)
 
 
 def mean_of_readings(
@@ -49,7 +54,7 @@ def deviation_of_readings(
     value = float(np.std(found - found[0]))  # equal readings have none, not a rounding error
     freedom = len(found) - 1
     if freedom < 1:
-        return Estimate.without_interval(name, value, unit, "a single reading has no deviation")
+        return Estimate.without_interval(name, value, unit, SINGLE_READING())
     squares, tail = value**2 * len(found), 0.5 * (1.0 - LEVEL)
     # chdtri is the inverse of the upper tail.
     high = math.sqrt(squares / chdtri(freedom, 1.0 - tail))
@@ -57,8 +62,7 @@ def deviation_of_readings(
     estimate = Estimate(name, value, unit, None, high, LEVEL, method, freedom=freedom)
     if value < count:
         high = max(high, _largest_unseen(len(found), count))
-        reason = "less than one count of the sensor: from zero up to a bound"
-        return replace(estimate, low=0.0, high=high, reason=reason)
+        return replace(estimate, low=0.0, high=high, reason=WITHIN_A_COUNT())
     low = math.sqrt(max(0.0, squares / chdtri(freedom, tail) - count**2 / 12.0))
     return replace(estimate, low=low)
 

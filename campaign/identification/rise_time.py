@@ -17,7 +17,8 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.identification.intervals import LEVEL, student
 from campaign.identification.least_squares import Array
-from campaign.identification.step_response import HIGH, LOW, StepCharacteristics
+from campaign.identification.step_response import HIGH, LOW, SCATTERS, StepCharacteristics
+from campaign.reason import Cause
 
 METHOD = "parabolas around 10 and 90 %, and where they may cross these for the recording's noise"
 QUIET = 1e-4
@@ -32,6 +33,14 @@ NOISY = 0.01
 response bends that makes a parabola wrong."""
 FINE = 100
 """places in a rise time at which a parabola is looked at."""
+SHORT_STANDSTILL = Cause(
+    "standstill too short",
+    "the standstill before it has fewer than {samples} samples to tell its noise by",
+)
+HIDDEN_LEVEL = Cause(
+    "level hidden by noise",
+    SCATTERS + ", which hides when it comes to {level_percent:.0f} %",
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ def rise_interval(
     if found.noise < QUIET:
         return None
     if len(rest) < FEWEST:
-        few = f"the standstill before it has fewer than {FEWEST} samples to tell its noise by"
+        few = SHORT_STANDSTILL(samples=FEWEST)
         plain = found.rise_time if found.noise <= NOISY else math.nan
         return Estimate.without_interval("rise_time", plain, "s", few), found.rise_from
     share = (response - float(np.mean(rest))) / step
@@ -81,8 +90,7 @@ def rise_interval(
         bound = quantile * np.hypot(error * weight, zero)
         crossing = _crossing(at, value - level, bound, about)
         if crossing is None:
-            told = f"the rate scatters by {100 * found.noise:.2g} % of the step (1 sigma), which "
-            told += f"hides when it comes to {100 * level:.0f} %"
+            told = HIDDEN_LEVEL(noise_percent=100 * found.noise, level_percent=100 * level)
             return Estimate.without_interval("rise_time", math.nan, "s", told), math.nan
         crossings.append(crossing)
     first, last = crossings

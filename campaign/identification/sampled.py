@@ -16,14 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
-from campaign.identification.intervals import LEVEL, of_repeats, shifted_by, student
+from campaign.identification.intervals import (
+    LEVEL,
+    NO_STANDARD_ERROR,
+    of_repeats,
+    shifted_by,
+    student,
+)
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 
 SAMPLES = "time between samples"
 """Source of the systematic part that is left of brackets once repetitions are averaged."""
-LOST = "samples were lost"
-"""Why a number was not determined."""
+LOST = Cause("samples lost", "samples were lost")
+PEAK_AT_END = Cause("peak at an end", "it is still rising at an end of what was looked at")
+UNRESOLVED_PEAK = Cause("peak not resolved", "the samples are too far apart to resolve it")
+ALIKE = Cause("equal parts", "its parts agree to {digits} digits, as in a simulation without noise")
 _ROUNDING = 1e-12  # share of a number below which a difference is none
 
 
@@ -43,16 +52,14 @@ def peak(name: str, samples: Array, unit: str) -> Estimate:
     lost (NaN) it is not determined: it may have been among them.
     """
     if not np.all(np.isfinite(samples)):
-        return Estimate.without_interval(name, math.nan, unit, LOST)
+        return Estimate.without_interval(name, math.nan, unit, LOST())
     at = int(np.argmax(samples))
     top = float(samples[at])
     if at < 2 or at > len(samples) - 3:
-        reason = "it is still rising at an end of what was looked at"
-        return Estimate.without_interval(name, top, unit, reason)
+        return Estimate.without_interval(name, top, unit, PEAK_AT_END())
     around = samples[at - 2 : at + 3]
     if np.any(np.diff(around, 2) > _ROUNDING * abs(top)):
-        reason = "the samples are too far apart to resolve it"
-        return Estimate.without_interval(name, top, unit, reason)
+        return Estimate.without_interval(name, top, unit, UNRESOLVED_PEAK())
     above = max(_most_between(around[:4]), _most_between(around[:0:-1]))
     return bracketed(name, top, unit, (top, above), "largest sample, and the most between samples")
 
@@ -82,7 +89,7 @@ def at_sample(name: str, samples: Array, at: int, unit: str) -> Estimate:
     """
     near = samples[max(at - 1, 0) : at + 2]
     if not np.all(np.isfinite(near)):
-        return Estimate.without_interval(name, math.nan, unit, LOST)
+        return Estimate.without_interval(name, math.nan, unit, LOST())
     ends = float(np.min(near)), float(np.max(near))
     return bracketed(name, float(samples[at]), unit, ends, "sample, and those beside it")
 
@@ -114,7 +121,7 @@ def where_it_scatters(estimate: Estimate, scale: float, digits: int = 9) -> Esti
     half = estimate.half_width
     if not half <= 10.0**-digits * scale:
         return estimate
-    reason = f"its parts agree to {digits} digits, as in a simulation without noise"
+    reason = ALIKE(digits=digits)
     return replace(estimate, low=None, high=None, level=None, standard_error=None, reason=reason)
 
 
@@ -128,7 +135,7 @@ def largest(name: str, found: Sequence[Estimate], unit: str) -> Estimate:
     top = max(each.value for each in found)
     without = next((each for each in found if each.standard_error is None), None)
     if without is not None:
-        reason = without.reason or "one of them has no standard error"
+        reason = without.reason or NO_STANDARD_ERROR(whom="them")
         return Estimate.without_interval(name, top, unit, reason)
     level = 1.0 - (1.0 - LEVEL) / len(found)
     halves = [

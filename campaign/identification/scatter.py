@@ -7,8 +7,11 @@ import math
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.identification.intervals import LEVEL, student
+from campaign.identification.intervals import LEVEL, SINGLE_VALUE, student
 from campaign.identification.least_squares import Array
+from campaign.reason import Cause
+
+ZERO_MEAN = Cause("mean of zero", "its mean is zero")
 
 
 def deviation_limits(deviation: float, freedom: float) -> tuple[float, float]:
@@ -36,10 +39,10 @@ def relative_scatter(name: str, values: Array) -> Estimate:
     sets, columns = values.shape
     mean = float(np.mean(values))
     if mean == 0.0:
-        return Estimate.without_interval(name, math.nan, "", "its mean is zero")
+        return Estimate.without_interval(name, math.nan, "", ZERO_MEAN())
     value = float(np.std(values)) / mean
     if sets < 2:
-        reason = "a single set: repeats would show how it scatters"
+        reason = SINGLE_VALUE(what="set", others="repeats")
         return Estimate.without_interval(name, value, "", reason)
     within = math.sqrt(float(np.mean(np.var(values, axis=0, ddof=1)))) / mean
     within_ends = deviation_limits(within, sets - 1)

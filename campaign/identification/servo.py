@@ -17,8 +17,10 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.continuation import DECIBEL, gain_margin_beyond
 from campaign.identification.crossings import Passing, passings, sides
 from campaign.identification.frequency_response import Array, ComplexArray, Response, open_loop
-from campaign.identification.intervals import LEVEL, judged, shifted_by, with_error
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import LEVEL, shifted_by, with_error
 from campaign.identification.local_fit import Quantity, Reading, read
+from campaign.reason import Cause, Reason
 
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
 LARGEST = 600.0
@@ -82,17 +84,31 @@ def characteristics(closed: Response) -> ServoCharacteristics:
     return ServoCharacteristics(
         _bandwidth(seen, widths),
         _gain_margin(gain, bound, phase),
-        least or _not_found("phase_margin", "rad", NO_CROSSOVER),
+        least or _not_found("phase_margin", "rad", NO_CROSSOVER()),
         bound,
         (*widths, *phase, *gain),
     )
 
 
-NO_CROSSOVER = "the open loop does not cross 0 dB within the sweep by more than its errors"
-NO_HALF_TURN = "the phase does not cross -180 deg within or near the sweep"
+NO_CROSSOVER = Cause(
+    "no gain crossover",
+    "the open loop does not cross 0 dB within the sweep by more than its errors",
+)
+NO_HALF_TURN = Cause(
+    "no phase crossover", "the phase does not cross -180 deg within or near the sweep"
+)
+TOO_FEW_AROUND = Cause("too few points", "too few points around -3 dB")
+BOUND = Cause("bound", "a bound: {why}")
+SWEEP_ENDS = Cause("sweep ends before", "the sweep ends before the gain falls")
+FELL_BEFORE = Cause("gain fell before", "the gain fell before the sweep")
+GAIN_AT_LAST = Cause(
+    "gain at last frequency",
+    "gain at {frequency:.4g} Hz less 1.645 standard errors, if it rises no more above that",
+)
+NO_INTERVAL = Cause("no interval", "one of the two has no interval")
 
 
-def _not_found(name: str, unit: str, reason: str) -> Estimate:
+def _not_found(name: str, unit: str, reason: Reason) -> Estimate:
     return Estimate.without_interval(name, math.nan, unit, reason)
 
 
@@ -126,11 +142,11 @@ def _bandwidth(seen: Response, widths: list[Crossing]) -> Estimate:
     side = sides(np.log(np.abs(seen.values) / MINUS_3_DB), seen.relative_error)
     decided = np.flatnonzero(side)
     if not decided.size or len(set(side[decided])) > 1:
-        return _not_found("bandwidth", "Hz", "too few points around -3 dB")
+        return _not_found("bandwidth", "Hz", TOO_FEW_AROUND())
     inside = side[decided[-1]] > 0
     last = seen.frequency[decided[-1]] if inside else seen.frequency[decided[0]]
-    method = "the sweep ends before the gain falls" if inside else "the gain fell before the sweep"
-    return _bound("bandwidth", float(last), "Hz", "at least" if inside else "at most", method)
+    why = SWEEP_ENDS() if inside else FELL_BEFORE()
+    return _bound("bandwidth", float(last), "Hz", "at least" if inside else "at most", why)
 
 
 def _gain_crossovers(loop: Response) -> list[Crossing]:
@@ -198,12 +214,11 @@ def _gain_bound(loop: Response, above: NDArray[np.bool_], crossover: float) -> E
     level = float(loop.level[k] + ONE_SIDED * DECIBEL * loop.relative_error[k])
     if last <= crossover or level >= 0:
         return None
-    method = f"gain at {last:.4g} Hz less 1.645 standard errors, if it rises no more above that"
-    return _bound("gain_margin", -level, "dB", "at least", method)
+    return _bound("gain_margin", -level, "dB", "at least", GAIN_AT_LAST(frequency=last))
 
 
-def _bound(name: str, value: float, unit: str, kind: Any, method: str) -> Estimate:
-    return Estimate(name, value, unit, method=method, kind=kind, reason=f"a bound: {method}")
+def _bound(name: str, value: float, unit: str, kind: Any, why: Reason) -> Estimate:
+    return Estimate(name, value, unit, method=str(why), kind=kind, reason=BOUND(why=why))
 
 
 def _gain_margin(
@@ -214,7 +229,8 @@ def _gain_margin(
     least = min(margins, key=lambda margin: margin.value, default=None)
     if least is None or (bound is not None and least.origin is Origin.NOT_DETERMINED):
         least = bound or least
-    return least or _not_found("gain_margin", "dB", NO_HALF_TURN if phase else NO_CROSSOVER)
+    why = NO_HALF_TURN() if phase else NO_CROSSOVER()
+    return least or _not_found("gain_margin", "dB", why)
 
 
 def _read(
@@ -234,13 +250,13 @@ METHOD = "Gaussian process through log L over log frequency"
 def _frequency(name: str, reading: Reading) -> Estimate:
     value = math.exp(reading.log_frequency)
     found = with_error(name, value, "Hz", value * reading.frequency_error, math.inf, METHOD)
-    return judged(shifted_by(found, INTERPOLATION, value * reading.frequency_gap))
+    return admitted(shifted_by(found, INTERPOLATION, value * reading.frequency_gap))
 
 
 def _value(name: str, unit: str, reading: Reading, more: float = 0.0) -> Estimate:
     value = reading.value + more
     found = with_error(name, value, unit, reading.value_error, math.inf, METHOD)
-    return judged(shifted_by(found, INTERPOLATION, reading.value_gap))
+    return admitted(shifted_by(found, INTERPOLATION, reading.value_gap))
 
 
 def change(name: str, unit: str, bare: Estimate, other: Estimate) -> Estimate | None:
@@ -265,7 +281,7 @@ def change(name: str, unit: str, bare: Estimate, other: Estimate) -> Estimate | 
 
     down, up = width(low, bare_high), width(high, bare_low)
     if down is None and up is None:
-        reason = other.reason or bare.reason or "one of the two has no interval"
+        reason = other.reason or bare.reason or NO_INTERVAL()
         return Estimate.without_interval(name, value, unit, reason, method=method)
     return Estimate(
         name,

@@ -9,10 +9,14 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.identification.intervals import with_error
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 LEAST_SAMPLES = 4
 """in a cycle, to tell sine, cosine and mean with something left over."""
+TOO_FEW_CYCLES = Cause(
+    "too few cycles", "its cycles are too few, or too short, to show how they scatter"
+)
 
 
 def amplitude(name: str, time: Array, samples: Array, frequency: float, unit: str) -> Estimate:
@@ -27,8 +31,7 @@ def amplitude(name: str, time: Array, samples: Array, frequency: float, unit: st
     cycles = int((len(time) + 1) * step * frequency)  # one sample short of a whole one allowed
     edges = np.round(np.arange(cycles + 1) / (frequency * step)).astype(int)
     if cycles < 2 or np.min(np.diff(edges)) < LEAST_SAMPLES or not value > 0:
-        reason = "its cycles are too few, or too short, to show how they scatter"
-        return Estimate.without_interval(name, value, unit, reason)
+        return Estimate.without_interval(name, value, unit, TOO_FEW_CYCLES())
     direction = np.conj(whole) / value
     parts = [
         (_phasor(time[a:b], samples[a:b], frequency) * direction).real for a, b in pairwise(edges)

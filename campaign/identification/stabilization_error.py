@@ -22,6 +22,8 @@ from campaign.identification.intervals import (
     ratio,
     with_error,
 )
+from campaign.identification.sampled import LOST
+from campaign.reason import Cause, Reason
 
 Array = NDArray[np.float64]
 
@@ -33,13 +35,20 @@ HARDLY = 10 * ALIKE
 """Relative standard error up to which a number beside one that does not scatter hardly does."""
 IDENTICAL = 1e-12
 """The same for two values, which may be alike by chance, and for trials of one seed."""
-NO_SCATTER = "it repeats to the fifth digit: nothing scatters on this bench"
-OF_ONE_TRIAL = (
-    "the interval is of that one trial; what differs from trial to trial is not in it, and "
-    "three trials alike would show it"
+NO_SCATTER = Cause(
+    "not scattering", "it repeats to the fifth digit: nothing scatters on this bench"
 )
-SHORT = "less than one cycle was recorded"
-LOST = "samples were lost"
+OF_ONE_TRIAL = Cause(
+    "of one trial",
+    "the interval is of that one trial; what differs from trial to trial is not in it, and "
+    "three trials alike would show it",
+)
+SHORT = Cause("record too short", "less than one cycle was recorded")
+TOO_FEW_FOR_BLOCKS = Cause("too few samples for blocks", "too few samples for {blocks} blocks")
+SHORT_BLOCK = Cause(
+    "blocks too short",
+    "a block is only {times:.2g} times as long as what the error remembers",
+)
 BLOCKS = 6
 """of an irregular record; with ten, 37 periods of narrow-band noise are covered in 90 % only."""
 MEMORY = 4.0
@@ -61,7 +70,7 @@ def over_cycles(samples: Array, per_cycle: float, name: str = NAME, unit: str = 
     whole = whole_cycles(len(samples), per_cycle)
     used = samples[: round(whole * per_cycle)] if whole else samples
     if not whole:
-        return _without(used, name, unit, SHORT)
+        return _without(used, name, unit, SHORT())
     edges = np.round(np.linspace(0, len(used), 2 * whole + 1)).astype(int)
     return _of_parts(used, edges, name, unit, "half cycles")
 
@@ -84,11 +93,11 @@ def over_blocks(
     `MEMORY` correlation times of the squared deviation: then neighbours know of each other.
     """
     if len(samples) < 2 * blocks or not np.all(np.isfinite(samples)):
-        return _without(samples, name, unit, f"too few samples for {blocks} blocks")
+        return _without(samples, name, unit, TOO_FEW_FOR_BLOCKS(blocks=blocks))
     block = len(samples) / blocks
     memory = correlation_time((samples - np.mean(samples)) ** 2, int(block))
     if block < MEMORY * memory:
-        reason = f"a block is only {block / memory:.2g} times as long as what the error remembers"
+        reason = SHORT_BLOCK(times=block / memory)
         return _without(samples, name, unit, reason)
     edges = np.round(np.linspace(0, len(samples), blocks + 1)).astype(int)
     return _of_parts(samples, edges, name, unit, "blocks")
@@ -97,24 +106,25 @@ def over_blocks(
 def _of_parts(samples: Array, edges: NDArray[np.int_], name: str, unit: str, what: str) -> Estimate:
     """The standard deviation of all samples, with the scatter of its parts between `edges`."""
     if not np.all(np.isfinite(samples)):
-        return _without(samples, name, unit, LOST)
+        return _without(samples, name, unit, LOST())
     squares = (samples - np.mean(samples)) ** 2
     means = np.add.reduceat(squares, edges[:-1]) / np.diff(edges)
     mean = float(np.mean(squares))
     if not mean > 0:
-        return Estimate.without_interval(name, 0.0, unit, NO_SCATTER)
+        return Estimate.without_interval(name, 0.0, unit, NO_SCATTER())
     error = float(np.std(means, ddof=1)) / (2 * mean * math.sqrt(len(means)))
     if error < (ALIKE if len(means) > 2 else IDENTICAL):
-        return Estimate.without_interval(name, math.sqrt(mean), unit, NO_SCATTER)
+        return Estimate.without_interval(name, math.sqrt(mean), unit, NO_SCATTER())
     method = f"standard deviation, Student's t over {len(means)} {what}, in the logarithm"
     inner = with_error(name, 0.5 * math.log(mean), "", error, len(means) - 1, method)
-    return replace(exponential(inner, unit), reason=OF_ONE_TRIAL)
+    return replace(exponential(inner, unit), reason=OF_ONE_TRIAL())
 
 
-def _without(samples: Array, name: str, unit: str, reason: str) -> Estimate:
+def _without(samples: Array, name: str, unit: str, reason: Reason) -> Estimate:
     """The standard deviation without an interval; not determined where samples are missing."""
     if not len(samples) or not np.all(np.isfinite(samples)):
-        return Estimate.without_interval(name, math.nan, unit, LOST if len(samples) else SHORT)
+        why = LOST() if len(samples) else SHORT()
+        return Estimate.without_interval(name, math.nan, unit, why)
     return Estimate.without_interval(name, float(np.std(samples)), unit, reason)
 
 
@@ -148,7 +158,7 @@ def over_trials(found: Sequence[Estimate]) -> Estimate:
     values = np.array([one.value for one in known])
     if not np.all(values > 0) or np.ptp(np.log(values)) < IDENTICAL:
         mean = float(np.mean(values))
-        return Estimate.without_interval(found[0].name, mean, found[0].unit, NO_SCATTER)
+        return Estimate.without_interval(found[0].name, mean, found[0].unit, NO_SCATTER())
     return of_positive_repeats(found[0].name, values, found[0].unit, "trials", kind=found[0].kind)
 
 
@@ -161,8 +171,9 @@ def quotient(name: str, one: Estimate, other: Estimate) -> Estimate:
     sides = (one, other)
     scatter = [e.reason for e in sides if (e.standard_error or 0.0) > HARDLY * abs(e.value)]
     without = [e.reason for e in sides if e.standard_error is None]
-    if NO_SCATTER in without and any(scatter):
-        without = [reason for reason in without if reason != NO_SCATTER] + scatter
+    varying = [reason for reason in without if reason not in NO_SCATTER]
+    if len(varying) < len(without) and any(scatter):
+        without = varying + scatter
     said = [*filter(None, without)] or [e.reason for e in sides if e.reason]
     return replace(told, reason=said[0]) if said else told
 

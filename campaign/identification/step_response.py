@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.identification.least_squares import Array
+from campaign.reason import Cause, Reason
 
 Flags = NDArray[np.bool_]
 
@@ -29,8 +30,24 @@ LOW, HIGH = 0.1, 0.9
 """Shares of the step between which a rise counts."""
 NO_OVERSHOOT = 0.005
 """of the step, below which noise hides no overshoot worth a word."""
-NOT_REACHED = "it was not seen to reach 90 % of the step"
-NOT_SETTLED = "it was not seen to stay within the band before its recording ended"
+NOT_REACHED = Cause("step not reached", "it was not seen to reach 90 % of the step")
+NOT_SETTLED = Cause(
+    "not settled", "it was not seen to stay within the band before its recording ended"
+)
+SCATTERS = "the rate scatters by {noise_percent:.2g} % of the step (1 sigma)"
+"""How the text of what noise hides begins."""
+HIDDEN_RISE = Cause(
+    "rise hidden by noise",
+    SCATTERS + ", too much for 10 % of it to be told within its rise",
+)
+HIDDEN_SETTLING = Cause(
+    "settling hidden by noise",
+    SCATTERS + ", and its mean comes to lie {room_percent:.2g} % within the band's edge",
+)
+HIDDEN_OVERSHOOT = Cause(
+    "overshoot hidden by noise",
+    SCATTERS + ", which hides one of less than {hidden_percent:.2g} %",
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +71,7 @@ class StepCharacteristics:
     steady_state_error: float
     noise: float = 0.0
     rise_from: float = math.nan
-    reasons: dict[str, str] = field(default_factory=dict)
+    reasons: dict[str, Reason] = field(default_factory=dict)
 
 
 def step_characteristics(
@@ -81,8 +98,7 @@ def step_characteristics(
     end = float(np.mean(share[final]))
     views = list(_views(time, share, after, final))
     noise = views[0].noise
-    reasons: dict[str, str] = {}
-    scatter = f"the rate scatters by {100 * noise:.2g} % of the step (1 sigma)"
+    reasons: dict[str, Reason] = {}
 
     rise = rise_from = math.nan
     told = [view for view in views if SIGMAS * view.noise <= LOW]
@@ -91,29 +107,31 @@ def step_characteristics(
     if legible is not None:
         rise, rise_from = legible.rise, legible.rise_from
     if not math.isfinite(rise):
-        hidden = f"{scatter}, too much for 10 % of it to be told within its rise"
-        reasons["rise_time"] = NOT_REACHED if legible is not None else hidden
+        hidden = HIDDEN_RISE(noise_percent=100 * noise)
+        reasons["rise_time"] = NOT_REACHED() if legible is not None else hidden
 
     settled = math.nan
     room = band - abs(end - 1.0)
     clear = next((view for view in views if CLEAR * view.noise <= room), None)
     if room <= 0.0:
-        reasons["settling_time"] = NOT_SETTLED
+        reasons["settling_time"] = NOT_SETTLED()
     elif clear is None:
-        reasons["settling_time"] = (
-            f"{scatter}, and its mean comes to lie {100 * room:.2g} % within the band's edge"
+        reasons["settling_time"] = HIDDEN_SETTLING(
+            noise_percent=100 * noise, room_percent=100 * room
         )
     else:
         settled = _settled(time, clear.share, after, band) - start
         if settled > 0.9 * span:
-            settled, reasons["settling_time"] = math.nan, NOT_SETTLED
+            settled, reasons["settling_time"] = math.nan, NOT_SETTLED()
 
     view = clear or views[-1]
     excess = float(np.max(view.share[after])) - 1.0
     hides = PEAK * view.noise
     if excess < hides and hides > NO_OVERSHOOT:
         excess = math.nan
-        reasons["overshoot"] = f"{scatter}, which hides one of less than {100 * hides:.2g} %"
+        reasons["overshoot"] = HIDDEN_OVERSHOOT(
+            noise_percent=100 * noise, hidden_percent=100 * hides
+        )
     return StepCharacteristics(
         rise_time=rise,
         settling_time=settled,

@@ -17,8 +17,18 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Systematic
 from campaign.identification.intervals import LEVEL
+from campaign.reason import Cause, Reason
 
 Array = NDArray[np.float64]
+
+BEYOND_WITHOUT_CHANGE = Cause(
+    "beyond without change", "the error is beyond the threshold without any change"
+)
+NOT_PASSED = Cause("threshold not passed", "the threshold is not passed by any change tried")
+NOT_SEEN_TO_PASS = Cause("threshold not seen passed", "the threshold is not passed; {why}")
+HIDDEN_BY_SCATTER = Cause(
+    "threshold within scatter", "the scatter of the error without change reaches the threshold"
+)
 
 FINE = 40
 """places between two changes where line and scatter are held against the threshold."""
@@ -81,8 +91,7 @@ def passing(name: str, change: Array, errors: Sequence[Estimate], threshold: Thr
     if value is None:
         return _bound(name, change, errors, threshold, without)
     if value == 0.0:
-        reason = "the error is beyond the threshold without any change"
-        return Estimate.without_interval(name, 0.0, "", reason)
+        return Estimate.without_interval(name, 0.0, "", BEYOND_WITHOUT_CHANGE())
     interpolated = _interpolation(change, error, threshold.value, value)
     method = "straight line between the changes tried"
     parts = (Systematic("interpolation", interpolated),)
@@ -100,21 +109,20 @@ def _bound(
     change: Array,
     errors: Sequence[Estimate],
     threshold: Threshold,
-    without: str | None,
+    without: Reason | None,
 ) -> Estimate:
     """How far the parameter may change, at least; both sides of it were tried that far."""
     reach = float(min(-change[0], change[-1]))
     method = "the largest change tried"
     if without is not None:
-        reason = f"the threshold is not passed; {without}"
+        reason = NOT_SEEN_TO_PASS(why=without)
         return Estimate(name, reach, "", kind="at least", method=method, reason=reason)
     may = _nearest(change, errors, threshold, 1.0, ONE_SIDED)
     if may is not None and may < reach:
         reach, method = may, "the largest change at which the scatter cannot hide a passing"
     if not reach > 0:
-        reason = "the scatter of the error without change reaches the threshold"
-        return Estimate.without_interval(name, math.nan, "", reason)
-    reason = "the threshold is not passed by any change tried"
+        return Estimate.without_interval(name, math.nan, "", HIDDEN_BY_SCATTER())
+    reason = NOT_PASSED()
     return Estimate(name, reach, "", kind="at least", level=LEVEL, method=method, reason=reason)
 
 

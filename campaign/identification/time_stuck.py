@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Systematic
 from campaign.identification.intervals import of_repeats
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 
@@ -26,9 +27,10 @@ SMOOTHED = 0.01
 """Longest smoothing, as a share of one part of the record (a half cycle)."""
 SIGMAS = 2.0
 """of the noise that stay below the threshold."""
-UNRESOLVED = (
+UNRESOLVED = Cause(
+    "rate not resolved",
     "no sensor resolves it: with one count, or twice the noise, below 0.1 % of the hull's largest "
-    "rate, the smoothing is longer than 1 % of a half cycle"
+    "rate, the smoothing is longer than 1 % of a half cycle",
 )
 
 
@@ -71,7 +73,7 @@ def time_stuck(
         method = f"{how}, smoothed over {rate.span * step:.3g} s; {told.method}"
         blurred = (Systematic("smoothing of the rate", blur),)
         return replace(_share(told), method=method, systematic=blurred)
-    return Estimate.without_interval(NAME, math.nan, "", UNRESOLVED)
+    return Estimate.without_interval(NAME, math.nan, "", UNRESOLVED())
 
 
 def over_recordings(found: Sequence[Estimate]) -> Estimate | None:

@@ -17,7 +17,7 @@ closest to the truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.extrapolated import extrapolated
-from campaign.identification.intervals import USELESS, judged, student, with_error
+from campaign.identification.gate import MATTERS, USELESS, admitted, refused
+from campaign.identification.intervals import student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
     LEAST,
@@ -44,6 +45,7 @@ from campaign.identification.stribeck import (
     stribeck,
     with_misfit,
 )
+from campaign.reason import NONE, Cause, Reason
 
 Model = Literal["free", "2", "none"]
 MODELS: tuple[Model, ...] = ("free", "2", "none")
@@ -54,7 +56,19 @@ ROUNDS = 20
 SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
 LACKING = 0.05
-"""p-value of the lack of fit below which the model does not describe the repeated points."""
+"""p-value below which a model does not describe the points, or the repeated points."""
+HELD_EXPONENT = Cause("held", "held at {value:g}")
+LEFT_OPEN = Cause("left open by points", "these points leave it open")
+NO_EFFECT = Cause("no Stribeck effect", "Ts and Tc are the same within their interval")
+SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
+NEGATIVE = Cause("negative by the data", "the data would have it negative")
+LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
+ONE_DIRECTION = Cause("one direction", "one direction is {origin}")
+CONTRADICTED: Mapping[Model, Cause] = {
+    "2": Cause("exponent contradicted", "the points contradict the exponent of 2 (p = {p:.2g})"),
+    "none": Cause("Stribeck effect shows", "the points show a Stribeck effect (p = {p:.2g})"),
+}
+"""Why parameters are those of a model that the data contradict."""
 
 
 @dataclass(frozen=True)
@@ -98,15 +112,31 @@ class DirectionFit:
         """The model with the lowest Bayesian information criterion."""
         return min(MODELS, key=lambda model: self.fits[model].bic)
 
+    def contradiction(self, model: Model) -> Reason:
+        """Why the points contradict a model: what it holds fixed; `NONE` where they do not.
+
+        F test of the model against the free fit, whose weights it has.
+        """
+        held, free = self.fits[model], self.fits["free"]
+        more = len(free.free) - len(held.free)
+        if more <= 0 or not free.chi_square > 0:
+            return NONE
+        excess = (held.chi_square - free.chi_square) / more
+        ratio = excess / (free.chi_square / self.freedom)
+        from scipy.special import fdtrc
+
+        p = float(fdtrc(more, self.freedom, max(ratio, 0.0)))
+        return CONTRADICTED[model](p=p) if p < LACKING else NONE
+
     @property
     def misfit(self) -> float:
         """Deviation of the residuals with delta = 2 over that with delta free, each weighted."""
         return math.sqrt(self.fits["2"].chi_square / max(self.fits["free"].chi_square, 1e-300))
 
-    def beyond(self, name: str) -> str:
-        """Why a parameter is extrapolated; "" where it is not, or no Stribeck effect shows."""
+    def beyond(self, name: str) -> Reason:
+        """Why a parameter is extrapolated; none where it is not, or no Stribeck effect shows."""
         velocity = self.fits["free"].values["stribeck_velocity"]
-        return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else ""
+        return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else NONE
 
 
 def fit_direction(
@@ -188,36 +218,48 @@ def differs(found: StribeckFit, freedom: float) -> bool:
 
 
 def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
-    """The parameters of one direction with their intervals, by name."""
-    found = fit.fits[model]
+    """The parameters of one direction with their intervals, by name, as they may be reported."""
+    return {name: _passed(one, model, fit) for name, one in _fitted(fit, model).items()}
+
+
+def _fitted(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
     names = PARAMETERS if model != "none" else ("viscous_friction", "coulomb_torque")
-    return {name: _estimate(fit, model, found, name) for name in names}
+    return {name: _estimate(fit, model, fit.fits[model], name) for name in names}
+
+
+def _passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
+    """A parameter of one direction, or of the mean of both, as it may be reported."""
+    if told.origin is not Origin.MEASURED:
+        return told
+    freedom = min(fit.freedom for fit in fits)
+    if told.name in ("stribeck_velocity", "stribeck_exponent"):
+        if not all(differs(fit.fits[model], freedom) for fit in fits):
+            return refused(told, NO_EFFECT())
+        matters = 0.0
+    else:
+        fastest = {"viscous_friction": max(float(fit.speed.max()) for fit in fits)}
+        force = MATTERS * max(float(fit.torque.max()) for fit in fits)
+        matters = force / fastest.get(told.name, 1.0)
+    one = admitted(told, matters)
+    against = next(filter(None, (fit.contradiction(model) for fit in fits)), NONE)
+    if against and one.origin is Origin.MEASURED:
+        return replace(one, origin=Origin.CONTRADICTED, reason=against)
+    return one
 
 
 def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) -> Estimate:
     value, unit = found.values[name], UNITS[name]
     method = f"least squares, points weighted by window and scatter, t({fit.freedom})"
     if name == "stribeck_exponent" and model == "2":
-        return Estimate(name, value, unit, reason="held at 2", origin=Origin.GIVEN)
+        return Estimate(
+            name, value, unit, reason=HELD_EXPONENT(value=HELD[model]), origin=Origin.GIVEN
+        )
     if name in found.bounds:
         return _at_bound(fit, model, name, method)
     if name in found.open:
-        reason = "these points leave it open"
-        return _not_determined(Estimate(name, value, unit, method=method), reason)
+        return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
-    told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
-    return _without_effect(told, differs(found, fit.freedom))
-
-
-def _without_effect(told: Estimate, effect: bool) -> Estimate:
-    """Vs and delta say nothing where no Stribeck effect shows; nothing does that is too wide."""
-    if told.name in ("stribeck_velocity", "stribeck_exponent") and not effect:
-        return _not_determined(told, "Ts and Tc are the same within their interval")
-    return judged(told)
-
-
-def _not_determined(told: Estimate, reason: str) -> Estimate:
-    return replace(told, origin=Origin.NOT_DETERMINED, reason=reason)
+    return with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
 
 
 def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estimate:
@@ -226,10 +268,9 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
     value, unit = found.values[name], UNITS[name]
     physical = name in ("viscous_friction", "coulomb_torque", "static_torque")
     if not physical or model == "none":
-        reason = f"the search ended at {value:.3g}, its {found.bounds[name]} limit"
-        if physical:
-            reason = "the data would have it negative"
-        return _not_determined(Estimate(name, value, unit, method=method), reason)
+        ended = SEARCH_ENDED(value=value, side=found.bounds[name])
+        reason = NEGATIVE() if physical else ended
+        return refused(Estimate(name, value, unit, method=method), reason)
     exponent = HELD[model]
 
     def cost(tried: float) -> float:
@@ -245,13 +286,13 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
         high = profile_limit(cost, value, step, rise)
     except ValueError:
         told = Estimate(name, value, unit, method=method)
-        return _not_determined(told, "these points leave it open")
+        return refused(told, LEFT_OPEN())
     if name != "viscous_friction" and high > USELESS * float(fit.torque.max()):
         # A map that ends below vs is as well described by Tc = 0 and a huge viscous friction as by
         # the truth. Where noise prefers that, a limit would be of the wrong one of two minima: it
         # held Tc in 22 % of such maps.
         told = Estimate(name, value, unit, method=method)
-        return _not_determined(told, "these points do not tell it from viscous friction")
+        return refused(told, LIKE_VISCOUS())
     return Estimate(
         name,
         value,
@@ -264,20 +305,16 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
 
 
 def nominal_estimates(
-    positive: DirectionFit,
-    negative: DirectionFit,
-    model: Model,
-    told: Sequence[Mapping[str, Estimate]] | None = None,
+    positive: DirectionFit, negative: DirectionFit, model: Model
 ) -> dict[str, Estimate]:
     """Mean of both directions, by name; their errors are those of the same trials.
-
-    `told` are the estimates of both directions, where they are at hand.
 
     Points of one speed are of one trial, out and back. How far their errors go together is told by
     the residuals; it was 0.73 to 0.99 where friction scatters from trial to trial.
     """
-    one, other = told or [direction_estimates(fit, model) for fit in (positive, negative)]
-    return {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
+    one, other = _fitted(positive, model), _fitted(negative, model)
+    found = {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
+    return {name: _passed(each, model, positive, negative) for name, each in found.items()}
 
 
 def _mean(
@@ -288,8 +325,8 @@ def _mean(
         if not each.has_interval or each.origin is Origin.AT_BOUND:
             if each.origin is Origin.GIVEN:
                 return each
-            reason = each.reason or f"one direction is {each.origin}"
-            return _not_determined(Estimate(name, value, unit), reason)
+            reason = each.reason or ONE_DIRECTION(origin=each.origin)
+            return refused(Estimate(name, value, unit), reason)
     found = positive.fits[model], negative.fits[model]
     cross = cross_covariance(positive, negative, model)
     i, j = found[0].free.index(name), found[1].free.index(name)
@@ -299,9 +336,7 @@ def _mean(
     freedom = min(positive.freedom, negative.freedom)
     method = f"mean of both directions, with the covariance of their points, t({freedom})"
     error = math.sqrt(max(float(variance), 0.0))
-    told = with_error(name, value, unit, error, freedom, method, reason=one.reason or other.reason)
-    effect = all(differs(each, freedom) for each in found)
-    return _without_effect(told, effect)
+    return with_error(name, value, unit, error, freedom, method, reason=one.reason or other.reason)
 
 
 def correlation(positive: DirectionFit, negative: DirectionFit) -> float:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, USELESS
+from campaign.identification.gate import USELESS
+from campaign.identification.intervals import LEVEL
 from campaign.identification.inverse.motion import Array
 from campaign.identification.inverse.regression import (
     Piece,
@@ -31,12 +32,20 @@ from campaign.identification.multi_start import (
 )
 from campaign.identification.objective import Objective
 from campaign.identification.unknowns import Unknown, values_at
+from campaign.reason import Cause
 
 Values = tuple[float, ...]
 Residuals = Callable[[Values], Sequence[Array]]
 METHOD = "least squares through the simulation; deviation with autocorrelation (Newey and West)"
 NULL = 1e-6
 """Of the largest singular value: directions below it leave their parameters open."""
+WENT_TO_BOUND = Cause("at bound", "it went to its {side} bound")
+NOT_IN_MOTION = Cause("not in the motion", "nothing in the motion tells it")
+LEFT_OPEN = Cause("left open by the motion", "the motion leaves it open")
+LEFT_WIDE = Cause(
+    "left wide by the motion",
+    "the motion leaves it anywhere from {low:.2g} to {high:.2g}{in_unit}",
+)
 
 
 @dataclass(frozen=True)
@@ -182,16 +191,16 @@ def _estimate(
     value = unknown.value(share)
     if not free[index] or regression is None:
         side = "" if found.uncertainty is None else found.uncertainty.bound[index]
-        reason = f"it went to its {side} bound" if side else "nothing in the motion tells it"
+        reason = WENT_TO_BOUND(side=side) if side else NOT_IN_MOTION()
         origin = Origin.AT_BOUND if side else Origin.NOT_DETERMINED
         return Estimate.without_interval(name, value, unit, reason, method=METHOD, origin=origin)
     place = int(np.count_nonzero(free[:index]))
     half = regression.quantile * float(regression.robust[place])
-    reason = "the motion leaves it open"
+    reason = LEFT_OPEN()
     low, high = value, value
     if not left_open and half < 1.0:
         low, high = sorted((unknown.value(share - half), unknown.value(share + half)))
-        reason = f"the motion leaves it anywhere from {low:.2g} to {high:.2g} {unit}".rstrip()
+        reason = LEFT_WIDE(low=low, high=high, in_unit=f" {unit}".rstrip())
     if not low < high or high - low > 2.0 * USELESS * abs(value):
         return Estimate.without_interval(
             name, value, unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.identifying.identification import Section
 from campaign.identifying.tables import told, words
 
@@ -14,21 +14,29 @@ SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
 COMPARED = ("coulomb", "viscous", "inertia")
 WORTH_TELLING = 0.1
 """of the larger of two values by which they are apart at least."""
+OVER_TEMPERATURE = "_over_temperature"
+"""How names end of a model whose friction is that at one temperature, and no mean over several."""
 
 
 def disagreements(sections: Sequence[Section]) -> Iterator[str]:
-    """Of numbers whose intervals exclude each other, a sentence; the widest gap of each alone."""
-    found: dict[str, list[tuple[str, Estimate, str]]] = {}
+    """Of measured numbers whose intervals exclude each other, a sentence; the widest gap alone.
+
+    Friction at one temperature is not held against a mean over several.
+    """
+    found: dict[tuple[str, bool], list[tuple[str, Estimate, str]]] = {}
     for section in sections:
+        names = {each.estimate.name for each in section.parameters}
         for each in section.parameters:
             name = each.estimate.name
             for own, common in SAME.items():
                 name = name.replace(own, common) if name.startswith(own) else name
-            if name.split("_")[0] in COMPARED and each.estimate.has_interval:
-                found.setdefault(name, []).append(
+            measured = each.estimate.origin is Origin.MEASURED and each.estimate.has_interval
+            if name.split("_")[0] in COMPARED and measured:
+                at_one = f"{name.split('_')[0]}{OVER_TEMPERATURE}" in names
+                found.setdefault((name, at_one), []).append(
                     (section.method.name, each.estimate, each.display)
                 )
-    for name, several in found.items():
+    for (name, _), several in found.items():
         pairs = [(_gap(one[1], other[1]), one, other) for one, other in combinations(several, 2)]
         gap, one, other = max(pairs, key=lambda pair: pair[0], default=(0.0, None, None))
         if gap <= 0 or one is None or other is None:

@@ -8,7 +8,7 @@ from typing import Any
 from campaign import __version__
 from campaign.axis_kind import speaking_of, unit_here
 from campaign.errors import CampaignError
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
 from campaign.identifying.compensations import identified_compensations, without_identified
 from campaign.identifying.identification import Identification, Section
 from campaign.identifying.method import Identified, Parameter
@@ -94,11 +94,7 @@ def _filled(section: Section) -> dict[str, Parameter]:
     """Parameters that have a place in a bench, by their names."""
     if section.identified is None:
         return {}
-    return {
-        each.estimate.name: each
-        for each in section.identified.parameters
-        if each.bench and each.estimate.origin is Origin.MEASURED
-    }
+    return {each.estimate.name: each for each in section.identified.parameters if each.bench}
 
 
 def _of_sliding(sections: Sequence[Section]) -> Section | None:

@@ -13,7 +13,13 @@ from campaign.experiments.interface import bench_of
 from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
 from campaign.identification.difference import Difference, difference_of
 from campaign.identifying.material import Chosen, same_recordings
-from campaign.identifying.method import Identified, Material, Method, Parameter, nobody_listens
+from campaign.identifying.method import (
+    Identified,
+    Material,
+    Method,
+    Parameter,
+    nobody_listens,
+)
 from campaign.physics.bench import Bench
 from campaign.plugins import Kinds
 from campaign.protocol.files import Overridden

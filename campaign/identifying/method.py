@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.archive import ArchivedTrial
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
@@ -35,6 +35,11 @@ class Material:
     say: Callable[[str], None] = nobody_listens
 
 
+def is_value(estimate: Estimate) -> bool:
+    """Whether a bench file may state it: a measured number, and no bound."""
+    return estimate.origin is Origin.MEASURED and estimate.kind == "number"
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number of the rig.
@@ -43,7 +48,8 @@ class Parameter:
         estimate: SI, of a rotary axis; what is shown follows from the bench.
         meaning: one sentence.
         display: unit that a reader is shown, "" for the same.
-        bench: key of the bench file that it fills in, e.g. `axis.inertia`; "" for none.
+        bench: key of the bench file that it fills in, e.g. `axis.inertia`; "" for none, which it
+            always is of what is no measured number: not determined, or a bound.
         lumped: key of a friction model that stands for all interfaces together, as that of a
             compensation does, e.g. `negative.coulomb_torque`; "" for none.
         advice: what to measure next to make its interval narrower; "" where nobody knows.
@@ -55,6 +61,10 @@ class Parameter:
     bench: str = ""
     advice: str = ""
     lumped: str = ""
+
+    def __post_init__(self) -> None:
+        if not is_value(self.estimate):
+            object.__setattr__(self, "bench", "")
 
 
 @dataclass(frozen=True)

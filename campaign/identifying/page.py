@@ -14,7 +14,7 @@ from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
 from campaign.access.sentences import remarks, sentence
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import speaking_of, words_here
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identifying.agreement import disagreements
@@ -128,7 +128,8 @@ def refuse_foreign(output: Path) -> None:
 def next_measurement(found: Identification) -> str:
     """About what methods disagree, and what to measure next to halve the widest interval."""
     widest_one = widest(found.parameters)
-    advice = [] if widest_one is None else [_advice(widest_one)]
+    with speaking_of(found.bench.sides):
+        advice = [] if widest_one is None else [_advice(widest_one)]
     return " ".join([*disagreements(found.sections), *advice])
 
 
@@ -142,8 +143,8 @@ def _advice(parameter: Parameter) -> str:
     parts = [part for part in estimate.systematic if part.standard_uncertainty]
     parts.sort(key=lambda part: -(part.standard_uncertainty or 0.0))
     if parts and 2.0 * estimate.systematic_uncertainty > scatter:
-        source = parts[0].source
-        cure = CURES.get(source, f"know the {source} better")
+        source = words_here(parts[0].source)
+        cure = CURES.get(parts[0].source, f"know the {source} better")
         return (
             f"{begin} Most of it is systematic ({source}), and no longer recording makes that "
             f"smaller: {cure}."

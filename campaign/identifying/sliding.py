@@ -138,7 +138,7 @@ def _found(
     found = [
         stretch for trial in trials for stretch in _stretches(trial, bench, shortest, slowest, held)
     ]
-    placed = [(each.angle, each.torque) for each in found if each.angle is not None]
+    placed = [(each.time, each.angle, each.torque) for each in found if each.angle is not None]
     whole = len(placed) == len(found) and not bench.is_linear
     return found, over_a_turn(placed) if whole else None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identifying.identification import Change, Section
 from campaign.result import Cell, Column, Table
@@ -27,6 +28,7 @@ def parameters_table(sections: Sequence[Section]) -> Table:
             "meaning": parameter.meaning,
             "bench": parameter.bench,
             "method": section.method.name,
+            "reason": str(parameter.estimate.reason),
         }
         for section in sections
         for parameter in section.parameters
@@ -40,6 +42,7 @@ def parameters_table(sections: Sequence[Section]) -> Table:
         Column("meaning", "What it is"),
         Column("bench", "Key of the bench"),
         Column("method", "Method"),
+        Column("reason", "Condition, or why it is not determined"),
     )
     note = (
         "Intervals hold what scatters, with autocorrelation, and the systematic parts; a choice of "
@@ -72,7 +75,7 @@ def changes_table(before: str, after: str, section: Section) -> Table:
 
 def _change_row(change: Change) -> Mapping[str, Cell]:
     p = change.adjusted
-    verdict = change.difference.reason or "no change shown"
+    verdict = str(change.difference.reason) or "no change shown"
     if p is not None:
         verdict = "changed" if p <= CHANGED else "no change shown"
     return {
@@ -111,8 +114,10 @@ def systematic(estimate: Estimate, display: str = "") -> str:
             return "unknown"
         return f"{float(convert(size, estimate.unit, display)) if display else size:.2g}"
 
-    parts = estimate.systematic
-    return ", ".join(f"{part.source} {shown(part.standard_uncertainty)}" for part in parts)
+    return ", ".join(
+        f"{words_here(part.source)} {shown(part.standard_uncertainty)}"
+        for part in estimate.systematic
+    )
 
 
 def words(name: str) -> str:

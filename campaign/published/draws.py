@@ -14,12 +14,16 @@ from dataclasses import replace
 from statistics import fmean, median, stdev
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import Cause
 from campaign.result import Finding, Value
 from campaign.units import convert
 
 SEED = "bench.variation.seed"
 """What a matrix sweeps for several draws: the condition in which their findings differ."""
 LEVEL = 0.95
+LOST_DRAWS = Cause("draws without a number", "{lost} of {draws} draws have no number")
+ONE_DRAW = Cause("too few draws", "it takes two draws or more")
+DRAWS_ALIKE = Cause("draws alike", "all {draws} draws are alike")
 
 
 def but_for_seed(conditions: Mapping[str, Value]) -> dict[str, Value]:
@@ -54,7 +58,7 @@ def together(findings: Sequence[Finding], seeds: Collection[Value] = ()) -> Find
     if "deviation" in str(first.conditions.get("statistic")) and told.low is not None:
         told = replace(told, low=max(told.low, 0.0))  # it cannot be less
     if lost := usable.count(False) + len(missing):
-        reason = f"{lost} of {len(findings) + len(missing)} draws have no number"
+        reason = LOST_DRAWS(lost=lost, draws=len(findings) + len(missing))
         value = told.value
         told = Estimate.without_interval(
             first.quantity, value, first.unit, reason, origin=Origin.NOT_DETERMINED
@@ -76,9 +80,9 @@ def spread(
     count = len(found)
     middle = median(found) if found else math.nan
     if count < 2:
-        return Estimate.without_interval(name, middle, unit, "it takes two draws or more")
+        return Estimate.without_interval(name, middle, unit, ONE_DRAW())
     if found[0] == found[-1] and not systematic:
-        return Estimate.without_interval(name, middle, unit, f"all {count} draws are alike")
+        return Estimate.without_interval(name, middle, unit, DRAWS_ALIKE(draws=count))
     outermost = int((1.0 - LEVEL) / 2.0 * (count + 1) + 1e-9)
     if outermost:
         low, high = found[outermost - 1], found[-outermost]

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from campaign.estimate import Kind, Origin
 from campaign.published.values import Cell
+from campaign.reason import NONE, Reason
 from campaign.result import Finding
 from campaign.units import convert
 
@@ -53,7 +54,7 @@ class Reproduced:
     high: float | None = None
     kind: Kind = "number"
     origin: Origin = Origin.MEASURED
-    reason: str = ""
+    reason: Reason = NONE
 
     @property
     def is_determined(self) -> bool:

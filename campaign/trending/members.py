@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -12,10 +12,11 @@ from pathlib import Path
 from campaign.access.analysis import AnalysedTest, analyse_run, source_of
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, words_here
 from campaign.comparing.circumstances import Change, changes
 from campaign.comparing.draws import SIMULATION
 from campaign.comparing.pairing import pair_tests
-from campaign.comparing.shared import constants
+from campaign.comparing.shared import constants, source_called
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.trial import Outcome, Role
@@ -50,6 +51,11 @@ class Member:
     @property
     def name(self) -> str:
         return self.run.name
+
+    @property
+    def sides(self) -> Sides:
+        """Of the rig, in the words of which it is told."""
+        return next((test.sides for test in self.tests if test.bench), BOTH_ROTARY)
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
@@ -92,11 +98,14 @@ def with_exchanged(
 
     Raises UsageError for what is no constant of these runs, or none of the runs but the first.
     """
-    for source, path in exchanged:
-        told = f"--exchanged {source}@{path.stem}"
-        known = dict.fromkeys(name for member in members for name in member.constants)
-        if source not in known:
-            raise UsageError(f"{told}: {source!r} is none of {', '.join(known) or 'nothing'}")
+    for name, path in exchanged:
+        told = f"--exchanged {name}@{path.stem}"
+        known = dict.fromkeys(source for member in members for source in member.constants)
+        source = source_called(name, known, members[0].sides)
+        if source is None:
+            with speaking_of(members[0].sides):
+                there = ", ".join(map(words_here, known)) or "nothing"
+            raise UsageError(f"{told}: {name!r} is none of {there}")
         first = next((each.number for each in members if each.run.path == path), None)
         if first is None:
             raise UsageError(f"{told}: none of the runs that are followed")
@@ -128,9 +137,15 @@ def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
             for change in changes(one.run, other.run, pair_tests(one.tests, other.tests))
             if change.path not in OWN_OF_EACH
         )
-        + tuple(Change("rig", source, "one piece", "another") for source in other.exchanged)
+        + tuple(_exchanges(other))
         for one, other in pairwise(members)
     )
+
+
+def _exchanges(member: Member) -> Iterator[Change]:
+    for source in member.exchanged:
+        with speaking_of(member.sides):
+            yield Change("rig", words_here(source), "one piece", "another")
 
 
 def _check(runs: Sequence[RunReader]) -> None:

@@ -67,7 +67,6 @@ def _fitted(members: Sequence[Member], methods: Kinds[Method], name: str) -> Fit
         made(
             points,
             left_out,
-            "",
             test=name,
             title=methods[name].summary,
             quantity=each,

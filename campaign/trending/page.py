@@ -12,6 +12,7 @@ from campaign import __version__
 from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
+from campaign.axis_kind import speaking_of, words_here
 from campaign.errors import UsageError
 from campaign.identification.difference import in_unit
 from campaign.identification.trends.family import POWER, RATE
@@ -90,6 +91,8 @@ def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str,
     judged = [each for each in trends.followed if each.change is not None]
     on_page = page_table(judged, trends.covariate)
     circumstances = circumstances_table(trends)
+    with speaking_of(trends.members[0].sides):
+        cancelled = {words_here(source) for each in trends.followed for source in each.cancelled}
     context = {
         "trends": trends,
         "title": title_of(trends),
@@ -106,7 +109,7 @@ def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str,
         if circumstances.rows
         else None,
         "damaged": [member for member in trends.members if member.damaged],
-        "cancelled": sorted({source for each in trends.followed for source in each.cancelled}),
+        "cancelled": sorted(cancelled),
         "problems": making.problems,
         "rate": f"{100 * RATE:g} %",
         "power": f"{100 * POWER:g} %",
@@ -186,7 +189,7 @@ def _tree(each: Followed, trends: Trends) -> dict[str, Any]:
         "conditions": dict(series.conditions),
         "unit": series.display,
         "verdict": str(each.verdict),
-        "reason": each.reason,
+        "reason": str(each.reason),
         "notes": list(each.notes),
         "left_out": list(series.left_out),
         "cancelled": list(each.cancelled),

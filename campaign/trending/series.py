@@ -25,12 +25,15 @@ from campaign.identification.contrast import is_student
 from campaign.identification.difference import BOUNDS, in_unit
 from campaign.identification.intervals import LEVEL, student
 from campaign.identification.trends.own_errors import moderated
+from campaign.reason import NONE, Cause, Reason
 from campaign.result import Finding, Value
 from campaign.trending.members import LEAST, Member
 
 Array = NDArray[np.float64]
 
 TWIN = "the same simulation as"
+TOO_FEW_RUNS = Cause("too few runs", "found in {runs} runs{lost}: three are the least")
+SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last digit")
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Series:
         display: what a reader is shown.
         points: in the order of time.
         left_out: why others are not among them.
-        reason: why it is not followed; "" where it is.
+        reason: why it is not followed; `NONE` where it is.
     """
 
     test: str
@@ -81,7 +84,7 @@ class Series:
     display: str
     points: tuple[Point, ...]
     left_out: tuple[str, ...] = ()
-    reason: str = ""
+    reason: Reason = NONE
     conditions: Mapping[str, Value] = field(default_factory=dict)
 
     @property
@@ -168,15 +171,17 @@ def add_point(
         points.append(Point(member, test, estimate))
 
 
-def made(points: Sequence[Point], left_out: Sequence[str], reason: str, **more: object) -> Series:
+def made(
+    points: Sequence[Point], left_out: Sequence[str], reason: Reason = NONE, **more: object
+) -> Series:
     """A series, with the reason why it is not followed: the given one, or another."""
     values = [point.estimate.value for point in points]
     if not reason and len(points) < LEAST:
         whys = Counter(why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in left_out)
         told = "; ".join(f"{why} in {count}" for why, count in whys.items())
-        reason = f"found in {len(points)} runs{f', {told}' if told else ''}: three are the least"
+        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {told}" if told else "")
     if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
-        reason = "it is the same in all runs, to the last digit"
+        reason = SAME_IN_ALL()
     return Series(
         points=tuple(points),
         left_out=tuple(left_out),
@@ -189,9 +194,9 @@ def _series(found: _Collected) -> Series:
     test, finding = found.test, found.finding
     words = condition_words(test, finding.conditions)
     name = name_here(test, finding.quantity)
-    reason = FOLLOWS if finding.quantity in DERIVED else ""
+    reason = FOLLOWS() if finding.quantity in DERIVED else NONE
     if not reason and 2 * len(found.wrong) > len(found.points):
-        reason = f"{found.wrong[0]}; {WRONG_MODEL}"
+        reason = WRONG_MODEL(held=found.wrong[0])
     return made(
         found.points,
         found.left_out,

@@ -11,12 +11,14 @@ from campaign.estimate import Estimate
 from campaign.identification.difference import in_unit
 from campaign.identification.trends.changes import LEAST_FOR_A_JUMP, Jump
 from campaign.identification.trends.family import RATE
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit
 from campaign.trending.covariates import ORDER, TIME, Covariate
 from campaign.trending.trends import JUMP, TREND, Followed, Trends, Verdict
 from campaign.units import convert
 
+MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
 CIRCUMSTANCES = 4
 """Most changes beside a jump that a sentence names; the table has them all."""
 
@@ -257,7 +259,7 @@ def sentences(trends: Trends) -> Iterator[str]:
 
 def not_judged(trends: Trends) -> Iterator[str]:
     """`12: ...`: each reason once, the most frequent first."""
-    told = Counter(each.reason for each in trends.of(Verdict.NOT_JUDGED))
+    told = Counter(str(each.reason) for each in trends.of(Verdict.NOT_JUDGED))
     for reason, count in told.most_common():
         yield f"{count}: {reason}"
 
@@ -281,7 +283,7 @@ def _row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
         "unit": pretty_unit(each.series.display),
         "runs": len(each.series.points),
         "verdict": str(each.verdict),
-        "reason": each.reason,
+        "reason": str(each.reason),
         "notes": "; ".join((*each.notes, *each.series.left_out)),
     }
     effects = effect(each, covariate)
@@ -325,8 +327,7 @@ def _shared(each: Followed, estimate: Estimate) -> Estimate:
     """As a share of the mean; without any where the mean may be 0."""
     share = each.share
     if not math.isfinite(share):
-        why = "the mean is too near 0, or too little known"
-        return Estimate.without_interval(estimate.name, math.nan, "", why)
+        return Estimate.without_interval(estimate.name, math.nan, "", MEAN_NEAR_ZERO())
     ends = [None if end is None else share * end for end in (estimate.low, estimate.high)]
     return replace(estimate, value=share * estimate.value, unit="", low=ends[0], high=ends[1])
 

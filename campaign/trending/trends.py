@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.archive import RunReader
+from campaign.axis_kind import speaking_of, words_here
 from campaign.channels import TEMPERATURE
 from campaign.comparing.circumstances import Change as Circumstance
 from campaign.errors import UsageError
@@ -23,6 +24,7 @@ from campaign.identification.trends.family import RATE, adjusted, detectable, le
 from campaign.identification.trends.scatter import Mixture
 from campaign.identifying.method import Method
 from campaign.plugins import Kinds
+from campaign.reason import NONE, Cause, Reason
 from campaign.trending.covariates import (
     ORDER,
     TIME,
@@ -38,7 +40,7 @@ from campaign.trending.members import (
     with_exchanged,
 )
 from campaign.trending.models import Fitted, fit_models
-from campaign.trending.series import Series, series_of
+from campaign.trending.series import SAME_IN_ALL, Series, series_of
 from campaign.units import convert
 
 Array = NDArray[np.float64]
@@ -51,6 +53,9 @@ WITHIN = (
     "all of this change lies within the interval of each single run: it may be an error that the "
     "runs share and that changes with something else, as one parameter's with another's value"
 )
+TOO_FEW_KNOWN = Cause("covariate of too few runs", "{covariate} is known of {runs} runs: too few")
+NOT_VARYING = Cause("constant covariate", "{covariate} does not vary")
+NO_CHANGE_MODEL = Cause("no model of changes", "{error}")
 TREND, JUMP = "trend", "jump"
 
 
@@ -83,7 +88,7 @@ class Followed:
     series: Series
     x: Array
     change: Change | None = None
-    reason: str = ""
+    reason: Reason = NONE
     verdict: Verdict = Verdict.NOT_JUDGED
     adjusted: Mapping[str, float] | None = None
     detectable: Mapping[str, float] | None = None
@@ -216,19 +221,21 @@ def _followed(series: Series, covariate: Covariate) -> Followed:
         series = replace(series, points=points, left_out=(*series.left_out, *told))
         x = x[known]
         if len(points) >= LEAST and np.ptp(series.values) == 0:
-            return Followed(series, x, reason="it is the same in all runs, to the last digit")
+            return Followed(series, x, reason=SAME_IN_ALL())
     n = len(x)
     if n < LEAST:
-        return Followed(series, x, reason=f"{covariate.name} is known of {n} runs: too few")
+        return Followed(series, x, reason=TOO_FEW_KNOWN(covariate=covariate.name, runs=n))
     if np.ptp(x) <= 1e-9 * np.max(np.abs(x)):
-        return Followed(series, x, reason=f"{covariate.name} does not vary")
+        return Followed(series, x, reason=NOT_VARYING(covariate=covariate.name))
     own, cancelled, unknown = series.own()
-    notes = [f"not the same in all runs, and nobody said how uncertain: {s}" for s in unknown]
+    with speaking_of(series.points[0].member.sides):
+        told_of = map(words_here, unknown)
+        notes = [f"not the same in all runs, and nobody said how uncertain: {s}" for s in told_of]
     notes += [series.bare] if series.bare else []
     try:
         found = change(x, series.values, own, jumps=covariate.ordered)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return Followed(series, x, reason=str(error))
+        return Followed(series, x, reason=NO_CHANGE_MODEL(error=str(error)))
     return Followed(series, x, found, cancelled=cancelled, notes=tuple(notes))
 
 

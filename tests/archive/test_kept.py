@@ -12,6 +12,7 @@ from campaign.archive import RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
+from campaign.reason import Reason
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
 from campaign.trial import Role
 from tests.archive.forging import series_digest
@@ -153,7 +154,7 @@ def test_a_run_of_format_3_is_read_as_it_was_recorded(name):
     assert first.windows == (Window("steady", 0.5, 1.75),)
     assert first.estimates == (
         Estimate("coulomb_torque", 0.25, "N m", 0.2, 0.3, 0.95, "bootstrap"),
-        Estimate("stribeck_rate", 0.125, "rad/s", reason="one run only"),
+        Estimate("stribeck_rate", 0.125, "rad/s", reason=Reason("text", "one run only")),
     )
     assert run.planned(4).seed == 4611686018427387908
 
@@ -189,7 +190,9 @@ def test_a_sealed_run_of_format_3_is_what_its_seal_says():
     assert run.ended == "2026-11-22T08:07:00.000+00:00"
     assert run.unchanged()
     assert run.root == "0af35a0a17f6a6ef298d08a40a8c2f279819bc5fe7eba1a5db02d7d6656a07cd"
-    assert run.trials[2].estimates == (Estimate("peak_rate", 29.5, "rad/s", reason="one sample"),)
+    assert run.trials[2].estimates == (
+        Estimate("peak_rate", 29.5, "rad/s", reason=Reason("text", "one sample")),
+    )
     for event in ('"decision":"retry"', '"step":"Lock the yaw axis"'):
         assert event in run.journal
     found = verify_run(run.path)

@@ -17,11 +17,13 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
 from campaign.archive.verifying.verification import verify_run
 from campaign.estimate import Estimate, Systematic
+from campaign.reason import Cause, Reason
 from campaign.recording import Ending, Outcome
 from tests.archive import forging
 
 TOP = Estimate("top", 0.25, "rad/s", 0.21, 0.29, 0.95, "the largest sample", freedom=7.0)
-LAST = Estimate.without_interval("last", -1.5, "N m", "one sample")
+FEW = Cause("few samples", "{samples} samples in {time:g} s")
+LAST = Estimate.without_interval("last", -1.5, "N m", FEW(samples=1, time=2.0, all_of_it=True))
 FOUND = Measured((TOP, LAST), "campaign 0.1.0")
 
 CRASH = """
@@ -94,8 +96,9 @@ def test_a_program_that_dies_while_it_measures_has_lost_no_recording(tmp_path: P
 def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit) -> None:
     """Every field, and only of the attempt that was measured."""
     full = Estimate(
-        "full", 1e-300, "s", None, 2.0, 0.9, "m", "r", standard_error=0.5, freedom=3.5,
-        systematic=(Systematic("inertia", 0.1), Systematic("alignment")),
+        "full", 1e-300, "s", None, 2.0, 0.9, "m", FEW(samples=3, time=0.5),
+        standard_error=0.5, freedom=3.5,
+        systematic=(Systematic("inertia", 0.1, of_rig=True), Systematic("alignment")),
     )  # fmt: skip
     found = Measured((full, TOP, LAST), "a laboratory's 2.1")
     writer = begun(tmp_path, kit)
@@ -123,6 +126,25 @@ def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit
     again = resumed.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     check(open_run(again).trials[0])
     assert verify_run(again).sound
+
+
+def test_a_reason_that_an_older_journal_has_in_words_is_read(tmp_path: Path, kit) -> None:
+    writer = begun(tmp_path, kit)
+    finish(writer, kit).measure(lambda archived: FOUND)
+    journal = writer.folder / JOURNAL
+    *first, line = journal.read_text(encoding="utf-8").splitlines()
+    measured = json.loads(line)
+    now = {
+        "code": "few samples",
+        "text": "1 samples in 2 s",
+        "values": [["samples", 1], ["time", 2.0], ["all_of_it", True]],
+    }
+    assert measured["estimates"][1].pop("reason") == now
+    measured["estimates"][1]["reason"] = "one sample"
+    journal.write_text("\n".join((*first, json.dumps(measured), "")), encoding="utf-8")
+    top, last = open_run(writer.folder).trials[0].estimates
+    assert (top, last.reason) == (TOP, Reason("text", "one sample"))
+    writer.close()
 
 
 def test_a_damaged_journal_costs_metrics_and_no_trial(tmp_path: Path, kit) -> None:
@@ -161,7 +183,9 @@ def test_metrics_belong_to_one_finished_trial(tmp_path: Path, kit, line, said: s
 
 
 def test_what_cannot_be_kept_costs_the_metrics_only(tmp_path: Path, kit) -> None:
-    strange = Estimate("x", 1.0, "", reason="r", systematic=(Systematic("s", float("inf")),))
+    strange = Estimate(
+        "x", 1.0, "", reason=Reason("test", "r"), systematic=(Systematic("s", float("inf")),)
+    )
     writer = begun(tmp_path, kit)
     before = (writer.folder / JOURNAL).read_bytes()
     recorder = finish(writer, kit)

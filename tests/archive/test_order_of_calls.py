@@ -18,6 +18,7 @@ from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
 from campaign.estimate import Estimate
+from campaign.reason import Reason
 from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
 from campaign.trial import Trial
 from tests.archive.recorded_calls import Call, Calls, recorded
@@ -81,7 +82,7 @@ def test_a_trial_is_reported_before_it_is_measured(
     """File, name and line are on the disk; what is found is one more line, and no other call."""
     writer = begun(tmp_path, trials)
     journal = writer.folder / JOURNAL
-    found = Measured((Estimate("x", 1.0, "", reason="one sample"),), "campaign")
+    found = Measured((Estimate("x", 1.0, "", reason=Reason("test", "one sample")),), "campaign")
     before: list[int] = []
     with recorded() as calls:
         recorder = writer.begin(trials[0])

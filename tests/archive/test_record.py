@@ -21,6 +21,7 @@ from campaign.archive.layout.record import (
 )
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
+from campaign.reason import NONE, Cause, Reason
 from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
 
 ENDING = Ending(
@@ -30,9 +31,12 @@ ENDING = Ending(
     Fault.LOST_CONNECTION,
     {"latency_ms": {"most": np.float64(4.5), "mean": float("nan")}, "resends": np.int64(3)},
 )
+FEW = Cause("too few runs", "{runs} run in {within:g} s")
 ESTIMATES = (
     Estimate("coulomb_torque", 0.25, "N m", 0.2, 0.3, 0.95, "bootstrap"),
-    Estimate("stribeck_rate", np.float64(5e-324), "rad/s", reason="one run only"),
+    Estimate(
+        "stribeck_rate", np.float64(5e-324), "rad/s", reason=FEW(runs=np.int64(1), within=2.0)
+    ),
 )
 WINDOWS = (Window("steady", 0.5, 1.75),)
 
@@ -68,6 +72,20 @@ def least(kit) -> TrialRecord:
     ending = Ending(Outcome.COMPLETED)
     times = (kit.STARTED, kit.ENDED)
     return make_record(described, trial.label, trial.fingerprint, 1, ending, times, [], series=None)
+
+
+def test_a_reason_keeps_its_code_and_values(record):
+    again = TrialRecord.model_validate_json(record.text).estimates[1].reason
+    assert again in FEW
+    assert dict(again.values) == {"runs": 1, "within": 2.0}
+
+
+def test_a_reason_of_an_older_archive_is_its_text(record):
+    tree = json.loads(record.text)
+    tree["estimates"][1]["reason"] = "one run only"
+    first, second = TrialRecord.model_validate(tree).estimates
+    assert second.reason == Reason("text", "one run only")
+    assert first.reason == NONE
 
 
 @pytest.mark.parametrize("which", ["record", "least"])
@@ -230,7 +248,11 @@ def test_a_record_is_written_as_the_format_says(record, kit):
                 "name": "stribeck_rate",
                 "value": 5e-324,
                 "unit": "rad/s",
-                "reason": "one run only",
+                "reason": {
+                    "code": "too few runs",
+                    "text": "1 run in 2 s",
+                    "values": [["runs", 1], ["within", 2.0]],
+                },
             },
         ],
     }

@@ -31,6 +31,7 @@ from campaign.archive.reading.results_file import read_results
 from campaign.archive.writing.results_file import write_results
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import Cause
 from campaign.result import (
     Amount,
     Axis,
@@ -51,6 +52,7 @@ from tests.archive.test_nexus import nxcheck
 ROOT = "ab" * 32
 TIMES = ("atime", "mtime", "ctime", "btime")
 NAME = "2026-11-21T09-36-58-tiny"
+ALONE = Cause("single trial", "one of {count} trial")
 RATE, TORQUE = Axis("Rate", "rad/s", "deg/s"), Axis("Friction torque", "N m")
 
 
@@ -96,7 +98,10 @@ def table() -> Table:
             "direction": "down ↘",
             "speed": 2,
             "torque": estimate(
-                6.0, None, reason="one only", systematic=(Systematic("gain", 0.1), Systematic("x"))
+                6.0,
+                None,
+                reason=ALONE(count=1),
+                systematic=(Systematic("gain", 0.1), Systematic("x")),
             ),
             "mixed": "x",
             "row": None,
@@ -203,6 +208,20 @@ def test_any_names_make_a_file(run):
 def test_no_results_at_all_are_a_file_too(run):
     found = results(tests=(), published=None, telling=None)
     assert told(read_results(write_results(run, found), ROOT)) == told(found)
+
+
+def test_a_finding_has_its_reason_as_text_and_as_data(run):
+    alone = estimate(5.0, None, reason=ALONE(count=1))
+    findings = (Finding.of(alone, {}), Finding.of(estimate(6.0), {}))
+    tests = (ResultsOfTest("map", "k", "T", Result(findings=findings)),)
+    path = write_results(run, results(tests=tests, telling=None))
+    with h5py.File(path) as file:
+        group = file[f"{ENTRY}/map/findings"]
+        assert list(group["reason"].asstr()) == ["one of 1 trial", ""]
+        assert list(group["reason_code"].asstr()) == ["single trial", ""]
+        assert list(group["reason_values"].asstr()) == ['{"count":1}', "{}"]
+    again = read_results(path, ROOT).tests[0].result.findings[0].known
+    assert again.reason == ALONE(count=1)
 
 
 # The same results, the same bytes; and no way out of the file.

@@ -66,7 +66,7 @@ def test_errors_of_single_trials_are_told_and_not_judged(compare: Compare):
     assert len(errors) == 2
     for pair in errors:
         assert pair.verdict is Verdict.NOT_JUDGED
-        assert "one trial each" in pair.reason
+        assert "one trial each" in str(pair.reason)
         assert "%" in change_of(pair)
         assert pair.display == "mrad"
 

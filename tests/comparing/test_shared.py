@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.shared import shared_sources
+from campaign.axis_kind import BOTH_ROTARY, AxisKind, Sides
+from campaign.comparing.shared import shared_sources, source_called
 from campaign.experiments.interface import TestData
 from campaign.physics.bench import Bench
 from campaign.physics.truth import plant_of
@@ -28,6 +29,17 @@ def test_one_bench_has_one_torque_constant_and_one_inertia(platform: Bench):
     assert shared_sources(on(platform), on(platform), {}, {}) == BOTH
     hardware = on(platform, source="hardware")
     assert shared_sources(hardware, hardware, {}, {}) == BOTH
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [("force constant", "torque constant"), ("torque constant", "torque constant"),
+     ("mass", "inertia"), ("motor", None)],
+)  # fmt: skip
+def test_a_source_goes_by_its_code_and_by_what_a_page_calls_it(name: str, source: str | None):
+    linear = Sides(AxisKind.LINEAR, AxisKind.LINEAR)
+    assert source_called(name, sorted(BOTH), linear) == source
+    assert source_called("force constant", sorted(BOTH), BOTH_ROTARY) is None
 
 
 @pytest.mark.parametrize(

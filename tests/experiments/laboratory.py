@@ -12,11 +12,14 @@ from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import channels_of
+from campaign.reason import Cause
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.result import Finding, Result, Table, bare
 from campaign.trial import Trial
 
 Tree = dict[str, Any]
+MADE_UP = Cause("made up", "somebody made it up")
+"""For a test to which it does not matter why."""
 
 
 @dataclass(frozen=True)

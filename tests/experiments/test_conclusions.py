@@ -34,7 +34,7 @@ from campaign.identification.stabilization_error import NO_SCATTER, OF_ONE_TRIAL
 from campaign.protocol import load_protocol, make_plan
 from campaign.result import Amount, Conclusion, Factor, Finding, Result
 from campaign.units import Quantity
-from tests.experiments.laboratory import analyse, execute, failed
+from tests.experiments.laboratory import MADE_UP, analyse, execute, failed
 from tests.experiments.test_channels import CASES, Case, done
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -193,7 +193,7 @@ def error(method: str, value: float, share: float | None = 0.01, **where: object
         **where,
     }
     if share is None:
-        told = Estimate("stabilization_error", 1e-3 * value, "rad", reason="nothing scatters")
+        told = Estimate("stabilization_error", 1e-3 * value, "rad", reason=MADE_UP())
         return Finding.of(told, conditions)
     half = 2.228 * share * value  # Student's t of 10 degrees of freedom
     told = Estimate(
@@ -320,13 +320,13 @@ def test_a_raised_preload_is_told_for_each_method() -> None:
 
 def test_single_trials_are_called_so() -> None:
     pair = error("none", 0.74), error("lugre", 0.26)
-    single = [Finding.of(replace(e.known, reason=OF_ONE_TRIAL), e.conditions) for e in pair]
+    single = [Finding.of(replace(e.known, reason=OF_ONE_TRIAL()), e.conditions) for e in pair]
     (told,) = stabilized(*single)
     assert told.startswith("At 0.5 Hz, 18 deg/s², one trial each: of an error")
 
 
 def single(finding: Finding) -> Finding:
-    return Finding.of(replace(finding.known, reason=OF_ONE_TRIAL), finding.conditions)
+    return Finding.of(replace(finding.known, reason=OF_ONE_TRIAL()), finding.conditions)
 
 
 @pytest.mark.parametrize("value", [0.26, 0.70, 0.78])
@@ -344,7 +344,7 @@ def test_no_ratio_is_decided_by_single_trials(value: float, which: tuple[int, ..
 def exact(finding: Finding) -> Finding:
     """As found where nothing scatters."""
     told = replace(finding.known, low=None, high=None, level=None, standard_error=None)
-    return Finding.of(replace(told, reason=NO_SCATTER), finding.conditions)
+    return Finding.of(replace(told, reason=NO_SCATTER()), finding.conditions)
 
 
 def test_a_ratio_without_noise_is_told_of_its_simulation_alone() -> None:
@@ -531,7 +531,7 @@ def test_a_change_of_bandwidth_is_one_where_its_interval_says_so(
 
 def threshold(parameter: str, value: float, half: float | None) -> Finding:
     if half is None:
-        told = Estimate("sensitivity_threshold", value, "", kind="at least", reason="never passed")
+        told = Estimate("sensitivity_threshold", value, "", kind="at least", reason=MADE_UP())
     else:
         told = known("sensitivity_threshold", value, half, "")
     return Finding.of(told, {"parameter": parameter})
@@ -636,8 +636,8 @@ def test_a_ratio_of_brackets_holds_every_ratio_in_them() -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        Estimate("a", 25.0, "N m", kind="at least", reason="a bound"),
-        Estimate("a", 25.0, "N m", reason="nothing scatters"),
+        Estimate("a", 25.0, "N m", kind="at least", reason=MADE_UP()),
+        Estimate("a", 25.0, "N m", reason=MADE_UP()),
         Estimate("a", 25.0, "N m", None, 26.0),
         bracket(-1.0, 25.0, 26.0),
     ],
@@ -666,7 +666,7 @@ def test_what_was_picked_from_many_is_widened_by_bonferroni() -> None:
 
 
 def test_a_range_counts_what_is_not_determined() -> None:
-    lost = Estimate("a", math.nan, "N m", reason="lost", origin=Origin.NOT_DETERMINED)
+    lost = Estimate("a", math.nan, "N m", reason=MADE_UP(), origin=Origin.NOT_DETERMINED)
     found = [
         Finding.of(each, {"frequency": float(number)})
         for number, each in enumerate((known("a", 2.0, 0.1), lost, known("a", 1.0, 0.1)))

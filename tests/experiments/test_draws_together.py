@@ -9,9 +9,11 @@ import pytest
 
 from campaign.access.sentences import sentence
 from campaign.estimate import Estimate, Origin
+from campaign.experiments.conclusions.parts import SET
 from campaign.experiments.preparing.draws import merged
 from campaign.experiments.preparing.draws_together import concluded
 from campaign.result import Amount, Conclusion, Factor, Result
+from tests.experiments.laboratory import MADE_UP
 
 T_2 = 4.302653
 """Student's t, 97.5 %, two degrees of freedom: three draws."""
@@ -19,13 +21,13 @@ T_2 = 4.302653
 
 def torque(value: float, name: str = "torque") -> Amount:
     if math.isnan(value):
-        lost = Estimate(name, value, "N m", reason="lost", origin=Origin.NOT_DETERMINED)
+        lost = Estimate(name, value, "N m", reason=MADE_UP(), origin=Origin.NOT_DETERMINED)
         return Amount(lost, "N m")
     return Amount(Estimate(name, value, "N m", value - 0.1, value + 0.1, 0.95), "N m")
 
 
 def draw(value: float, ratio: float = 2.0, position: float = 1.0) -> tuple[Conclusion, ...]:
-    place = Amount(Estimate("setting", position, "rad", origin=Origin.GIVEN, reason="set"))
+    place = Amount(Estimate("setting", position, "rad", origin=Origin.GIVEN, reason=SET()))
     factor = Factor(Estimate("r", ratio, "", ratio - 0.01, ratio + 0.01, 0.95))
     return (
         Conclusion(("It takes ", torque(value), " at ", place, ".")),

@@ -11,8 +11,8 @@ from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
-from campaign.result import Cell, Column, Finding, Result, Table
-from tests.experiments.laboratory import analyse
+from campaign.result import NO_INTERVAL, NOT_FOUND, Cell, Column, Finding, Result, Table
+from tests.experiments.laboratory import MADE_UP, analyse
 from tests.experiments.test_channels import CASES, Case, done
 
 
@@ -80,7 +80,7 @@ BARE = Finding("gain", 2.0, "dB", {})
     [
         (Result(findings=(BARE,)), ["gain"]),
         (Result(findings=(Finding.of(Estimate("gain", 2.0, "dB"), {}),)), ["gain"]),
-        (Result(findings=(Finding.of(Estimate("gain", 2.0, "dB", reason="one"), {}),)), []),
+        (Result(findings=(Finding.of(Estimate("gain", 2.0, "dB", reason=MADE_UP()), {}),)), []),
         (Result(findings=(Finding.of(Estimate("gain", 2.0, "dB", 1.0, 3.0), {}),)), []),
     ],
 )
@@ -94,13 +94,13 @@ def test_the_walker_sees_what_findings_lack(result: Result, said: list[str]) -> 
         (Column("x", "X"), 1.0, True),
         (Column("x", "X"), 1, True),
         (Column("x", "X", exact=True), 1, False),
-        (Column("x", "X", reason="a share of ranks"), 1.0, False),
+        (Column("x", "X", reason=MADE_UP()), 1.0, False),
         (Column("x", "X"), "text", False),
         (Column("x", "X"), None, False),
         (Column("x", "X"), True, False),
         (Column("x", "X"), Estimate("x", 1.0, ""), True),
-        (Column("x", "X"), Estimate("x", 1.0, "", reason="a single trial"), False),
-        (Column("x", "X", "rad"), Estimate("x", 1.0, "deg", reason="another unit"), True),
+        (Column("x", "X"), Estimate("x", 1.0, "", reason=MADE_UP()), False),
+        (Column("x", "X", "rad"), Estimate("x", 1.0, "deg", reason=MADE_UP()), True),
     ],
 )
 def test_the_walker_sees_what_cells_lack(column: Column, cell: Cell, seen: bool) -> None:
@@ -119,6 +119,6 @@ def test_a_finding_of_a_plug_in_may_say_no_more_than_its_value() -> None:
     with experiments().including(old):
         result = analyse("old", ())
     gain, lag = (finding.known for finding in result.findings)
-    assert (gain.value, gain.unit, gain.reason) == (2.0, "dB", "the analysis gives no interval")
-    assert (lag.origin, lag.reason) == ("not determined", "the analysis did not find it")
+    assert (gain.value, gain.unit, gain.reason) == (2.0, "dB", NO_INTERVAL())
+    assert (lag.origin, lag.reason) == ("not determined", NOT_FOUND())
     assert lacking(result) == ["gain", "lag", "t/gain"]

@@ -12,7 +12,7 @@ from scipy.signal import lsim, lti
 from campaign.estimate import Window
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response import _point
-from campaign.identification.step_response import step_characteristics
+from campaign.identification.step_response import NOT_SETTLED, step_characteristics
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Result
 from campaign.trial import Offered, Trial
@@ -94,6 +94,12 @@ def test_a_downward_step_that_falls_short_is_off_as_its_mirror_image():
         assert finding(result, "steady_state_error").value == pytest.approx(0.1, rel=1e-6)
 
 
+def test_a_step_that_does_not_settle_is_told_with_its_band():
+    result = step(JUMP, 0.9 * answer(JUMP))
+    assert finding(result, "settling_time").known.reason in NOT_SETTLED
+    assert any("does not stay within 2 % of the step." in note for note in result.notes)
+
+
 def test_noise_within_the_band_does_not_put_off_settling():
     truth = step(JUMP, answer(JUMP))
     result = step(JUMP, answer(JUMP) + noise(0.005))
@@ -110,9 +116,9 @@ def test_what_noise_hides_has_no_number_and_says_why():
     for name in ("settling_time", "overshoot"):
         estimate = finding(result, name).estimate
         assert np.isnan(estimate.value)
-        assert "scatters by 5.1 % of the step" in estimate.reason
+        assert "scatters by 5.1 % of the step" in str(estimate.reason)
     (row,) = table_of_estimates(result, "step-response").rows
-    assert "scatters" in row["settling_time"].reason  # type: ignore[union-attr]
+    assert "scatters" in str(row["settling_time"].reason)  # type: ignore[union-attr]
     assert any("no settling time: the rate scatters" in note for note in result.notes)
 
 

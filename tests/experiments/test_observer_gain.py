@@ -9,8 +9,9 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions
-from campaign.experiments.results.observer_metrics import Gain, Rejection, measured_corner
+from campaign.experiments.results.observer_metrics import TOO_FEW, Gain, Rejection, measured_corner
 from campaign.identification.sine_amplitude import amplitude
+from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.recording import Ending, Outcome
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench
@@ -84,7 +85,7 @@ def test_every_number_has_an_interval_or_a_reason_and_repeats_count(done) -> Non
     for result in (one, both):
         assert all(f.known.says_enough for f in result.findings)
     for row, twice in zip(one.tables[0].rows, both.tables[0].rows, strict=True):
-        assert "of that one trial" in row["error"].reason
+        assert row["error"].reason in OF_ONE_TRIAL
         assert twice["error"].value == pytest.approx(row["error"].value * np.sqrt(1.02))
         assert twice["error"].freedom == 1
         assert row["noise"].low < row["noise"].value < row["noise"].high
@@ -108,7 +109,7 @@ def test_the_corner_frequency_of_six_disturbances_has_their_range() -> None:
     few = dict(list(reduced.items())[:5])
     less = measured_corner(gain(4.0, few), gain(0.0, dict.fromkeys(frequencies, 1.0)))
     assert less.low is None
-    assert "5 frequencies" in less.reason
+    assert less.reason == TOO_FEW(frequencies=5, enough=6)
 
 
 def test_an_unstable_gain_is_a_result(done) -> None:

@@ -10,10 +10,10 @@ import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.experiments.friction_map.repeated import scatter_figure
-from campaign.experiments.repeatability import MapSet, relative_deviation
+from campaign.experiments.repeatability import DOUBTFUL, MapSet, relative_deviation
 from campaign.experiments.repeatability import _deviation as deviation_of
 from campaign.experiments.repeatability import _mean as over_maps
-from tests.experiments.laboratory import analyse, execute, finding, table, trials
+from tests.experiments.laboratory import MADE_UP, analyse, execute, finding, table, trials
 from tests.physics.benches import bench
 
 FAST = {
@@ -66,11 +66,11 @@ def test_maps_do_not_average_a_wrong_torque_constant_away() -> None:
 @pytest.mark.parametrize("origin", [Origin.AT_BOUND, Origin.NOT_DETERMINED])
 def test_maps_that_do_not_determine_a_parameter_have_no_mean_with_an_interval(origin) -> None:
     """Three maps at 0.1 agree perfectly, and say nothing."""
-    sets = [*sets_of([0.1, 0.1], origin=origin, reason="open"), *sets_of([0.1])]
+    sets = [*sets_of([0.1, 0.1], origin=origin, reason=MADE_UP()), *sets_of([0.1])]
     for told in (over_maps(sets, "coulomb_torque"), deviation_of(sets, "coulomb_torque")):
         assert not told.has_interval
         assert told.origin is Origin.NOT_DETERMINED
-        assert told.reason == f"4 of 6 values are {origin}"
+        assert told.reason == DOUBTFUL(doubtful=4, values=6, origins=str(origin))
     assert over_maps(sets, "coulomb_torque").value == pytest.approx(0.1)
 
 
@@ -196,7 +196,7 @@ def test_directions_are_told_apart_by_their_difference_in_each_map(
     for number, difference in enumerate(apart):
         level = 20.0 + 10.0 * number
         found = {
-            name: {"coulomb_torque": Estimate("coulomb_torque", value, "N m", reason="made up")}
+            name: {"coulomb_torque": Estimate("coulomb_torque", value, "N m", reason=MADE_UP())}
             for name, value in (("positive", level), ("negative", level + difference))
         }
         sets.append(MapSet(str(number), "", None, found))
@@ -215,7 +215,7 @@ def test_several_parameters_share_the_chance_of_being_wrong() -> None:
     for number, difference in enumerate((2.0, 2.6, 1.4)):
         found = {
             name: {
-                parameter: Estimate(parameter, value, "N m", reason="made up")
+                parameter: Estimate(parameter, value, "N m", reason=MADE_UP())
                 for parameter in ("coulomb_torque", "static_torque")
             }
             for name, value in (("positive", 20.0), ("negative", 20.0 + difference))

@@ -17,7 +17,7 @@ from campaign.experiments.stabilization import StabilizationOptions
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Figure, Panel
 from campaign.trial import Trial
-from tests.experiments.laboratory import Done, analyse, execute, trials
+from tests.experiments.laboratory import MADE_UP, Done, analyse, execute, trials
 from tests.physics.benches import bench
 
 STEP = 1e-3
@@ -264,7 +264,7 @@ def test_errors_of_different_size_have_a_logarithmic_axis() -> None:
 
 
 def test_nothing_is_drawn_of_what_was_not_found() -> None:
-    lost = Estimate.without_interval("stabilization_error", float("nan"), "rad", "lost")
+    lost = Estimate.without_interval("stabilization_error", float("nan"), "rad", MADE_UP())
     assert errors([{**row("none", 1.0), "error": lost}, row("lugre", 1e-4)], "compensation") == []
     found = [row("static", 2e-4), row("lugre", 1e-4), {**row("none", 1.0), "error": lost}]
     (figure,) = errors(found, "compensation")

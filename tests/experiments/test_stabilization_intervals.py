@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Window
-from campaign.experiments.stabilization import EXPERIMENT
+from campaign.experiments.stabilization import EXPERIMENT, OF_A_RECORD
+from campaign.identification.sampled import LOST
+from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.physics.bench import Bench
+from campaign.reason import NONE
 from campaign.trial import Trial
 from tests.experiments.laboratory import (
     Done,
@@ -49,7 +52,7 @@ def test_repeats_say_where_the_mean_and_where_one_more_trial_lies(done) -> None:
     for name in ("none", "static", "lugre", "observer"):
         mean = finding(result, "stabilization_error", compensation=name).estimate
         single = finding(result, "stabilization_error_of_one_trial", compensation=name).estimate
-        assert (mean.freedom, mean.reason) == (2, "")
+        assert (mean.freedom, mean.reason) == (2, NONE)
         wide = np.log([single.high / single.low, mean.high / mean.low])
         assert wide[0] / wide[1] == pytest.approx(2.0)  # sqrt(3 + 1)
     for row in table_of_estimates(result, "stabilization-error").rows:
@@ -64,9 +67,9 @@ def test_a_single_trial_says_that_its_interval_is_of_that_trial(done) -> None:
         assert found
         for estimate in found:
             assert estimate.has_interval
-            assert "of that one trial" in estimate.reason
+            assert estimate.reason in OF_ONE_TRIAL
     rows = table_of_estimates(result, "stabilization-error").rows
-    assert all("a longer one holds a larger" in row["peak"].reason for row in rows)
+    assert all(row["peak"].reason in OF_A_RECORD for row in rows)
 
 
 def test_the_load_of_the_virtual_hardware_hardly_sticks_and_the_sensors_show_it(done) -> None:
@@ -131,7 +134,7 @@ def test_lost_samples_leave_a_number_out_and_say_so(done) -> None:
     holed = {**done[0].samples.channels, "pointing_error": replace(channel, samples=samples)}
     item = replace(done[0], samples=replace(done[0].samples, channels=holed))
     (row,) = table_of_estimates(analyse("stabilization", [item]), "stabilization-error").rows
-    assert (row["error"].origin, row["error"].reason) == ("not determined", "samples were lost")
+    assert (row["error"].origin, row["error"].reason) == ("not determined", LOST())
 
 
 # How often the truth is held.

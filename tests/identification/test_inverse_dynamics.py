@@ -33,7 +33,12 @@ from campaign.identification.inverse.regression import (
 from campaign.identification.inverse.rows import in_blocks, moving, rows
 from campaign.identification.inverse.simulation import simulated_rate
 from campaign.identification.inverse.terms import DIRECTIONAL, SYMMETRIC, TERMS, periodic
-from campaign.identification.inverse.validation import Prediction, improvement, relative_error
+from campaign.identification.inverse.validation import (
+    TOO_FEW_BLOCKS,
+    Prediction,
+    improvement,
+    relative_error,
+)
 from campaign.identifying.inverse.found import find
 from campaign.identifying.inverse.motions import Moved, with_slowest
 from tests.identification.coverage import holds, rejected
@@ -348,6 +353,31 @@ def test_a_period_over_position_is_found() -> None:
     assert found == pytest.approx(period, rel=0.02)
 
 
+def strokes(rates: tuple[float, ...], travel: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Position and rate of strokes out and back at each rate, shape (n,)."""
+    parts = []
+    for rate in rates:
+        out = np.arange(0.0, travel, rate * step)
+        parts += [(out, np.full(len(out), rate)), (out[::-1], np.full(len(out), -rate))]
+    position, speed = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return position, speed
+
+
+def test_slow_strokes_show_a_period_that_most_rows_pass_too_fast() -> None:
+    period = 2.0 * np.pi / 12.0  # cogging of a motor: 12 a turn
+    position, rate = strokes((0.4, *(30.0,) * 400), 2.0 * np.pi, 0.01)
+    assert np.median(np.abs(np.diff(position))) * 10.0 > 2.0 * period
+    wave = 0.3 * np.sin(2.0 * np.pi * position / period + 0.4)
+    noise = np.random.default_rng(3).normal(0.0, 0.1, len(wave))
+    assert find_period(position, rate, wave + noise) == pytest.approx(period, rel=0.01)
+
+
+def test_one_period_and_a_half_of_travel_are_enough() -> None:
+    position, rate = strokes((0.02, 0.05), 0.41, 0.01)
+    wave = 6.0 * np.sign(rate) * np.cos(2.0 * np.pi * position / 0.25)
+    assert find_period(position, rate, wave) == pytest.approx(0.25, rel=0.05)
+
+
 # Instruments, prediction, simulation --------------------------------------------------------------
 
 
@@ -400,7 +430,7 @@ def test_a_motion_too_short_for_blocks_has_no_interval() -> None:
     slow = np.sin(np.arange(60) * 0.1)
     found = relative_error("validation", Prediction(np.arange(60.0), slow + 2.0, np.zeros(60)))
     assert found.low is None
-    assert "do not know of each other" in found.reason
+    assert found.reason in TOO_FEW_BLOCKS
 
 
 def test_a_simulated_rate_is_that_of_another_solver() -> None:

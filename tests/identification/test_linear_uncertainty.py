@@ -7,7 +7,10 @@ import pytest
 from scipy.optimize import brentq, lsq_linear
 
 from campaign.estimate import Origin
+from campaign.identification.intervals import NO_FREEDOM
 from campaign.identification.linear_uncertainty import (
+    NO_LIMIT,
+    NOT_DETERMINED,
     Array,
     Uncertainty,
     estimate_of,
@@ -16,6 +19,7 @@ from campaign.identification.linear_uncertainty import (
 )
 from campaign.identification.losses import weights
 from campaign.identification.unknowns import Unknown
+from campaign.reason import Cause
 
 from .coverage import rejected
 
@@ -310,20 +314,22 @@ def test_an_estimate_at_its_bound_is_open_beyond_it(
     assert told.origin is Origin.AT_BOUND
     bare = estimate_of(DECADES, share, known(**at), 0, "")
     assert not bare.has_interval
-    assert bare.reason == f"the data give no limit between its {side} bound and the other one"
+    assert bare.reason == NO_LIMIT(side=side)
 
 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"open": (True,), "half_width": none()}, "not determined by these data"),
-        ({"open": (True,)}, "not determined by these data"),
-        ({"half_width": none(), "freedom": 0}, "nothing is left over"),
+        ({"open": (True,), "half_width": none()}, NOT_DETERMINED),
+        ({"open": (True,)}, NOT_DETERMINED),
+        ({"half_width": none(), "freedom": 0}, NO_FREEDOM),
     ],
 )
-def test_an_estimate_without_an_interval_says_why(changes: dict[str, object], reason: str) -> None:
+def test_an_estimate_without_an_interval_says_why(
+    changes: dict[str, object], reason: Cause
+) -> None:
     told = estimate_of(DECADES, 0.5, known(**changes), 0, "")
     assert told.origin is Origin.NOT_DETERMINED
     assert told.value == pytest.approx(1e4)
     assert not told.has_interval
-    assert reason in told.reason
+    assert told.reason in reason

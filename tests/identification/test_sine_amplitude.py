@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from campaign.identification.sine_amplitude import amplitude
+from campaign.identification.sine_amplitude import TOO_FEW_CYCLES, amplitude
 from tests.identification.coverage import holds, rejected
 
 STEP = 1e-3
@@ -20,7 +20,7 @@ def test_amplitude_with_offset_and_whole_cycles_only_in_its_scatter() -> None:
     assert found.freedom == 3
     once = amplitude("rate", time[:150], np.sin(time[:150]), FREQUENCY, "rad/s")
     assert once.low is None
-    assert "too few" in once.reason
+    assert once.reason in TOO_FEW_CYCLES
 
 
 @pytest.mark.parametrize(

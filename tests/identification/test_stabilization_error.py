@@ -9,11 +9,13 @@ import pytest
 from scipy.signal import lfilter
 
 from campaign.estimate import Estimate
+from campaign.identification.sampled import LOST
 from campaign.identification.stabilization_error import (
-    LOST,
     NO_SCATTER,
     OF_ONE_TRIAL,
     SHORT,
+    SHORT_BLOCK,
+    TOO_FEW_FOR_BLOCKS,
     correlation_time,
     decrease,
     over_blocks,
@@ -33,7 +35,7 @@ def test_a_sine_has_its_amplitude_over_root_two_over_whole_cycles() -> None:
     time = np.arange(2625) / 1000.0  # 2.625 cycles of 1 Hz
     found = over_cycles(3e-3 * np.sin(2 * np.pi * time + 0.4) + 0.1, 1000.0)
     assert found.value == pytest.approx(3e-3 / np.sqrt(2), rel=1e-9)
-    assert (found.low, found.reason) == (None, NO_SCATTER)
+    assert (found.low, found.reason) == (None, NO_SCATTER())
 
 
 def test_two_cycles_that_are_not_of_whole_samples_are_two() -> None:
@@ -54,17 +56,17 @@ def test_the_interval_of_half_cycles_of_known_size() -> None:
     assert found.low == pytest.approx(np.sqrt(2.0) * np.exp(-T3 * error), rel=1e-6)
     assert found.high == pytest.approx(np.sqrt(2.0) * np.exp(T3 * error), rel=1e-6)
     assert found.freedom == 3
-    assert found.reason == OF_ONE_TRIAL
+    assert found.reason in OF_ONE_TRIAL
 
 
 def test_what_has_no_interval_says_why() -> None:
-    assert over_cycles(np.arange(50.0), 100.0).reason == SHORT
+    assert over_cycles(np.arange(50.0), 100.0).reason in SHORT
     lost = over_cycles(np.array([1.0, np.nan] * 100), 100.0)
-    assert (np.isnan(lost.value), lost.reason, lost.origin) == (True, LOST, "not determined")
+    assert (np.isnan(lost.value), lost.reason, lost.origin) == (True, LOST(), "not determined")
     assert over_cycles(np.zeros(200), 100.0).value == 0.0
     slow = np.sin(np.linspace(0.0, 3.0, 600))
-    assert "a block is only" in over_blocks(slow).reason
-    assert "too few samples" in over_blocks(np.arange(5.0)).reason
+    assert over_blocks(slow).reason in SHORT_BLOCK
+    assert over_blocks(np.arange(5.0)).reason in TOO_FEW_FOR_BLOCKS
 
 
 def test_the_correlation_time_of_an_autoregressive_series() -> None:
@@ -82,8 +84,8 @@ def test_one_trial_is_itself_and_trials_alike_have_no_scatter() -> None:
     one = over_cycles(friction_error(4) + 0.1 * noise, PER_CYCLE)
     assert over_trials([one]) == one
     alike = over_trials(estimates(np.full(3, 2.0)))
-    assert (alike.value, alike.low, alike.reason) == (2.0, None, NO_SCATTER)
-    lost = Estimate.without_interval("error", np.nan, "rad", LOST)
+    assert (alike.value, alike.low, alike.reason) == (2.0, None, NO_SCATTER())
+    lost = Estimate.without_interval("error", np.nan, "rad", LOST())
     assert over_trials([lost, one]) == one
     with pytest.raises(ValueError, match="no trial"):
         over_trials([])
@@ -92,15 +94,15 @@ def test_one_trial_is_itself_and_trials_alike_have_no_scatter() -> None:
 def test_a_ratio_of_single_trials_says_that_it_is_one() -> None:
     noise = np.random.default_rng(2).standard_normal((2, 4 * PER_CYCLE))
     one, other = (over_cycles(friction_error(4) + 0.2 * each, PER_CYCLE) for each in noise)
-    assert quotient("error_reduction", one, other).reason == OF_ONE_TRIAL
+    assert quotient("error_reduction", one, other).reason in OF_ONE_TRIAL
     less = decrease("error_decrease", one, other)
     ratio = quotient("ratio", one, other)
     assert (less.value, less.low, less.high) == (1 - ratio.value, 1 - ratio.high, 1 - ratio.low)
     still = over_cycles(friction_error(4), PER_CYCLE)
     for sides in ((one, still), (still, one)):  # of what scatters it is not that nothing does
         told = quotient("error_reduction", *sides)
-        assert (told.has_interval, told.reason) == (False, OF_ONE_TRIAL)
-    assert quotient("error_reduction", still, still).reason == NO_SCATTER
+        assert (told.has_interval, told.reason) == (False, OF_ONE_TRIAL())
+    assert quotient("error_reduction", still, still).reason in NO_SCATTER
 
 
 # How often the truth is held. Errors have the shape that friction gives them: a kick at each

@@ -14,7 +14,7 @@ from campaign.identification.ripple import (
     pooled,
     ripple_of_points,
 )
-from campaign.identification.scatter import deviation_limits, relative_scatter
+from campaign.identification.scatter import ZERO_MEAN, deviation_limits, relative_scatter
 from campaign.identification.steady_sliding import steady_sliding
 from tests.identification.coverage import rejected
 
@@ -61,7 +61,7 @@ def test_a_window_with_few_samples_has_a_mean_and_no_interval() -> None:
     found = steady_sliding(TIME[:12], np.full(12, SPEED), np.full(12, 20.0), None, J)
     assert found.torque.value == pytest.approx(20.0)
     assert found.torque.low is None
-    assert "12 samples are too few" in found.torque.reason
+    assert str(found.torque.reason) == "12 samples are too few for 10 batches"
     with pytest.raises(ValueError, match="2 samples"):
         steady_sliding(TIME[:2], np.full(2, SPEED), np.full(2, 20.0), None, J)
 
@@ -171,7 +171,7 @@ def test_limits_of_a_deviation_are_those_of_tables() -> None:
 def test_a_single_set_scatters_by_nothing_that_is_known() -> None:
     told = relative_scatter("coulomb_torque", np.array([[25.3, 26.7]]))
     assert told.low is None
-    assert told.reason
+    assert str(told.reason) == "a single set: repeats would show how it scatters"
 
 
 def test_what_is_zero_in_all_sets_has_no_relative_deviation() -> None:
@@ -179,7 +179,7 @@ def test_what_is_zero_in_all_sets_has_no_relative_deviation() -> None:
     told = relative_scatter("viscous_friction", np.zeros((3, 2)))
     assert np.isnan(told.value)
     assert not told.has_interval
-    assert told.reason == "its mean is zero"
+    assert told.reason in ZERO_MEAN
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.03])

@@ -9,6 +9,7 @@ from scipy.stats import t as t_distribution
 
 from campaign.identification.stribeck import PARAMETERS, Problem, fit_stribeck
 from campaign.identification.velocity_map import (
+    NO_EFFECT,
     direction_estimates,
     doubts,
     fit_direction,
@@ -85,7 +86,7 @@ def test_a_flat_map_says_that_it_shows_no_stribeck_effect(noise: float) -> None:
     assert found.preferred == "none"
     estimates = direction_estimates(found, "free")
     assert estimates["stribeck_velocity"].origin == "not determined"
-    assert estimates["stribeck_velocity"].reason
+    assert estimates["stribeck_velocity"].reason in NO_EFFECT
     line = direction_estimates(found, "none")
     low, high = line["coulomb_torque"].combined
     assert low is not None
@@ -107,8 +108,8 @@ def test_few_speeds_below_the_stribeck_velocity_are_told() -> None:
     found = fit_direction(speed, equation_4_6(speed), np.zeros(30))
     assert any("2 speeds are below vs; add slower ones" in d for d in doubts(found))
     told = direction_estimates(found, "free")
-    assert told["static_torque"].reason == "Ts is extrapolated: 2 speeds are below vs"
-    assert told["coulomb_torque"].reason == ""
+    assert str(told["static_torque"].reason) == "Ts is extrapolated: 2 speeds are below vs"
+    assert not told["coulomb_torque"].reason
 
 
 @pytest.mark.parametrize(("fastest", "is_extrapolated"), [(2.8, True), (3.2, False)])
@@ -120,8 +121,8 @@ def test_no_speed_far_above_the_stribeck_velocity_is_told(
     found = fit_direction(speed, equation_4_6(speed), np.zeros(30))
     told = direction_estimates(found, "free")
     why = "Tc is extrapolated: no speed is above 3 times vs"
-    assert told["coulomb_torque"].reason == (why if is_extrapolated else "")
-    assert told["static_torque"].reason == ""
+    assert str(told["coulomb_torque"].reason) == (why if is_extrapolated else "")
+    assert not told["static_torque"].reason
     assert (f"{why}; add faster ones" in doubts(found)) == is_extrapolated
     both = nominal_estimates(found, found, "free")
     assert both["coulomb_torque"].reason == told["coulomb_torque"].reason

@@ -7,7 +7,8 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.identification.intervals import of_positive_repeats
-from campaign.identification.threshold import Threshold, crossing, passing
+from campaign.identification.threshold import BEYOND_WITHOUT_CHANGE, Threshold, crossing, passing
+from campaign.reason import Cause
 from tests.identification.coverage import holds, rejected
 
 CHANGES = np.array([-0.8, -0.4, -0.2, 0.0, 0.2, 0.4, 0.8])
@@ -95,12 +96,13 @@ def test_a_threshold_that_is_not_passed_is_a_bound() -> None:
 
 
 def test_what_does_not_scatter_has_no_interval_and_says_why() -> None:
-    single = [Estimate.without_interval("e", v, "", "alone") for v in 0.1 + 0.5 * np.abs(CHANGES)]
+    alone = Cause("alone", "alone")()
+    single = [Estimate.without_interval("e", v, "", alone) for v in 0.1 + 0.5 * np.abs(CHANGES)]
     found = passing("threshold", CHANGES, single, LIMIT)
-    assert (found.value, found.low, found.reason) == (pytest.approx(0.2), None, "alone")
+    assert (found.value, found.low, found.reason) == (pytest.approx(0.2), None, alone)
     beyond = passing("threshold", CHANGES, errors(np.full(7, 0.3), 0.01), LIMIT)
     assert (beyond.value, beyond.low) == (0.0, None)
-    assert "without any change" in beyond.reason
+    assert beyond.reason in BEYOND_WITHOUT_CHANGE
 
 
 TRIED = np.array([-0.8, -0.65, -0.5, -0.4, -0.3, -0.2, -0.1, 0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8])

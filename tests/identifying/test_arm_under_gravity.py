@@ -6,6 +6,7 @@ rates differ in the sixth. Gravity is three times the friction, and steady nowhe
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.identification.over_a_turn import over_a_turn
 from campaign.identification.steady_sliding import steady_sliding
 from campaign.identifying.agreement import disagreements
@@ -121,13 +122,32 @@ def test_friction_that_differs_from_stretch_to_stretch_is_left_alone() -> None:
     for _ in range(30):
         angle = random.uniform(-3, 3) + np.linspace(0.0, random.uniform(0.2, 2.0), 200)
         torque = 5.0 * np.sin(angle.mean()) + 0.3 * random.standard_normal(200)
-        stretches.append((angle, torque))
+        stretches.append((np.arange(200) / 100.0, angle, torque))
     assert over_a_turn(stretches) is None
-    held = [(angle, torque + 2.0 * np.cos(angle)) for angle, torque in stretches]
+    held = [(time, angle, torque + 2.0 * np.cos(angle)) for time, angle, torque in stretches]
     found = over_a_turn(held)
     assert found is not None
     assert found.amplitudes[0] == pytest.approx(2.0, rel=0.05)
     assert over_a_turn(held[:5]) is None
+
+
+def test_friction_that_falls_as_it_warms_up_is_no_gravity() -> None:
+    """Strokes out and back at several speeds: later in each the torque is less, as is the angle."""
+    random = np.random.default_rng(4)
+    cold, warm, start = [], [], 0.0
+    for speed in np.tile([0.1, 0.2, 0.4, 0.8], 6):
+        for way in (1.0, -1.0):
+            time = start + np.linspace(0.0, 1.5 / speed, 200)
+            angle = way * (speed * (time - start) - 0.75)
+            friction = way * (0.8 + 0.3 * np.exp(-time / 200.0))
+            noise = 0.002 * random.standard_normal(200)
+            warm.append((time, angle, friction + noise))
+            cold.append((time, angle, friction + 0.2 * np.cos(angle - 0.7) + noise))
+            start = float(time[-1]) + 1.0
+    assert over_a_turn(warm) is None
+    found = over_a_turn(cold)
+    assert found is not None
+    assert found.amplitudes[0] == pytest.approx(0.2, rel=0.1)
 
 
 def test_a_point_is_moved_with_its_interval() -> None:
@@ -145,9 +165,13 @@ def test_a_point_is_moved_with_its_interval() -> None:
 def test_methods_that_disagree_are_told() -> None:
     """Only where intervals exclude each other by more than a tenth."""
 
-    def section(method: str, name: str, value: float, half: float) -> Any:
+    def section(
+        method: str, name: str, value: float, half: float, *beside: str, origin: Any = None
+    ) -> Any:
         one = Estimate(name, value, "N m", value - half, value + half, 0.95, "m", freedom=20.0)
-        parameters = (SimpleNamespace(estimate=one, display=""),)
+        one = replace(one, origin=origin or Origin.MEASURED)
+        found = [one, *(replace(one, name=each) for each in beside)]
+        parameters = tuple(SimpleNamespace(estimate=each, display="") for each in found)
         return SimpleNamespace(method=SimpleNamespace(name=method), parameters=parameters)
 
     first = section("friction_map", "coulomb_torque_positive", 1.55, 0.08)
@@ -156,3 +180,11 @@ def test_methods_that_disagree_are_told() -> None:
     for other in (("coulomb_positive", 1.7, 0.2), ("coulomb_negative", 3.0, 0.1),
                   ("coulomb_positive", 1.65, 0.001)):  # fmt: skip
         assert not list(disagreements([first, section("inverse_dynamics", *other)]))
+    undetermined = ("coulomb_positive", 3.07, 0.16)
+    assert not list(
+        disagreements(
+            [first, section("inverse_dynamics", *undetermined, origin=Origin.NOT_DETERMINED)]
+        )
+    )
+    at_one = section("inverse_dynamics", "coulomb_positive", 3.07, 0.16, "coulomb_over_temperature")
+    assert not list(disagreements([first, at_one])), "a mean over temperatures, and a value at one"

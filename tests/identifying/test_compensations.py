@@ -20,6 +20,7 @@ from campaign.identifying.compensations import (
 from campaign.identifying.identification import Identification, Section, _with_place
 from campaign.identifying.method import Identified, Parameter
 from campaign.physics.bench import Bench
+from campaign.reason import Reason
 from campaign.result import Result
 from tests.experiments.laboratory import analyse, execute, finding, trials
 
@@ -143,8 +144,11 @@ def test_a_curve_of_one_direction_goes_nowhere() -> None:
 
 
 def test_a_number_without_an_interval_goes_nowhere() -> None:
-    alone = Parameter(Estimate.without_interval("inertia", 70.0, "kg m^2", "why"), "",
-                      bench="axis.inertia")  # fmt: skip
+    alone = Parameter(
+        Estimate.without_interval("inertia", 70.0, "kg m^2", Reason("test", "why")),
+        "",
+        bench="axis.inertia",
+    )
     assert entries(text_of("platform"), presliding=[alone]).names == ()
 
 

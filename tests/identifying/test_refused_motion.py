@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimate import Origin
+from campaign.identification import gate
 from campaign.identification.inverse.motion import Filtering
 from campaign.identifying.inverse.motions import moved
 from campaign.identifying.method import Identified, Material
@@ -83,7 +85,9 @@ def test_small_and_slow_motion_over_coarse_counts_is_none_of_these() -> None:
 def test_a_constant_load_is_no_friction() -> None:
     found = identified(SWING, 2.0 + 0.02 * NOISE[0])
     assert [each.bench for each in found.parameters if each.bench] == []
-    assert any("not told from zero" in note for note in found.result.notes)
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    for name in ("inertia", "coulomb_positive", "coulomb_negative"):
+        assert told[name].kind == "at most" or told[name].origin is Origin.NOT_DETERMINED
 
 
 def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
@@ -93,5 +97,7 @@ def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
     assert "axis.inertia" in places
     found = identified(SWING, -force)
     assert [each.bench for each in found.parameters if each.bench] == []
-    [note] = [each for each in found.result.notes if "sign or unit" in each]
-    assert note.startswith("inertia and coulomb positive and coulomb negative")
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    for name in ("inertia", "coulomb_positive", "coulomb_negative"):
+        assert told[name].reason in gate.UNPHYSICAL
+        assert dict(told[name].reason.values)["cause"] == gate.OPPOSITE_SIGNS.code

@@ -117,7 +117,7 @@ def test_half_a_second_is_enough_where_it_is_all_there_is(tmp_path: Path) -> Non
     assert holds(found["inertia"], 24.7)
     # One sine in one direction: a delay turns it as inertia and viscous friction do.
     assert found["delay"].origin is Origin.NOT_DETERMINED
-    assert "looks like other terms" in found["delay"].reason
+    assert "looks like other terms" in str(found["delay"].reason)
     assert holds(found["viscous_positive"], 40.0)
 
 

@@ -17,6 +17,7 @@ from campaign.identifying.whole.along import Along
 from campaign.identifying.whole.found import _with_band, find, product, resolved
 from campaign.identifying.whole.models import Sizes, models
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
+from campaign.reason import Reason
 from tests.identification.coverage import holds, rejected
 from tests.identification.rigs import random_rigs
 
@@ -141,8 +142,9 @@ def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
     def told(name: str, value: float) -> Estimate:
         return Estimate(name, value, "", 0.8 * value, 1.2 * value, 0.95, "m", freedom=20.0)
 
-    bound = Estimate.without_interval("coulomb_positive", 0.01, "N m", "it went to its lower bound",
-                                      origin=Origin.AT_BOUND)  # fmt: skip
+    bound = Estimate.without_interval(
+        "coulomb_positive", 0.01, "N m", Reason("test", "at a bound"), origin=Origin.AT_BOUND
+    )
     estimates = {"coulomb_positive": bound, "delay": told("delay", 1e-3)}
     names = ("coulomb_negative", "static_over_coulomb_positive", "static_over_coulomb_negative",
              "stribeck_velocity")  # fmt: skip
@@ -150,7 +152,7 @@ def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
     fit = ModelFit(None, estimates, (), (), None, np.zeros(0, bool))  # type: ignore[arg-type]
     found = _with_band(fit, {name: one.value for name, one in estimates.items()}).estimates
     assert found["static_over_coulomb_positive"].origin is Origin.NOT_DETERMINED
-    assert "went to its bound" in found["static_over_coulomb_positive"].reason
+    assert "went to its bound" in str(found["static_over_coulomb_positive"].reason)
     # The other direction has friction, and tells both.
     assert found["static_over_coulomb_negative"].has_interval
     assert found["stribeck_velocity"].has_interval
@@ -177,7 +179,9 @@ def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
     assert part.source == "band"
     assert part.standard_uncertainty == pytest.approx(20.0 * 0.03 + 0.5 * 1.0)
     assert product("static", ratio, base, 1.0).standard_error == pytest.approx(10.0 * 0.04)
-    lost = Estimate.without_interval("ratio", 0.5, "", "nobody knows", origin=Origin.NOT_DETERMINED)
+    lost = Estimate.without_interval(
+        "ratio", 0.5, "", Reason("test", "nobody knows"), origin=Origin.NOT_DETERMINED
+    )
     assert product("static", lost, base, 0.0).origin is Origin.NOT_DETERMINED
 
 

@@ -75,7 +75,7 @@ def test_thirty_nine_hold_one_more_without_a_distribution() -> None:
 
 
 def test_without_scatter_there_is_no_spread() -> None:
-    assert spread("torque", [2.0, 2.0, math.nan], "N m").reason == "all 2 draws are alike"
+    assert spread("torque", [2.0, 2.0, math.nan], "N m").reason.text == "all 2 draws are alike"
     assert spread("torque", [2.0], "N m").reason
     coarse = spread("torque", [2.0, 2.0], "N m", (Systematic("resolution", 0.5),))
     assert coarse.combined == pytest.approx((2.0 - 0.979982, 2.0 + 0.979982))
@@ -175,7 +175,7 @@ def test_a_draw_that_was_lost_selects_the_others() -> None:
     vague = Estimate("torque", 9e-3, "N m", origin=Origin.NOT_DETERMINED)
     open_one = Finding.of(vague, {"statistic": "mean", SEED: 0})
     assert together([*SEVEN, open_one]).known.origin == "not determined"
-    assert together([*SEVEN, nothing]).known.reason == "1 of 8 draws have no number"
+    assert together([*SEVEN, nothing]).known.reason.text == "1 of 8 draws have no number"
 
 
 def test_two_numbers_of_one_draw_are_no_two_draws() -> None:

@@ -13,6 +13,7 @@ from campaign.published.evidence import Evidence
 from campaign.published.provenance import OF_A_TRUTH, Place, Provenance
 from campaign.published.scoreboard import COLUMNS, Line, Scoreboard, score, to_csv
 from campaign.published.values import read_published
+from campaign.reason import Reason
 from campaign.result import Finding
 
 PUBLISHED = read_published(
@@ -254,7 +255,9 @@ def test_a_failed_trial_keeps_its_cells_on_the_board() -> None:
 
 def test_the_file_has_the_interval_and_a_bound_only_on_its_side() -> None:
     found = Estimate("error", 0.56e-3, "rad", 0.5e-3, 0.6e-3, 0.95)
-    bound = Estimate.without_interval("error", 0.3e-3, "rad", "never passed", kind="at least")
+    bound = Estimate.without_interval(
+        "error", 0.3e-3, "rad", Reason("test", "never passed"), kind="at least"
+    )
     there = {**SHAKEN, "compensation": "lugre"}
     evidence = Evidence(
         "t", ("1.1",), [Finding.of(found, SHAKEN), Finding.of(bound, there)], source="hardware"

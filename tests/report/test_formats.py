@@ -22,6 +22,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.interface import TestData
 from campaign.plugins import GROUPS
+from campaign.reason import Reason
 from campaign.report.build import Report, build_report
 from campaign.report.content.citation import citation_of
 from campaign.report.formats import chosen_formats, formats, pdf
@@ -183,7 +184,7 @@ def test_the_opening_says_in_markdown_what_it_says_on_the_page(made_up, tmp_path
     run = made_up.made_up_run(tmp_path, tests={"stabilization": (), "velocity_map": ()})
 
     def says(data: TestData) -> Result:
-        odd = Estimate.without_interval("rate", 1.0, "rad/s", "one recording only")
+        odd = Estimate.without_interval("rate", 1.0, "rad/s", Reason("test", "one recording only"))
         return Result(conclusions=(Conclusion(("The rate was ", Amount(odd, "rad/s"), ".")),))
 
     kinds = {

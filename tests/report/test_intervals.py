@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import Reason
 from campaign.report.content.tables import REASONS, remarks, show, table_csv
 from campaign.report.drawing import curves, figures
 from campaign.result import Axis, Cell, Column, Curve, Figure, Panel, Table
@@ -113,14 +114,16 @@ def test_digits_that_no_reader_needs_are_left_to_the_file() -> None:
 def test_rounding_errors_of_estimates_are_nothing() -> None:
     """The width of a loop that a static model does not have, beside the one of another model."""
     widths = (0.15, -8.9e-16, 1.4e-16)
-    cells: list[Cell] = [estimate(each, None, reason="no noise") for each in widths]
+    cells: list[Cell] = [estimate(each, None, reason=Reason("test", "no noise")) for each in widths]
     assert [row[0].text for row in show(table({"a": cells})).rows] == ["150", "0", "0"]
 
 
-ALONE = estimate(half=None, reason="a single trial")
-WIDE = estimate(half=3.0, origin=Origin.NOT_DETERMINED, reason="its interval is too wide")
-LOST = Estimate.without_interval("x", math.nan, "N m", "it never slid")
-GIVEN = estimate(half=None, origin=Origin.GIVEN, reason="it was set")
+ALONE = estimate(half=None, reason=Reason("test", "a single trial"))
+WIDE = estimate(
+    half=3.0, origin=Origin.NOT_DETERMINED, reason=Reason("test", "its interval is too wide")
+)
+LOST = Estimate.without_interval("x", math.nan, "N m", Reason("test", "it never slid"))
+GIVEN = estimate(half=None, origin=Origin.GIVEN, reason=Reason("test", "it was set"))
 BOUND = estimate(half=None, kind="at least")
 
 
@@ -189,14 +192,18 @@ def test_systematic_parts_that_nobody_has_sized_are_named() -> None:
 
 
 def test_many_reasons_are_not_all_said() -> None:
-    cells: list[Cell] = [estimate(half=None, reason=f"{n} samples") for n in range(20)]
+    cells: list[Cell] = [
+        estimate(half=None, reason=Reason("test", f"{n} samples")) for n in range(20)
+    ]
     (said,) = remarks(table({"a": cells}))
     assert said.count("samples") == REASONS - 1
     assert said.endswith(f"and others, for {20 - REASONS + 1} more reasons.")
 
 
 def test_cells_have_interval_bound_and_origin_in_display_units() -> None:
-    assumed = estimate(2.0, None, origin=Origin.ASSUMED, reason="a damping ratio of one")
+    assumed = estimate(
+        2.0, None, origin=Origin.ASSUMED, reason=Reason("test", "a damping ratio of one")
+    )
     shown = show(table({"a": [estimate(0.0102, 0.0003), BOUND, WIDE, LOST, assumed, 1.0]}))
     assert [row[0].text for row in shown.rows] == [
         "10.20 ± 0.30",

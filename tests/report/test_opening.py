@@ -16,6 +16,7 @@ from campaign.archive import RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
+from campaign.reason import NONE, Reason
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.report.build import build_report, render
 from campaign.report.content.citation import citation_of
@@ -37,7 +38,7 @@ DIFFERENCE = re.compile(r"\b(less|more|better|worse)\b")
 
 
 def estimate(value: float, low: float | None = None, high: float | None = None) -> Estimate:
-    reason = "" if low is not None else "a single value"
+    reason = NONE if low is not None else Reason("test", "a single value")
     return Estimate("error", value, "rad", low, high, 0.95, reason=reason)
 
 
@@ -117,7 +118,9 @@ def test_a_run_that_found_nothing_says_why(made_up: ModuleType, tmp_path: Path):
 
 
 def test_a_number_that_was_not_determined_is_none(made_up: ModuleType, tmp_path: Path):
-    open_ = Estimate("e", math.nan, "rad", reason="lost", origin=Origin.NOT_DETERMINED)
+    open_ = Estimate(
+        "e", math.nan, "rad", reason=Reason("test", "lost"), origin=Origin.NOT_DETERMINED
+    )
     said = Conclusion(("The error is ", Amount(open_, "mrad"), "."))
     found = opening(made_up, tmp_path, stabilization=says(said))
     assert found.answers[0].sentences == ("The error is not determined (lost).",)

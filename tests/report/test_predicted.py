@@ -14,6 +14,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import fingerprint
 from campaign.protocol.problems import find_faults
+from campaign.reason import Reason
 from campaign.report.build import render
 from campaign.report.content.document import Document, document_of
 from campaign.resources import templates_folder
@@ -163,7 +164,9 @@ def test_what_was_said_of_another_bench_is_compared_with_nothing(
 def test_a_number_without_interval_is_shown_and_not_judged(
     made_up: ModuleType, tmp_path: Path
 ) -> None:
-    open_one = Estimate.without_interval("coulomb_torque", 18.4, "N m", "a single run")
+    open_one = Estimate.without_interval(
+        "coulomb_torque", 18.4, "N m", Reason("test", "a single run")
+    )
     *_, document = analysed(made_up, tmp_path, open_one)
     (row,) = document.predictions["breakaway"].table.rows
     assert row["verdict"] not in ("differs", "no difference shown")

@@ -21,6 +21,7 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment
+from campaign.reason import Cause, Reason
 from campaign.report.build import build_report
 from campaign.report.formats.as_json import POINTS, plain, read_report
 from campaign.report.formats.report_data import ReportData
@@ -28,6 +29,7 @@ from campaign.result import Amount, Column, Conclusion, Factor, Finding, Result,
 from campaign.text import pretty_unit
 from campaign.units import convert
 
+ALONE = Cause("single trial", "one of {count} trial")
 SCHEMA = Path(__file__).parents[2] / "docs" / "report.schema.json"
 POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 NUMBER = re.compile(r"(?<![\w.])(-?\d+(?:\.(\d+))?)(?: × 10(-?\d+))?(?![\w.])")
@@ -55,8 +57,10 @@ def with_numbers(made_up: ModuleType) -> dict[str, Experiment]:
             lopsided,
             found(3e-9, 2e-10, "rad"),
             found(1234.5678, 0.5, "rad"),
-            found(2.5e-3, None, "rad", reason="one only"),
-            Estimate("q", math.nan, "rad", reason="too few", origin=Origin.NOT_DETERMINED),
+            found(2.5e-3, None, "rad", reason=ALONE(count=1)),
+            Estimate(
+                "q", math.nan, "rad", reason=Reason("test", "too few"), origin=Origin.NOT_DETERMINED
+            ),
             Estimate("q", 0.4, "rad", kind="at least"),
             -7.25e-4,
             math.inf,
@@ -368,6 +372,15 @@ def test_the_same_run_gives_the_same_text(made_up, folder, tmp_path):
     )
     text = again.path.with_name("report.json").read_bytes()
     assert text == (folder / "report.json").read_bytes()
+
+
+def test_a_reason_is_text_and_data(told: dict[str, Any]):
+    cells = [cell for test in told["tests"] for table in test["tables"] for row in table["rows"]
+             for cell in row.values() if isinstance(cell, dict)]  # fmt: skip
+    (alone,) = (cell for cell in cells if cell["reason_code"] == "single trial")
+    assert (alone["reason"], alone["reason_values"]) == ("one of 1 trial", {"count": 1})
+    assert any((cell["reason"], cell["reason_code"], cell["reason_values"]) == ("", "", {})
+               for cell in cells)  # fmt: skip
 
 
 def test_the_schema_in_the_docs_is_that_of_the_program():

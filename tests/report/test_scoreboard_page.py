@@ -22,6 +22,7 @@ from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.scoreboard import Line, score
 from campaign.published.verdicts import reproduced
+from campaign.reason import Reason
 from campaign.recording import Outcome, SafeState
 from campaign.report.build import build_report
 from campaign.report.content.lines import shown_line
@@ -184,11 +185,11 @@ def test_an_interval_of_one_trial_says_that_it_is(made_up: ModuleType, tmp_path:
 
     ends = {"low": 0.9 * value, "high": 1.1 * value}
     said = "the interval is of one trial: how trials scatter is not in it"
-    assert notes(reason=f"{OF_ONE_TRIAL}; and more", **ends) == {said}
-    assert notes(reason="of blocks", **ends) == set()
-    assert notes(reason=OF_ONE_TRIAL, low=None, high=None) == set()
+    assert notes(reason=OF_ONE_TRIAL(), **ends) == {said}
+    assert notes(reason=Reason("of blocks", str(OF_ONE_TRIAL())), **ends) == set()
+    assert notes(reason=OF_ONE_TRIAL(), low=None, high=None) == set()
 
 
 def test_the_reason_of_an_interval_comes_with_the_number() -> None:
-    known = Estimate("error", 0.5, "mrad", 0.4, 0.6, 0.95, reason=OF_ONE_TRIAL)
-    assert reproduced(Finding.of(known, {}), "mrad").reason == OF_ONE_TRIAL
+    known = Estimate("error", 0.5, "mrad", 0.4, 0.6, 0.95, reason=OF_ONE_TRIAL())
+    assert reproduced(Finding.of(known, {}), "mrad").reason == OF_ONE_TRIAL()

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from campaign.access.sentences import is_decided, remarks, sentence, words
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import NONE, Reason
 from campaign.result import Amount, Conclusion, Factor
 
-REASON = "a single value"
+REASON = Reason("test", "a single value")
 
 
 def ratio(value: float, low: float | None = None, high: float | None = None, **more) -> Factor:
-    reason = "" if low is not None or high is not None else REASON
+    reason = NONE if low is not None or high is not None else REASON
     estimate = Estimate("ratio", value, "", low, high, 0.95, reason=reason, **more)
     return Factor(estimate, above="less", below="more")
 
@@ -79,7 +80,17 @@ def ratio(value: float, low: float | None = None, high: float | None = None, **m
             "a ratio that is not determined (a single value)",
         ),
         (
-            Factor(Estimate("r", 3.0, "", 2.0, 4.0, origin=Origin.NOT_DETERMINED, reason="wide")),
+            Factor(
+                Estimate(
+                    "r",
+                    3.0,
+                    "",
+                    2.0,
+                    4.0,
+                    origin=Origin.NOT_DETERMINED,
+                    reason=Reason("test", "wide"),
+                )
+            ),
             "a ratio that is not determined (wide)",
         ),
     ],
@@ -150,22 +161,25 @@ def amount(value: float, low: float | None = None, high: float | None = None, **
     [
         (amount(25.3, 25.2, 25.4), "25.30 ± 0.10 N·m"),
         (amount(0.26e-3, 0.25e-3, 0.27e-3, unit="rad", display="mrad"), "0.260 ± 0.010 mrad"),
-        (amount(3e-6, unit="rad", display="urad", reason="set"), "3 µrad"),
-        (amount(24.5, kind="at least", reason="a bound"), "at least 24.5 N·m"),
-        (amount(24.5, kind="at most", reason="a bound"), "at most 24.5 N·m"),
+        (amount(3e-6, unit="rad", display="urad", reason=Reason("test", "set")), "3 µrad"),
+        (amount(24.5, kind="at least", reason=Reason("test", "a bound")), "at least 24.5 N·m"),
+        (amount(24.5, kind="at most", reason=Reason("test", "a bound")), "at most 24.5 N·m"),
         (amount(0.0, None, 0.5, origin=Origin.AT_BOUND), "0 (≤ 0.5) N·m (at its bound)"),
-        (amount(1165.0, origin=Origin.ASSUMED, reason="a rule"), "1165 N·m (assumed)"),
-        (amount(0.24, unit="Hz", origin=Origin.GIVEN, reason="set"), "0.24 Hz"),
-        # Settings that differ late in their digits are told apart; computed ones are shortened.
-        (amount(33.0001, origin=Origin.GIVEN, reason="set"), "33.0001 N·m"),
-        (amount(100 / 3, origin=Origin.GIVEN, reason="set"), "33.33 N·m"),
         (
-            amount(math.nan, origin=Origin.NOT_DETERMINED, reason="no ramp slid"),
+            amount(1165.0, origin=Origin.ASSUMED, reason=Reason("test", "a rule")),
+            "1165 N·m (assumed)",
+        ),
+        (amount(0.24, unit="Hz", origin=Origin.GIVEN, reason=Reason("test", "set")), "0.24 Hz"),
+        # Settings that differ late in their digits are told apart; computed ones are shortened.
+        (amount(33.0001, origin=Origin.GIVEN, reason=Reason("test", "set")), "33.0001 N·m"),
+        (amount(100 / 3, origin=Origin.GIVEN, reason=Reason("test", "set")), "33.33 N·m"),
+        (
+            amount(math.nan, origin=Origin.NOT_DETERMINED, reason=Reason("test", "no ramp slid")),
             "not determined (no ramp slid)",
         ),
         # A number that is there and says nothing is not told: somebody would take it for one.
         (
-            amount(5.0, 1.0, 9.0, origin=Origin.NOT_DETERMINED, reason="too wide"),
+            amount(5.0, 1.0, 9.0, origin=Origin.NOT_DETERMINED, reason=Reason("test", "too wide")),
             "not determined (too wide)",
         ),
         (amount(math.nan, origin=Origin.NOT_DETERMINED), "not determined"),
@@ -181,12 +195,12 @@ def test_a_sentence_is_its_parts() -> None:
 
 
 def test_what_numbers_do_not_say_is_told_once() -> None:
-    single = amount(1.0, reason="a single value")
-    one_trial = amount(1.0, 0.9, 1.1, reason="the interval is of one trial")
+    single = amount(1.0, reason=Reason("test", "a single value"))
+    one_trial = amount(1.0, 0.9, 1.1, reason=Reason("test", "the interval is of one trial"))
     unknown = amount(1.0, 0.9, 1.1, systematic=(Systematic("dwell"), Systematic("inertia", 0.1)))
-    given_ = amount(1.0, origin=Origin.GIVEN, reason="it was set")
-    open_ = amount(math.nan, origin=Origin.NOT_DETERMINED, reason="lost")
-    bound = amount(1.0, kind="at least", reason="a bound")
+    given_ = amount(1.0, origin=Origin.GIVEN, reason=Reason("test", "it was set"))
+    open_ = amount(math.nan, origin=Origin.NOT_DETERMINED, reason=Reason("test", "lost"))
+    bound = amount(1.0, kind="at least", reason=Reason("test", "a bound"))
     parts = ("x", single, single, one_trial, unknown, given_, open_, bound)
     assert list(remarks([Conclusion(parts), Conclusion(parts)])) == [
         "Without an interval: a single value.",

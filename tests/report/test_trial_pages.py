@@ -18,6 +18,7 @@ from campaign.archive.layout.journal import Decision, TrialFinished
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate, Window
+from campaign.reason import Reason
 from campaign.recording import (
     Channel,
     ChannelInfo,
@@ -343,7 +344,7 @@ def test_metrics_attempts_and_decisions_are_told(made_up: ModuleType, tmp_path: 
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ()})
     measured = (
         Estimate("largest_error", 0.00048, "rad", 0.00040, 0.00056, 0.95),
-        Estimate("coulomb_torque", 30.0, "N m", reason="read once"),
+        Estimate("coulomb_torque", 30.0, "N m", reason=Reason("test", "read once")),
         Estimate("top_rate", math.radians(12), "rad/s", math.radians(11), math.radians(13), 0.95),
     )
     first = replace(run.trials[0], estimates=measured)

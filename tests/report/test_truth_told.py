@@ -10,6 +10,7 @@ import pytest
 
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments.interface import Experiment, TestData
+from campaign.reason import Reason
 from campaign.report.content.document import Document, document_of
 from campaign.result import Finding, Result
 
@@ -100,7 +101,9 @@ def test_what_is_off_alike_is_told_without_any_interval(
 ) -> None:
     true = _true(made_up, tmp_path)
     none = (
-        Estimate.without_interval("stiffness_at_rest", share * true, "N m/rad", "one value")
+        Estimate.without_interval(
+            "stiffness_at_rest", share * true, "N m/rad", Reason("test", "one value")
+        )
         for share in (0.90, 0.92, 0.93, 0.91)
     )
     found = tuple(Finding.of(each, {"measurement": n}) for n, each in enumerate(none))

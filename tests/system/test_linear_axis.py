@@ -199,4 +199,4 @@ def test_what_shifts_two_runs_alike_is_called_as_its_estimates_call_it(
 ) -> None:
     (test,) = (each for each in analyse_run(open_run(run[0]), experiments()) if each.name == "map")
     told = {part.source for each in test.result.findings for part in each.known.systematic}
-    assert shared_sources(test, test, {}, {}) == {"mass", "torque constant"} == told
+    assert shared_sources(test, test, {}, {}) == {"inertia", "torque constant"} == told

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from campaign.archive import RunReader, open_run
+from campaign.axis_kind import AxisKind, Sides
 from campaign.cli.trend import _command, _exchange
 from campaign.errors import UsageError
 from campaign.estimate import Systematic
@@ -64,6 +65,18 @@ def test_each_exchange_is_told_of_its_own_run_and_kept_for_all_behind() -> None:
 def test_what_explains_nothing_is_refused(source: str, run: int, why: str) -> None:
     with pytest.raises(UsageError, match=why):
         with_exchanged(members(6), [(source, at(run))])
+
+
+@pytest.mark.parametrize("name", [CALIBRATED, "force constant"])
+def test_of_a_linear_rig_it_goes_by_the_name_that_its_page_shows(name: str) -> None:
+    linear = Sides(AxisKind.LINEAR, AxisKind.LINEAR)
+    axis = SimpleNamespace(bench=True, sides=linear)
+    runs = [replace(each, tests=(axis,)) for each in members(6)]  # type: ignore[arg-type]
+    told = with_exchanged(runs, [(name, at(3))])
+    assert told[2].exchanged == (CALIBRATED,)
+    assert len({each.constants[CALIBRATED] for each in told}) == 2
+    with pytest.raises(UsageError, match=r"is none of force constant$"):
+        with_exchanged(runs, [("mass", at(3))])
 
 
 def test_it_is_said_on_the_command_line_and_beside_the_jump(runs: Path) -> None:

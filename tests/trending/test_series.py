@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import Reason
 from campaign.trending.covariates import Covariate
 from campaign.trending.members import Member
 from campaign.trending.series import Point, Series, add_point, made
@@ -30,7 +31,7 @@ def member(number: int, constant: str = "one") -> Member:
 
 def number(value: float, half: float | None = 0.1, **more: object) -> Estimate:
     if half is None:
-        return Estimate.without_interval("tc", value, "N m", "single", **more)
+        return Estimate.without_interval("tc", value, "N m", Reason("test", "single"), **more)
     error = half / 1.96
     return Estimate(
         "tc", value, "N m", value - half, value + half, 0.95, standard_error=error,
@@ -60,7 +61,7 @@ def test_what_is_no_number_takes_no_part_and_is_told():
     given = number(10.0, origin=Origin.GIVEN)
     found = series(number(10.0), number(math.nan, None), bound, given, number(10.5))
     assert [point.member.number for point in found.points] == [1, 5]
-    assert found.reason == (
+    assert str(found.reason) == (
         "found in 2 runs, not found in 1; a bound in 1; given, not measured in 1: three are the "
         "least"
     )
@@ -122,7 +123,7 @@ def test_an_error_of_each_evaluation_is_its_own():
 def test_what_is_the_same_in_all_runs_is_no_test():
     (told,) = judged(series(*(number(10.0, None) for _ in range(6))))
     assert told.verdict is Verdict.NOT_JUDGED
-    assert "the same in all runs" in told.reason
+    assert "the same in all runs" in str(told.reason)
 
 
 def test_verdicts_are_of_all_numbers_together():

@@ -109,7 +109,9 @@ def test_the_same_simulation_counts_once(runs: Path, tmp_path: Path):
     found = follow([open_run(path) for path in paths.values()], experiments())
     assert not found.judged
     for each in found.followed:
-        assert each.reason == "found in 2 runs, the same simulation as in 6: three are the least"
+        assert (
+            str(each.reason) == "found in 2 runs, the same simulation as in 6: three are the least"
+        )
 
 
 def test_runs_of_one_moment_have_an_order_and_no_time(tmp_path: Path):
@@ -144,7 +146,9 @@ def test_what_follows_the_temperature_is_told_per_kelvin(tmp_path: Path):
     assert not follow(found, experiments()).declared
     lost = [replace(run, header=run.header.model_copy(update={"tags": ()})) for run in found[:6]]
     few = follow([*lost, *found[6:]], experiments(), "temperature")
-    assert {each.reason for each in few.followed} == {"temperature is known of 2 runs: too few"}
+    assert {str(each.reason) for each in few.followed} == {
+        "temperature is known of 2 runs: too few"
+    }
 
 
 def test_a_recorded_temperature_counts_before_a_noted_one(tmp_path: Path):

@@ -11,6 +11,7 @@ from campaign.archive.writing import hdf5
 from campaign.archive.writing.plots import INTERVAL, half_widths, names_of, unused
 from campaign.estimate import Estimate
 from campaign.result import Array, Cell, Column, Finding, Table, Value, bare
+from campaign.trial import canonical_json
 
 INDEX = "index"
 
@@ -58,7 +59,9 @@ def put_findings(parent: h5py.Group, name: str, findings: Sequence[Finding]) -> 
         "standard_error": [each.standard_error for each in known],
         "origin": [each.origin.value for each in known],
         "kind": [each.kind for each in known],
-        "reason": [each.reason for each in known],
+        "reason": [str(each.reason) for each in known],
+        "reason_code": [each.reason.code for each in known],
+        "reason_values": [canonical_json(dict(each.reason.values)) for each in known],
         "method": [each.method for each in known],
     }
     columns |= {

@@ -89,7 +89,7 @@ def _marked(finding: Finding, findings: Sequence[Finding]) -> Finding:
     counts = [ramps.count(each) for each in (set(ramps) if way == "both" else {way})]
     if 1 not in counts:
         return finding
-    return Finding.of(replace(told, reason=OF_ONE_TRIAL), finding.conditions)
+    return Finding.of(replace(told, reason=OF_ONE_TRIAL()), finding.conditions)
 
 
 def _top(means: Sequence[Finding]) -> list[Finding]:

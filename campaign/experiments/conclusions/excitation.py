@@ -13,8 +13,9 @@ from campaign.experiments.conclusions.parts import (
     listed,
     setting,
 )
-from campaign.experiments.results.excitation_account import OF_ALL, Dynamics, Response
+from campaign.experiments.results.excitation_account import Dynamics, Response
 from campaign.experiments.results.excitation_tables import distortion_findings
+from campaign.experiments.shared.common import OF_RECORDING
 from campaign.result import Amount, Conclusion
 
 
@@ -52,8 +53,8 @@ def dynamics_conclusion(found: Dynamics, told: Sequence[Part], period: float) ->
         elif words.startswith("viscous"):
             words = f"viscous friction{words.removeprefix('viscous')}"
         items.append((f"{words} ", Amount(each)))
-    designed = Estimate.without_interval("designed", found.designed, "", OF_ALL)
-    reached = Estimate.without_interval("reached", found.fit.likeness, "", OF_ALL)
+    designed = Estimate.without_interval("designed", found.designed, "", OF_RECORDING())
+    reached = Estimate.without_interval("reached", found.fit.likeness, "", OF_RECORDING())
     return conclusion(
         where,
         "the series of ",

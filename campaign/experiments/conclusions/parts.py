@@ -15,13 +15,22 @@ from campaign.experiments.interface import TestData, bench_of
 from campaign.identification.intervals import LEVEL, ratio, student
 from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.options import Options, describe
+from campaign.reason import Cause
 from campaign.result import Amount, Conclusion, Factor, Finding, Value
 from campaign.units import Quantity
 
 Part = str | Amount | Factor
 Parts = tuple[Part, ...]
-SET = "it was set"
-OF_SINGLES = "a ratio of which a side is of one trial: how trials scatter is not in it"
+SET = Cause("set", "it was set")
+OF_SINGLES = Cause(
+    "ratio of single trials",
+    "a ratio of which a side is of one trial: how trials scatter is not in it",
+)
+MISSING_PART = Cause("missing part", "a part is missing")
+ONLY_A_BOUND = Cause("ratio of a bound", "one of the two is only a bound")
+OPEN_SIDE = Cause("ratio of an open interval", "one of the two has an interval that is open")
+MAY_BE_ZERO = Cause("ratio of what may be zero", "one of the two may be zero")
+PICKED = Cause("picked by its size", "it was picked from {count} by its size")
 
 
 def conclusion(*parts: Part | Iterable[Part]) -> Conclusion:
@@ -61,7 +70,7 @@ def listed(items: Iterable[Parts], between: str = ", ", last: str = " and ") -> 
 
 def setting(value: float, unit: str = "", display: str = "") -> Amount:
     """A number that was set (SI), such as the frequency of a motion."""
-    given = Estimate("setting", float(value), unit, origin=Origin.GIVEN, reason=SET)
+    given = Estimate("setting", float(value), unit, origin=Origin.GIVEN, reason=SET())
     return Amount(given, display)
 
 
@@ -194,25 +203,24 @@ def ratio_of(
     """
     for each in (one, other):
         if not determined(each):
-            return Estimate.without_interval(name, math.nan, "", each.reason or "a part is missing")
+            return Estimate.without_interval(name, math.nan, "", each.reason or MISSING_PART())
     told = ratio(name, one, other)
     if not math.isfinite(told.value) or (told.has_interval and not of_same_trials):
         return told
     if {one.kind, other.kind} & {"at least", "at most"}:
-        return Estimate.without_interval(name, told.value, "", "one of the two is only a bound")
+        return Estimate.without_interval(name, told.value, "", ONLY_A_BOUND())
     low, high, other_low, other_high = one.low, one.high, other.low, other.high
     if low is None or high is None or other_low is None or other_high is None:
-        reason = told.reason or "one of the two has an interval that is open"
-        return Estimate.without_interval(name, told.value, "", reason)
+        return Estimate.without_interval(name, told.value, "", told.reason or OPEN_SIDE())
     if not low > 0 or not other_low > 0:
-        return Estimate.without_interval(name, told.value, "", "one of the two may be zero")
+        return Estimate.without_interval(name, told.value, "", MAY_BE_ZERO())
     method = "from the ends of both intervals"
     return Estimate(name, told.value, "", low / other_high, high / other_low, LEVEL, method)
 
 
 def of_one_trial(estimate: Estimate) -> bool:
     """Whether its interval is that of a single trial, without what differs between trials."""
-    return OF_ONE_TRIAL in estimate.reason
+    return estimate.reason in OF_ONE_TRIAL
 
 
 def shown_by(ratio: Estimate, *sides: Estimate) -> Estimate:
@@ -232,7 +240,7 @@ def shown_by(ratio: Estimate, *sides: Estimate) -> Estimate:
         standard_error=None,
         freedom=None,
         systematic=(),
-        reason=OF_SINGLES,
+        reason=OF_SINGLES(),
     )
 
 
@@ -245,8 +253,7 @@ def held_at_once(estimate: Estimate, count: int) -> Estimate:
     if count < 2 or not estimate.has_interval or not estimate.value > 0:
         return estimate
     if estimate.standard_error is None:
-        reason = f"it was picked from {count} by its size"
-        return replace(estimate, low=None, high=None, level=None, reason=reason)
+        return replace(estimate, low=None, high=None, level=None, reason=PICKED(count=count))
     level = 1.0 - (1.0 - LEVEL) / count
     half = student(estimate.freedom or math.inf, level)
     half *= estimate.standard_error / estimate.value

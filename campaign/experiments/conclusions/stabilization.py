@@ -73,7 +73,7 @@ def method(name: object) -> str:
 def one_trial(errors: Sequence[Finding]) -> Parts:
     """That nothing was repeated, where the intervals are those of single trials."""
     # Where nothing scatters, it does not matter how many trials there were.
-    single = [of_one_trial(e.known) for e in errors if NO_SCATTER not in e.known.reason]
+    single = [of_one_trial(e.known) for e in errors if e.known.reason not in NO_SCATTER]
     if not any(single):
         return ()
     return (", one trial each",) if all(single) else (", some of one trial only",)
@@ -226,7 +226,7 @@ def _over_sweep(
 def _surely_largest(largest: Finding, errors: Sequence[Finding]) -> bool:
     """Whether no other interval reaches the largest error's; where nothing scatters, by value."""
     others = [each.known for each in errors if each is not largest]
-    if all(NO_SCATTER in each.reason for each in (largest.known, *others)):
+    if all(each.reason in NO_SCATTER for each in (largest.known, *others)):
         return all(each.value < largest.value for each in others)
     low = largest.known.combined[0]
     if low is None or of_one_trial(largest.known):

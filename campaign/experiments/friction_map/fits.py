@@ -65,9 +65,7 @@ class MapFits:
             for parameter in PARAMETERS
         }
         found = {name: direction_estimates(self.fits[name], model) for name in DIRECTIONS}
-        both = found["positive"], found["negative"]
-        positive, negative = self.fits["positive"], self.fits["negative"]
-        found["nominal"] = nominal_estimates(positive, negative, model, both)
+        found["nominal"] = nominal_estimates(self.fits["positive"], self.fits["negative"], model)
         return {
             name: {each.name: self._shifted(each, effects[name]) for each in estimates.values()}
             for name, estimates in found.items()
@@ -78,7 +76,7 @@ class MapFits:
 
     def _shifted(self, told: Estimate, effects: Mapping[str, float]) -> Estimate:
         told = where_it_scatters(told, abs(told.value), DIGITS)
-        if not told.has_interval:
+        if not told.has_interval and told.kind != "at most":
             return told
         if told.name in TORQUES:
             told = with_systematic(told, self.bench, TORQUE_CONSTANT, told.value)

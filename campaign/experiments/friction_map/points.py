@@ -21,13 +21,14 @@ from campaign.identification.ripple import (
 )
 from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.recording import Recording
 from campaign.result import Array
 from campaign.units import shown_here
 
 UNSTEADY = 0.25
 """Share of its mean by which the rate of a window may change, or be uncertain."""
-DESCRIBES = "it describes the window"
+DESCRIBES = Cause("describes the window", "it describes the window")
 """Why some metrics of a window have no interval."""
 
 
@@ -125,7 +126,7 @@ def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterat
         }
     for word, (value, unit) in plain.items():
         if np.isfinite(value):
-            yield Estimate.without_interval(f"{word}_{name}", value, unit, DESCRIBES)
+            yield Estimate.without_interval(f"{word}_{name}", value, unit, DESCRIBES())
 
 
 @dataclass(frozen=True)

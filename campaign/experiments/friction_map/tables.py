@@ -16,13 +16,18 @@ from campaign.identification.intervals import with_error
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.identification.velocity_map import MODELS, DirectionFit, Model, correlation, doubts
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.units import angle_here
 
 FITTED: tuple[Model, ...] = ("free", "2")
 """Models whose parameters are findings."""
 MODEL_LABELS = {"free": "δ free", "2": "δ = 2", "none": "no Stribeck effect"}
-ERROR_OF = "the standard error of the column before it"
+ERROR_OF = Cause("standard error of a column", "the standard error of the column before it")
+BY_LONG_RUNS = Cause("from the ripple of long runs", "it follows from the ripple of long runs")
+OF_SAMPLES = Cause("describes the window's samples", "it describes the window's samples")
+OF_RESIDUALS = Cause("describes the residuals", "it describes the residuals")
+CRITERION = Cause("criterion", "a criterion to compare models by")
 MISFIT = 2.0
 """by which the residuals of delta = 2 exceed those of delta free, to be told."""
 
@@ -41,7 +46,7 @@ def point_table(points: Sequence[MapPoint], suffix: str, where: str) -> Table:
     """The points as measured, and as they are fitted where a ripple was taken out of them."""
     rippled = any(point.ripple for point in points)
     more = (
-        Column("ripple", "Ripple", "N m", "N m", reason="it follows from the ripple of long runs"),
+        Column("ripple", "Ripple", "N m", "N m", reason=BY_LONG_RUNS()),
         Column("without_ripple", "Friction torque without ripple", "N m", "N m"),
     )
     return Table(
@@ -51,13 +56,7 @@ def point_table(points: Sequence[MapPoint], suffix: str, where: str) -> Table:
             Column("speed", "Commanded rate", "rad/s", "deg/s", exact=True),
             Column("rate", "Measured rate", "rad/s", "deg/s"),
             Column("torque", "Friction torque", "N m", "N m"),
-            Column(
-                "spread",
-                "Spread in the window (1σ)",
-                "N m",
-                "N m",
-                reason="it describes the window's samples",
-            ),
+            Column("spread", "Spread in the window (1σ)", "N m", "N m", reason=OF_SAMPLES()),
             Column("window", "Window", "s", "s", exact=True),
             Column("rule", "Window set by"),
             *(more if rippled else ()),
@@ -108,9 +107,9 @@ def parameter_table(fits: MapFits, suffix: str, where: str) -> Table:
             Column("parameter", "Parameter"),
             Column("unit", "Unit"),
             Column("positive", "Positive"),
-            Column("positive_error", "± (1σ)", reason=ERROR_OF),
+            Column("positive_error", "± (1σ)", reason=ERROR_OF()),
             Column("negative", "Negative"),
-            Column("negative_error", "± (1σ)", reason=ERROR_OF),
+            Column("negative_error", "± (1σ)", reason=ERROR_OF()),
             Column("nominal", "Nominal"),
             Column("positive_2", "Positive, δ = 2"),
             Column("negative_2", "Negative, δ = 2"),
@@ -124,8 +123,7 @@ def parameter_table(fits: MapFits, suffix: str, where: str) -> Table:
 
 
 def _rms(fit: DirectionFit, model: Model) -> Estimate:
-    value, reason = fit.fits[model].rms, "it describes the residuals"
-    return Estimate.without_interval("residual", value, "N m", reason)
+    return Estimate.without_interval("residual", fit.fits[model].rms, "N m", OF_RESIDUALS())
 
 
 def model_table(fits: MapFits, suffix: str, where: str) -> Table:
@@ -146,7 +144,6 @@ def model_table(fits: MapFits, suffix: str, where: str) -> Table:
                     "preferred": "yes" if model == fit.preferred else "",
                 }
             )
-    criterion = "a criterion to compare models by"
     return Table(
         key=f"models{suffix}",
         title=f"Models of the Stribeck effect{f' ({where})' if where else ''}",
@@ -155,9 +152,9 @@ def model_table(fits: MapFits, suffix: str, where: str) -> Table:
             Column("model", "Model"),
             Column("parameters", "Parameters", exact=True),
             Column("points", "Speeds", exact=True),
-            Column("rms", "Residual (rms)", "N m", "N m", reason="it describes the residuals"),
-            Column("chi_square", "χ²", reason=criterion),
-            Column("bic", "BIC", reason=criterion),
+            Column("rms", "Residual (rms)", "N m", "N m", reason=OF_RESIDUALS()),
+            Column("chi_square", "χ²", reason=CRITERION()),
+            Column("bic", "BIC", reason=CRITERION()),
             Column("preferred", "Lowest BIC"),
         ),
         rows=tuple(rows),

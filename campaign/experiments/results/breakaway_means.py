@@ -11,14 +11,15 @@ import numpy as np
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.systematic import shared_parts
+from campaign.identification.gate import admitted
 from campaign.identification.intervals import (
     difference,
-    judged,
     shifted_by,
     student,
     welch,
     with_error,
 )
+from campaign.reason import NONE
 from campaign.result import Value
 
 MEASURED = ("breakaway_torque", "bristle_stiffness", "stiffness_at_rest")
@@ -89,7 +90,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     own = [each.standard_error or 0.0 for each in found]
     inner = math.sqrt(float(np.mean(np.square(own))) / count)
     inner_freedom = float(sum(each.freedom or 0.0 for each in found))
-    reason = next((each.reason for each in found if not each.has_interval), "")
+    reason = next((each.reason for each in found if not each.has_interval), NONE)
     if count == 1:
         return replace(found[0], systematic=systematic)
     outer = float(np.std([each.value for each in found], ddof=1)) / math.sqrt(count)
@@ -98,7 +99,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     method = f"mean of {count} ramps, Student's t"
     scatter = with_error(quantity, value, unit, outer, count - 1, method, systematic=systematic)
     within = with_error(quantity, value, unit, inner, inner_freedom, method, systematic=systematic)
-    return judged(max((scatter, within), key=_width))
+    return admitted(max((scatter, within), key=_width))
 
 
 def _bound(estimate: Estimate) -> bool:
@@ -124,7 +125,7 @@ def _between(one: Estimate, other: Estimate) -> Estimate:
     method = "mean of both directions, Welch"
     error = 0.5 * math.hypot(*errors)
     found = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
-    return judged(found)
+    return admitted(found)
 
 
 def with_comparisons(groups: Sequence[Ramps]) -> list[Ramps]:

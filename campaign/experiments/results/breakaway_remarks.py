@@ -9,6 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.experiments.results.breakaway_means import MEASURED, Ramps
+from campaign.identification.presliding import WINDOW
 from campaign.units import angle_here, rate_here
 
 FEW_COUNTS = 10.0
@@ -111,7 +112,7 @@ def _relative(estimate: Estimate) -> float:
 
 def _by_window(estimate: Estimate) -> float:
     """Systematic part of where the fitted window ends (1 sigma)."""
-    parts = (part for part in estimate.systematic if part.source == "window")
+    parts = (part for part in estimate.systematic if part.source == WINDOW)
     return sum(part.standard_uncertainty or 0.0 for part in parts)
 
 

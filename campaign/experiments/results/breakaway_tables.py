@@ -8,8 +8,16 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.experiments.results.breakaway_means import QUANTITIES, Ramps, mean
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table
 
+CHORD = Cause(
+    "chord through a curve", "a chord through a curve: too low by far more than any scatter"
+)
+EXTREME = Cause(
+    "extreme of the ramps",
+    "the extreme of the ramps; each has its own interval in the table above",
+)
 SHARE = "bristle_stiffness_to_"
 """What the metric of a window is called, before its share of the breakaway torque."""
 
@@ -36,8 +44,7 @@ def _finding(estimate: Estimate, place: Mapping[str, Cell]) -> Finding:
 
 
 def _chord(value: float) -> Estimate:
-    reason = "a chord through a curve: too low by far more than any scatter"
-    return Estimate.without_interval("chord", value, "N m/rad", reason)
+    return Estimate.without_interval("chord", value, "N m/rad", CHORD())
 
 
 def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str) -> Table:
@@ -102,15 +109,14 @@ def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
         )
     if not rows:
         return
-    extreme = "the extreme of the ramps; each has its own interval in the table above"
     yield Table(
         key=f"window{suffix}",
         title="How much the fitted window matters to σ0",
         columns=(
             Column("share", "Fitted up to (share of breakaway)", exact=True),
             Column("mean", "σ0, mean", "N m/rad", "N m/rad"),
-            Column("lowest", "Lowest", "N m/rad", "N m/rad", reason=extreme),
-            Column("highest", "Highest", "N m/rad", "N m/rad", reason=extreme),
+            Column("lowest", "Lowest", "N m/rad", "N m/rad", reason=EXTREME()),
+            Column("highest", "Highest", "N m/rad", "N m/rad", reason=EXTREME()),
         ),
         rows=tuple(rows),
         note="These intervals hold the scatter of all ramps alone, for comparing windows with one "

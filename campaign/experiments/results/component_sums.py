@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from campaign.estimate import Estimate, Systematic
 from campaign.identification.intervals import welch, with_error
 from campaign.identification.readings import RESOLUTION
+from campaign.reason import NONE
 
 
 def _of_means(
     name: str, unit: str, parts: Sequence[tuple[float, Estimate]], value: float
 ) -> Estimate:
     """A value that depends on independent means, each with its derivative (GUM 5.1.2)."""
-    reason = next((each.reason for _, each in parts if not each.has_interval), "")
+    reason = next((each.reason for _, each in parts if not each.has_interval), NONE)
     shift = math.hypot(*(slope * each.systematic_uncertainty for slope, each in parts))
     systematic = (Systematic(RESOLUTION, shift),)
     if reason:

@@ -11,6 +11,7 @@ import numpy as np
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.common import OF_RECORDING
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.excitation_options import ExcitationOptions
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
@@ -36,8 +37,6 @@ from campaign.result import Array
 from campaign.signals import MultiSine
 from campaign.trial import Trial
 
-OF_ALL = "it describes this recording"
-"""Why some metrics have no interval."""
 BAND, LOWEST_BAND = 40.0, 25.0
 """Corner of the low-pass of a series: times its highest harmonic, and at least (Hz)."""
 COHERENT = 0.2
@@ -124,7 +123,7 @@ def _rms(samples: Array) -> float:
 
 
 def _plain(name: str, value: float, unit: str) -> Estimate:
-    return Estimate.without_interval(name, value, unit, OF_ALL)
+    return Estimate.without_interval(name, value, unit, OF_RECORDING())
 
 
 def reached_rate(data: TrialData) -> tuple[Array, Array]:

@@ -10,7 +10,8 @@ import numpy as np
 from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
 from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.results.excitation_account import OF_ALL, Dynamics
+from campaign.experiments.results.excitation_account import Dynamics
+from campaign.experiments.shared.common import OF_RECORDING
 from campaign.identification.frequency.best_linear import BestLinear
 from campaign.identification.frequency.distortion import total
 from campaign.identification.inverse.terms import TERMS
@@ -44,10 +45,10 @@ def _reached(accounts: Sequence[Account], mode: str, suffix: str) -> Table:
             Column("command_rms", "RMS", unit, display, exact=True),
             Column("crest_factor", "Crest factor", exact=True),
             *asked,
-            Column("top_angle", "Angle reached", "rad", "deg", reason=OF_ALL),
-            Column("top_rate", "Rate reached", "rad/s", "deg/s", reason=OF_ALL),
-            Column("peak_torque", "Torque reached", "N m", "N m", reason=OF_ALL),
-            Column("used", "Of its limit", "", "percent", reason=OF_ALL),
+            Column("top_angle", "Angle reached", "rad", "deg", reason=OF_RECORDING()),
+            Column("top_rate", "Rate reached", "rad/s", "deg/s", reason=OF_RECORDING()),
+            Column("peak_torque", "Torque reached", "N m", "N m", reason=OF_RECORDING()),
+            Column("used", "Of its limit", "", "percent", reason=OF_RECORDING()),
             Column("limit", "Nearest limit"),
         ),
         rows=tuple(_row(data, found) for data, found in accounts),
@@ -98,11 +99,11 @@ def response_table(best: BestLinear, suffix: str) -> Table:
             Column("lines", "Lines", exact=True),
             Column("lowest", "Lowest", "Hz", "Hz", exact=True),
             Column("highest", "Highest", "Hz", "Hz", exact=True),
-            Column("torque", "Torque, RMS", "N m", "N m", reason=OF_ALL),
+            Column("torque", "Torque, RMS", "N m", "N m", reason=OF_RECORDING()),
             Column("even", "Even distortion", "", "percent"),
             Column("odd", "Odd distortion", "", "percent"),
-            Column("noise", "Noise", "", "percent", reason=OF_ALL),
-            Column("nonlinear", "Nonlinear scatter", "", "percent", reason=OF_ALL),
+            Column("noise", "Noise", "", "percent", reason=OF_RECORDING()),
+            Column("nonlinear", "Nonlinear scatter", "", "percent", reason=OF_RECORDING()),
         ),
         rows=(
             {
@@ -167,5 +168,5 @@ def _plain(term: str, meaning: str, value: float) -> dict[str, Cell]:
         "term": term,
         "meaning": meaning,
         "unit": "",
-        "value": Estimate.without_interval("value", value, "", OF_ALL),
+        "value": Estimate.without_interval("value", value, "", OF_RECORDING()),
     }

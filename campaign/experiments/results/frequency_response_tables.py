@@ -13,6 +13,7 @@ from campaign.experiments.interface import TrialData
 from campaign.identification.elastic_mode import elastic_mode
 from campaign.identification.frequency_response import Response
 from campaign.identification.servo import Crossing, ServoCharacteristics, change
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.signals import Sine
 from campaign.units import rate_here
@@ -140,7 +141,10 @@ def _effect_table(
         )
 
 
-ONE_SIGMA = "it is the standard error of the column before it, from noise alone"
+ONE_SIGMA = Cause(
+    "standard error from noise",
+    "it is the standard error of the column before it, from noise alone",
+)
 
 
 def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> Table:
@@ -150,11 +154,11 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         columns=(
             *named,
             Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA),
+            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA()),
             Column("gain_margin", "Gain margin", "dB"),
-            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA),
+            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA()),
             Column("phase_margin", "Phase margin", "rad", "deg"),
-            Column("phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA),
+            Column("phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA()),
             Column("gain_margin_bound", "Gain margin at least", "dB"),
         ),
         rows=tuple(rows),

@@ -18,12 +18,15 @@ from campaign.identification.friction_line import (
     in_order_of_time,
     mean_of_stretches,
 )
-from campaign.identification.intervals import difference, judged, shifted_by
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import difference, shifted_by
+from campaign.reason import Cause
 from campaign.result import Value
 
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 OFFSET = 0.3
 """of Coulomb friction, from which on what both directions do not share is told as a load."""
+NO_LOAD = Cause("no normal load", "there is no normal load")
 FRICTION, OF_LOAD, WHAT_HOLDS = "friction_torque", "friction_coefficient", "constant_torque"
 
 
@@ -154,7 +157,7 @@ def _stretches(
 def _coefficient(data: TrialData, rate: Estimate, torque: Estimate, load: float) -> Estimate:
     """Friction over normal load times its arm (N m); its interval is that of the friction."""
     if load == 0.0:
-        return Estimate.without_interval(OF_LOAD, float("nan"), "", "there is no normal load")
+        return Estimate.without_interval(OF_LOAD, float("nan"), "", NO_LOAD())
     scale = (1.0 if rate.value > 0 else -1.0) / abs(load)
     ends = [None if end is None else end * scale for end in (torque.low, torque.high)]
     low, high = ends if scale > 0 else ends[::-1]
@@ -188,7 +191,7 @@ def _mean_coefficient(
     if not values:
         return None
     mean = mean_of_stretches(OF_LOAD, np.array(values), "")
-    return judged(with_scale(_told(mean, data, force), data, NORMAL_LOAD))
+    return admitted(with_scale(_told(mean, data, force), data, NORMAL_LOAD))
 
 
 def _constant(lines: Mapping[str, FrictionLine]) -> Estimate | None:

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.experiments.results.motion_account import Motion
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table
 
-ONE = "it describes one recording"
-
+OF_ONE_RECORDING = Cause("describes one recording", "it describes one recording")
+MEAN_OF_STRETCH = Cause("mean of a stretch", "mean of the stretch")
 
 _SUMMARY = (
-    Column("duration", "Duration", "s", "s", reason=ONE),
-    Column("travel", "Travel", "rad", "deg", reason=ONE),
-    Column("top_rate", "Largest rate", "rad/s", "deg/s", reason=ONE),
-    Column("rms_torque", "Torque (RMS)", "N m", "N m", reason=ONE),
-    Column("peak_torque", "Largest torque", "N m", "N m", reason=ONE),
-    Column("rms_error", "Tracking error (RMS)", "rad", "mrad", reason=ONE),
-    Column("peak_error", "Largest tracking error", "rad", "mrad", reason=ONE),
+    Column("duration", "Duration", "s", "s", reason=OF_ONE_RECORDING()),
+    Column("travel", "Travel", "rad", "deg", reason=OF_ONE_RECORDING()),
+    Column("top_rate", "Largest rate", "rad/s", "deg/s", reason=OF_ONE_RECORDING()),
+    Column("rms_torque", "Torque (RMS)", "N m", "N m", reason=OF_ONE_RECORDING()),
+    Column("peak_torque", "Largest torque", "N m", "N m", reason=OF_ONE_RECORDING()),
+    Column("rms_error", "Tracking error (RMS)", "rad", "mrad", reason=OF_ONE_RECORDING()),
+    Column("peak_error", "Largest tracking error", "rad", "mrad", reason=OF_ONE_RECORDING()),
     Column("stretches", "Steady stretches", exact=True),
 )
 
@@ -95,7 +96,7 @@ def friction_table(motion: Motion, suffix: str) -> Table:
             row |= {"load": each.load, "coefficient": each.coefficient}
         rows.append(row)
     more = (
-        Column("load", "Normal load", "N", "N", reason="mean of the stretch"),
+        Column("load", "Normal load", "N", "N", reason=MEAN_OF_STRETCH()),
         Column("coefficient", "Friction coefficient"),
     )
     return Table(

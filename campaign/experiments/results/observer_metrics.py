@@ -17,6 +17,7 @@ from campaign.identification.stabilization_error import over_blocks, over_trials
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, control_rate
+from campaign.reason import Cause
 from campaign.recording import Outcome, Recording
 from campaign.result import Array
 from campaign.signals import Sine
@@ -25,7 +26,11 @@ ERROR = "stabilization_error"
 ERROR_THEORY = "error_by_equation_5_4"
 NOISE = "noise_rate"
 REJECTION = "disturbance_rejection"
-BY_THEORY = "an equation says so, not a measurement"
+BY_THEORY = Cause("by theory", "an equation says so, not a measurement")
+TOO_FEW = Cause(
+    "too few frequencies",
+    "{frequencies} frequencies; from {enough} on their range encloses it",
+)
 ENOUGH = 6
 """frequencies whose lowest and highest answer enclose the median in 97 % of cases (sign test)."""
 
@@ -104,7 +109,7 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
         if FRICTION_TORQUE in cut.channels:
             bench = _bench(data)
             value = predicted_error(cut, bench, _corner(data), _inertia(data, bench))
-            yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY)
+            yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY())
     elif measured == "noise" and LOAD_RATE in cut.channels:
         yield over_blocks(cut[LOAD_RATE], NOISE, "rad/s")
     elif measured == "rejection" and isinstance(task.disturbance, Sine):
@@ -198,7 +203,7 @@ def measured_corner(gain: Gain, without: Gain) -> Estimate | None:
         return None
     name, value = "observer_corner_frequency", float(np.median(corners))
     if len(corners) < ENOUGH:
-        reason = f"{len(corners)} frequencies; from {ENOUGH} on their range encloses it"
+        reason = TOO_FEW(frequencies=len(corners), enough=ENOUGH)
         return Estimate.without_interval(name, value, "Hz", reason)
     low, high = float(min(corners)), float(max(corners))
     method = f"median and range of what {len(corners)} frequencies say"

@@ -10,6 +10,7 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.identification.threshold import Threshold, crossing, passing
+from campaign.reason import Cause
 from campaign.result import (
     Array,
     Cell,
@@ -20,6 +21,12 @@ from campaign.result import (
 )
 from campaign.units import in_words
 
+RANK = Cause("rank", "a place in an order, not a size")
+OPEN_RANK = Cause(
+    "open rank",
+    "a place in an order, not a size; by the intervals of the thresholds it may change places with "
+    "{others}",
+)
 SYMBOLS = {
     "bristle_stiffness": "σ0",
     "bristle_damping": "σ1",
@@ -111,11 +118,7 @@ def _rank(name: str, ranks: Mapping[str, int], thresholds: Mapping[str, Estimate
         for other, estimate in thresholds.items()
         if other != name and _may_be_alike(estimate, thresholds[name])
     ]
-    reason = "a place in an order, not a size"
-    if near:
-        reason += (
-            f"; by the intervals of the thresholds it may change places with {', '.join(near)}"
-        )
+    reason = OPEN_RANK(others=", ".join(near)) if near else RANK()
     rank = float(ranks[name])
     return Estimate.without_interval("sensitivity_rank", rank, "", reason, kind="count")
 

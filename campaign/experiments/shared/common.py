@@ -10,8 +10,12 @@ from pydantic import ValidationError
 
 from campaign.experiments.interface import TestData, TrialData
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.result import Value
 from campaign.trial import Tree, canonical_json
+
+COUNTED = Cause("counted", "counted")
+OF_RECORDING = Cause("describes the recording", "it describes this recording")
 
 METHOD_LABELS = {
     "none": "no compensation",

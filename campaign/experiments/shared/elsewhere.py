@@ -24,6 +24,4 @@ def with_scale(estimate: Estimate, data: TrialData, channel: str) -> Estimate:
     relative = scale_uncertainty(data, channel)
     if relative is None or estimate.origin is Origin.NOT_DETERMINED:
         return estimate
-    return shifted_by(
-        estimate, SOURCE.format(channel), abs(estimate.value) * relative, of_rig=True
-    )
+    return shifted_by(estimate, SOURCE.format(channel), abs(estimate.value) * relative, of_rig=True)

@@ -19,8 +19,26 @@ from campaign.identification.frequency.line_spectra import LineSpectra
 from campaign.identification.frequency.multisine import Lines
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.intervals import LEVEL, student
+from campaign.reason import Cause, Reason
 
 Parity = Literal["even", "odd"]
+SHARED_LINES = Cause(
+    "shared lines", "even lines are excited, too: even and odd distortion share lines"
+)
+NO_LINE = Cause("no detection line", "there is no {parity} detection line")
+HIDDEN_IN_ONE = Cause(
+    "noise of a single realisation", "not more than the noise shows, in a single realisation"
+)
+SINGLE_REALISATION = Cause(
+    "single realisation",
+    "a single realisation does not show how distortion scatters with the phases",
+)
+SINGLE_ODD = Cause(
+    "single realisation of odd lines",
+    SINGLE_REALISATION.text
+    + ", nor what of it is at the excited lines: those left out stand for all",
+)
+WITHIN_NOISE = Cause("within noise", "not more than the noise shows; a bound")
 
 
 @dataclass(frozen=True)
@@ -152,9 +170,9 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     method = f"power at {parity} {where} less noise, over that of the output"
     count = len(level.power)
     if distortion.mixed:
-        return _none(name, "even lines are excited, too: even and odd distortion share lines")
+        return _none(name, SHARED_LINES())
     if not len(level.frequency):
-        return _none(name, f"there is no {parity} detection line")
+        return _none(name, NO_LINE(parity=parity))
     ratio = (np.sum(level.power, axis=1) - np.sum(level.noise)) / (
         max(level.share, 1e-300) * distortion.output
     )
@@ -162,10 +180,8 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     if count < 2:
         # Lines of one set of phases are no independent draws: what they scatter holds too little.
         if mean <= 0:
-            return _none(name, "not more than the noise shows, in a single realisation")
-        reason = "a single realisation does not show how distortion scatters with the phases"
-        if parity == "odd":
-            reason += ", nor what of it is at the excited lines: those left out stand for all"
+            return _none(name, HIDDEN_IN_ONE())
+        reason = SINGLE_ODD() if parity == "odd" else SINGLE_REALISATION()
         return Estimate.without_interval(name, math.sqrt(mean), "", reason, method=method)
     scatter = float(np.std(ratio, ddof=1)) / math.sqrt(count)
     # The noise that is taken off is the same in all realisations.
@@ -174,7 +190,7 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     half = student(count - 1) * math.hypot(scatter, noise)
     if mean - half <= 0 or np.any(ratio <= 0):
         most = math.sqrt(max(mean, 0.0) + half)
-        reason = "not more than the noise shows; a bound"
+        reason = WITHIN_NOISE()
         return Estimate(name, most, "", method=method, kind="at most", reason=reason)
     ends = _ends(ratio, mean, math.hypot(scatter, noise) / mean)
     return Estimate(name, math.sqrt(mean), "", *ends, LEVEL, method, freedom=count - 1)
@@ -197,5 +213,5 @@ def _ends(ratio: Array, mean: float, error: float) -> tuple[float, float]:
     return math.exp(0.5 * low), math.exp(0.5 * high)
 
 
-def _none(name: str, reason: str) -> Estimate:
+def _none(name: str, reason: Reason) -> Estimate:
     return Estimate.without_interval(name, math.nan, "", reason)

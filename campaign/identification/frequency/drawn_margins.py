@@ -18,6 +18,7 @@ from campaign.estimate import Estimate
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.intervals import LEVEL
 from campaign.identification.servo import MINUS_3_DB
+from campaign.reason import Cause
 
 DRAWS = 1000
 GRID = 500
@@ -31,6 +32,7 @@ DECIBEL = 20.0 / math.log(10.0)
 METHOD = "rational function with a delay, functions drawn from its scatter"
 TAIL = 0.5 - 0.5 * LEVEL
 ONE_SIDED = 1.0 - LEVEL
+OPEN_IN_BAND = Cause("open in band", "scatter leaves open whether it lies in the band")
 
 
 class Logarithm(Protocol):
@@ -129,7 +131,7 @@ def with_draws(estimate: Estimate, draws: Array) -> Estimate:
         float(max(high, estimate.value)) if math.isfinite(high) else None,
     )
     if ends == (None, None):
-        reason = "scatter leaves open whether it lies in the band"
+        reason = OPEN_IN_BAND()
         return Estimate.without_interval(
             estimate.name, math.nan, estimate.unit, reason, method=METHOD
         )

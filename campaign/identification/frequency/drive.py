@@ -17,6 +17,7 @@ from campaign.identification.frequency.two_mass_model import (
     polynomials,
 )
 from campaign.identification.frequency_response import Array, ComplexArray
+from campaign.reason import Reason
 
 PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
 HIDDEN_BY_PLACE = {
@@ -40,7 +41,7 @@ class TwoMass:
         resonance, antiresonance: undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2) over 2 pi (Hz).
         antiresonance_damping: d / (2 sqrt(k J2)).
         inertia_ratio: J2 / J1.
-        misfit: why such a drive is no model of the responses; empty where it may be one.
+        misfit: why such a drive is no model of the responses; none where it may be one.
         excess: weighted square over what a right model leaves in the mean.
         criterion: Schwarz' (BIC).
         sides: that were measured.
@@ -63,7 +64,7 @@ class TwoMass:
     antiresonance: Estimate
     antiresonance_damping: Estimate
     inertia_ratio: Estimate
-    misfit: str
+    misfit: Reason
     excess: float
     criterion: float
     sides: tuple[Side, ...]

@@ -30,10 +30,12 @@ from campaign.identification.frequency.orders import Chosen, with_order
 from campaign.identification.frequency.rational import RationalFit
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.servo import (
+    BOUND,
     Crossing,
     ServoCharacteristics,
     characteristics,
 )
+from campaign.reason import Cause, Reason
 
 GRID = 8000
 """Frequencies between the first and the last at which crossings are looked for."""
@@ -41,6 +43,17 @@ DECIBEL = 20.0 / math.log(10.0)
 METHOD = "rational function with a delay, delta method"
 STEP = 1e-5
 """of the logarithm of frequency, for slopes."""
+GAIN_UP_TO = Cause(
+    "gain up to last frequency", "the gain up to {frequency:.4g} Hz, if it rises no more behind"
+)
+NO_FALL = Cause("gain not below 1", "the gain does not fall below 1 in the band")
+NO_WIDTH = Cause("gain not through -3 dB", "the gain does not fall through -3 dB in the band")
+BAND_ENDS = Cause("band ends before", "the band ends before it")
+BAND_BEGINS = Cause("band begins after", "the band begins after it")
+NOT_CROSSED = Cause(
+    "0 dB not in band",
+    "the open loop does not cross 0 dB in the band: its gain is {side} 1 all along",
+)
 
 
 def measured_margins(loop: MeasuredResponse) -> ServoCharacteristics:
@@ -134,7 +147,7 @@ def fitted_margins(
     bandwidth = widths[0].frequency if widths else _outside(fit, fall(log), drawn)
     found = ServoCharacteristics(
         bandwidth,
-        gain_margin or _none("gain_margin", "dB", "the gain does not fall below 1 in the band"),
+        gain_margin or _none("gain_margin", "dB", NO_FALL()),
         smallest or _none("phase_margin", "rad", _where(log.real)),
         bound,
         (*widths, *gain, *half),
@@ -235,7 +248,7 @@ def _gain_bound(loop: _Loop, drawn: Drawn | None) -> Estimate | None:
     value = min(value, least(drawn.gain_margin, math.inf))
     if value <= 0:
         return None
-    reason = f"a bound: the gain up to {last:.4g} Hz, if it rises no more behind"
+    reason = BOUND(why=GAIN_UP_TO(frequency=last))
     return Estimate("gain_margin", value, "dB", method=DRAWN, kind="at least", reason=reason)
 
 
@@ -243,22 +256,20 @@ def _outside(fit: RationalFit, above: Array, drawn: Drawn | None) -> Estimate:
     """A bandwidth that lies beyond the band, or before it; scatter moves the bound inwards."""
     if np.all(above > 0):
         value = fit.highest if drawn is None else least(drawn.bandwidth, fit.highest)
-        return _bound(value, "at least", "the band ends before it")
+        return _bound(value, "at least", BAND_ENDS())
     if np.all(above < 0):
         value = fit.lowest if drawn is None else -least(-drawn.bandwidth, -fit.lowest)
-        return _bound(value, "at most", "the band begins after it")
-    return _none("bandwidth", "Hz", "the gain does not fall through -3 dB in the band")
+        return _bound(value, "at most", BAND_BEGINS())
+    return _none("bandwidth", "Hz", NO_WIDTH())
 
 
-def _bound(value: float, kind: Any, reason: str) -> Estimate:
-    reason = f"a bound: {reason}"
-    return Estimate("bandwidth", value, "Hz", method=DRAWN, kind=kind, reason=reason)
+def _bound(value: float, kind: Any, why: Reason) -> Estimate:
+    return Estimate("bandwidth", value, "Hz", method=DRAWN, kind=kind, reason=BOUND(why=why))
 
 
-def _none(name: str, unit: str, reason: str) -> Estimate:
+def _none(name: str, unit: str, reason: Reason) -> Estimate:
     return Estimate.without_interval(name, math.nan, unit, reason)
 
 
-def _where(gain: Array) -> str:
-    side = "above" if np.all(gain > 0) else "below"
-    return f"the open loop does not cross 0 dB in the band: its gain is {side} 1 all along"
+def _where(gain: Array) -> Reason:
+    return NOT_CROSSED(side="above" if np.all(gain > 0) else "below")

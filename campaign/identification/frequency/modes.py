@@ -11,13 +11,16 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.frequency.orders import Chosen, root_jacobian, with_order
 from campaign.identification.frequency.rational import RationalFit
 from campaign.identification.frequency_response import Array, ComplexArray
-from campaign.identification.intervals import judged, with_error
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import MODEL_MISFIT, with_error
+from campaign.reason import Cause, Reason
 
 LEAST_IMAGINARY = 1e-6
 """Share of a root below which its imaginary part counts as rounding."""
 SAME = 0.1
 """Distance in the logarithm of frequency within which modes of two orders are the same."""
 METHOD = "root of a rational function with a delay, delta method"
+OUTSIDE = Cause("outside of the band", "it lies outside of the measured frequencies")
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ def _mode(
     )
     if fit.lowest <= frequency <= fit.highest:
         return found
-    reason = "it lies outside of the measured frequencies"
+    reason = OUTSIDE()
     return replace(
         found,
         frequency=replace(found.frequency, origin=Origin.NOT_DETERMINED, reason=reason),
@@ -112,8 +115,10 @@ def _mode(
     )
 
 
-def of_fit(name: str, value: float, unit: str, error: float, misfit: str, method: str) -> Estimate:
+def of_fit(
+    name: str, value: float, unit: str, error: float, misfit: Reason, method: str
+) -> Estimate:
     """An estimate by a fit; without an interval where the fit is no model of the response."""
     if misfit:
-        return Estimate.without_interval(name, value, unit, f"misfit: {misfit}", method=method)
-    return judged(with_error(name, value, unit, error, math.inf, method))
+        return Estimate.without_interval(name, value, unit, MODEL_MISFIT(why=misfit), method=method)
+    return admitted(with_error(name, value, unit, error, math.inf, method))

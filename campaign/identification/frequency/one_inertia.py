@@ -18,15 +18,20 @@ from campaign.identification.frequency.modes import of_fit
 from campaign.identification.frequency.rational import rational_fit
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency_response import Array
+from campaign.reason import Cause
 
-HIDDEN = (
+HIDDEN = Cause(
+    "load side alone",
     "a sensor at the load shows no antiresonance: any J1, J2 and k with the same resonance and the "
-    "same sum of inertias answer alike; measure the motor's rate too"
+    "same sum of inertias answer alike; measure the motor's rate too",
 )
-RIGID = (
+RIGID = Cause(
+    "rigid drive",
     "one inertia explains the response: no second one shows; excite up to above the resonance, or "
-    "with more torque around it"
+    "with more torque around it",
 )
+NEGATIVE_INERTIA = Cause("negative inertia", "its inertia would be negative")
+NO_RESONANCE = Cause("no resonance in band", "no resonance of two inertias lies in the band")
 METHOD = "One inertia with viscous friction and a delay, least squares weighted by scatter"
 NOT_OF_ONE = {**HIDDEN_BY_PLACE, "resonance": "Hz", "resonance_damping": ""}
 """What one inertia has not, with units."""
@@ -42,10 +47,10 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
     error = math.sqrt(max(float(by @ fit.scatter @ by), 0.0))
     misfit = fit.misfit
     if not misfit and inertia <= 0:
-        misfit = "its inertia would be negative"
+        misfit = NEGATIVE_INERTIA()
     told = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
     nothing: dict[str, Any] = {
-        name: Estimate.without_interval(name, math.nan, of, RIGID)
+        name: Estimate.without_interval(name, math.nan, of, RIGID())
         for name, of in NOT_OF_ONE.items()
     }
     return TwoMass(
@@ -96,14 +101,14 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
     method = "function of third order with a delay, friction taken to be at one of the inertias"
     misfit = fit.misfit
     if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
-        misfit = "no resonance of two inertias lies in the band"
+        misfit = NO_RESONANCE()
     names = (("total_inertia", "kg m^2"), ("resonance", "Hz"), ("resonance_damping", ""))
     estimates: dict[str, Any] = {
         name: of_fit(name, float(value), of, float(by_fit), misfit, method)
         for (name, of), value, by_fit in zip(names, found, error, strict=True)
     }
     for name, of in HIDDEN_BY_PLACE.items():
-        estimates[name] = Estimate.without_interval(name, math.nan, of, HIDDEN)
+        estimates[name] = Estimate.without_interval(name, math.nan, of, HIDDEN())
     return TwoMass(
         **estimates,
         misfit=misfit,

@@ -10,6 +10,11 @@ import numpy as np
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency.rational import SURE, Weights
 from campaign.identification.frequency_response import Array, ComplexArray
+from campaign.reason import NONE, Cause, Reason
+
+NO_DEVIATION = Cause(
+    "too few realisations", "too few realisations or averages tell how it scatters"
+)
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class HeldAgainst:
         square: squared difference over its expectation, all frequencies together, with what the
             fit's own error has in common among them: 1 in the mean for a right model; NaN likewise.
         most: 3.3 standard deviations of `square` above 1.
-        reason: why there is no deviation; "" where there is.
+        reason: why there is no deviation; none where there is.
     """
 
     measured: MeasuredResponse
@@ -32,7 +37,7 @@ class HeldAgainst:
     deviation: Array
     square: float
     most: float
-    reason: str = ""
+    reason: Reason = NONE
 
     @property
     def difference(self) -> ComplexArray:
@@ -75,8 +80,7 @@ def held_against(
         weights = Weights.of(measured)
     except ValueError:
         nothing = np.full(n, math.nan)
-        reason = "too few realisations or averages tell how it scatters"
-        return HeldAgainst(measured, predicted, nothing, math.nan, math.nan, reason)
+        return HeldAgainst(measured, predicted, nothing, math.nan, math.nan, NO_DEVIATION())
     stacked = np.concatenate([jacobian.real, jacobian.imag])
     shared = stacked @ covariance @ stacked.T
     # Variances that are estimates are too small in their inverse mean.

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from campaign.identification.frequency.measured import ALIKE, LEAST_FREEDOM, MeasuredResponse
 from campaign.identification.frequency_response import Array, ComplexArray
 from campaign.identification.least_squares import covariance, minimum
+from campaign.reason import NONE, Cause, Reason
 
 SANATHANAN = 8
 """iterations before a refinement."""
@@ -31,6 +32,13 @@ MOST_EXCESS = 2.0
 """Weighted square over its expectation above which a function is no model of the response."""
 SURE = 3.3
 """Standard deviations of a statistic above which it is no chance (0.05 %, one-sided)."""
+LARGE_RESIDUALS = Cause(
+    "residuals too large", "it leaves {times:.1f} times the square that scatter would"
+)
+ALIKE_RESIDUALS = Cause(
+    "residuals alike",
+    "what it leaves is alike at neighbouring frequencies ({correlation:.2f})",
+)
 
 
 @dataclass(frozen=True)
@@ -80,7 +88,7 @@ class RationalFit:
         covariance: of (numerator, denominator, delay), shape (p, p); not yet with `excess`.
         residuals: weighted, complex, shape (n,); squares of either part are 1 in the mean.
         excess: weighted square over what a right model leaves in the mean.
-        misfit: why it is no model of the response; empty where it may be one.
+        misfit: why it is no model of the response; none where it may be one.
         parameters: how many are free.
         with_delay: whether the delay is one of them.
         lowest, highest: of the frequencies (Hz).
@@ -94,7 +102,7 @@ class RationalFit:
     covariance: Array
     residuals: ComplexArray
     excess: float
-    misfit: str
+    misfit: Reason
     parameters: int
     with_delay: bool
     lowest: float
@@ -312,7 +320,7 @@ def condition_of(jacobian: Array) -> float:
     return float(np.linalg.cond(jacobian / length))
 
 
-def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tuple[float, str]:
+def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tuple[float, Reason]:
     """Weighted square over its expectation, and why a model is none of the response, or nothing.
 
     Args:
@@ -327,10 +335,10 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     # Of white residuals this has a standard deviation of 1 / sqrt(2 n), and a model takes some off.
     alike = together * math.sqrt(2.0 * n)
     if excess > MOST_EXCESS and excess > 1.0 + SURE * chance:
-        return excess, f"it leaves {excess:.1f} times the square that scatter would"
+        return excess, LARGE_RESIDUALS(times=excess)
     if alike > SURE and excess > 1.0 + SURE * chance:
-        return excess, f"what it leaves is alike at neighbouring frequencies ({together:.2f})"
-    return excess, ""
+        return excess, ALIKE_RESIDUALS(correlation=together)
+    return excess, NONE
 
 
 def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:

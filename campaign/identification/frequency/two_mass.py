@@ -35,7 +35,9 @@ from campaign.identification.frequency.two_mass_model import (
     starts,
 )
 from campaign.identification.frequency_response import Array, ComplexArray
+from campaign.identification.intervals import TORQUE_CONSTANT
 from campaign.identification.least_squares import Minimum, covariance, minimum
+from campaign.reason import Cause, Reason
 
 STEP = 1e-6
 ROUGH = 10
@@ -47,7 +49,14 @@ LARGEST = 50.0
 WIDEST_RATIO = 8.0
 """Largest logarithm of J2 / J1, either way."""
 METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
-NO_SCALE = "the input is not a torque in N m, so that only frequencies and ratios are known"
+NO_SCALE = Cause(
+    "input not a torque",
+    "the input is not a torque in N m, so that only frequencies and ratios are known",
+)
+OPEN_COMBINATION = Cause(
+    "combination left open",
+    "the data leave a combination of the inertias and the stiffness open",
+)
 
 
 def two_mass(
@@ -156,7 +165,7 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     left = best.residuals[:n] + 1j * best.residuals[n:]
     excess, misfit = judged_fit(left, len(free), weights[0])
     if not misfit and np.any(open_[:3]):
-        misfit = "the data leave a combination of the inertias and the stiffness open"
+        misfit = OPEN_COMBINATION()
     criterion = best.cost + len(free) * math.log(2 * n)
     found = _estimates(point, spread * max(excess, 1.0), sides, misfit, excess, criterion, grounded)
     return replace(found, condition=condition_of(best.jacobian[:, free]))
@@ -170,7 +179,7 @@ def _estimates(
     point: Array,
     spread: Array,
     sides: tuple[Side, ...],
-    misfit: str,
+    misfit: Reason,
     excess: float,
     criterion: float,
     grounded: bool,
@@ -228,11 +237,11 @@ def _estimates(
 
 def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) -> TwoMass:
     """What can be told from these sides, and with this knowledge of the torque."""
-    hidden: dict[str, str] = {}
+    hidden: dict[str, Reason] = {}
     if not torque_known:
-        hidden = dict.fromkeys((*PARTS, "total_inertia"), NO_SCALE)
+        hidden = dict.fromkeys((*PARTS, "total_inertia"), NO_SCALE())
     if found.sides == ("load",) and not found.rigid:
-        hidden |= dict.fromkeys(PARTS, HIDDEN)
+        hidden |= dict.fromkeys(PARTS, HIDDEN())
     changed: dict[str, Any] = {
         name: Estimate.without_interval(name, math.nan, getattr(found, name).unit, reason)
         for name, reason in hidden.items()
@@ -241,7 +250,7 @@ def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) 
         each = getattr(found, name)
         if name in changed or not each.has_interval or torque_uncertainty is None:
             continue
-        part = Systematic("torque constant", abs(each.value) * torque_uncertainty)
+        part = Systematic(TORQUE_CONSTANT, abs(each.value) * torque_uncertainty)
         changed[name] = replace(each, systematic=(*each.systematic, part))
     kept = {pair: share for pair, share in found.correlations.items() if not {*pair} & {*hidden}}
     return replace(found, **changed, correlations=kept)

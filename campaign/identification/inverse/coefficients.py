@@ -18,10 +18,14 @@ from campaign.identification.inverse.motion import Array, Filtering, Motion
 from campaign.identification.inverse.regression import Regression, regress
 from campaign.identification.inverse.rows import rows
 from campaign.identification.inverse.terms import Term
+from campaign.reason import Cause
 
 FASTER = 5.0
 """times the slowest rate of a row: rows below that are left out to see what they do."""
 METHOD = "least squares; deviation with autocorrelation (Newey and West)"
+TOO_FEW_ROWS = Cause(
+    "too few independent rows", "what is left over is worth too few independent rows"
+)
 
 
 def coefficients(
@@ -54,8 +58,9 @@ def estimates(
         value, error = float(fit.values[index]), float(fit.robust[index])
         wide = fit.quantile * error
         if fit.freedom < 1.0 or not math.isfinite(wide):
-            reason = "what is left over is worth too few independent rows"
-            found[term.name] = Estimate.without_interval(term.name, value, term.unit, reason)
+            found[term.name] = Estimate.without_interval(
+                term.name, value, term.unit, TOO_FEW_ROWS()
+            )
             continue
         one = Estimate(
             term.name, value, term.unit, value - wide, value + wide, LEVEL, METHOD,

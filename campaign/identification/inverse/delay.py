@@ -17,6 +17,7 @@ from campaign.identification.inverse.motion import Array, Filtering, Motion, dec
 from campaign.identification.inverse.regression import Piece, fitted, regress, stacked
 from campaign.identification.inverse.rows import all_rows, moving, rows
 from campaign.identification.inverse.terms import Terms
+from campaign.reason import Cause
 
 LONGEST = 0.02
 """s; delays are looked for up to this, or up to `SAMPLES` samples where these are longer."""
@@ -24,6 +25,15 @@ SAMPLES = 5.0
 OWN = 0.05
 """Share of what a delay changes that has to be like no other term."""
 METHOD = "least residual over a shift of the force, Bartlett HAC"
+HALF_BAND_OPEN = Cause("half band open", "half the band does not tell it: {why}")
+STILL_FALLING = Cause(
+    "residual still falling", "the residual still falls at {milliseconds:+.3g} ms"
+)
+LIKE_OTHER_TERMS = Cause(
+    "delay like other terms",
+    "a later force looks like other terms in this motion: all but {own_percent:.1g} % of it",
+)
+STEADY_FORCE = Cause("force hardly changing", "the force hardly changes: its time cannot be told")
 
 
 def find_delay(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> Estimate:
@@ -41,7 +51,7 @@ def find_delay(motions: Sequence[Motion], terms: Terms, filtering: Filtering) ->
     except ValueError:
         return found
     if math.isnan(other.value):
-        reason = f"half the band does not tell it: {other.reason}"
+        reason = HALF_BAND_OPEN(why=other.reason)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     return shifted_by(found, "band", abs(other.value - found.value))
 
@@ -63,7 +73,7 @@ def _in_band(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> E
     tried = np.linspace(-reach, reach, 21)
     best = int(np.argmin([left(float(each)) for each in tried]))
     if best in (0, len(tried) - 1):
-        reason = f"the residual still falls at {tried[best] * 1e3:+.3g} ms"
+        reason = STILL_FALLING(milliseconds=tried[best] * 1e3)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     ends = (float(tried[best - 1]), float(tried[best + 1]))
     found = float(minimize_scalar(left, bounds=ends, method="bounded").x)
@@ -84,15 +94,12 @@ def _with_interval(
         wider.append(Piece(both * moves[:, None], whole.force * moves, whole.time))
     design, force = stacked(wider)
     if (own := _own_share(design)) < OWN:
-        reason = (
-            f"a later force looks like other terms in this motion: all but {100 * own:.1g} % of it"
-        )
+        reason = LIKE_OTHER_TERMS(own_percent=100 * own)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     fit = fitted(wider, np.asarray(np.linalg.pinv(design)), design, force)
     half = fit.quantile * float(fit.robust[-1])
     if not half < reach:
-        reason = "the force hardly changes: its time cannot be told"
-        return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
+        return Estimate.without_interval("delay", math.nan, "s", STEADY_FORCE(), method=METHOD)
     return Estimate(
         "delay", delay, "s", delay - half, delay + half, LEVEL, METHOD,
         standard_error=float(fit.robust[-1]), freedom=fit.freedom,

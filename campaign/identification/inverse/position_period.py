@@ -3,38 +3,59 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.identification.inverse.motion import Array
 
-FEWEST, MOST = 2.0, 200.0
+FEWEST, MOST = 1.0, 400.0
 """Periods in the travel between which one is looked for."""
 FINE = 8
 """Tried periods per period in the travel: two neighbours shift by an eighth over all of it."""
 FEWEST_ROWS = 10.0
-"""Rows per period, on average, where the axis moves: below that nothing is seen of it."""
+"""Rows in a period, at least, at the rate of a row that counts: a faster one does not show it."""
+SLOW = 0.1
+"""Share of the moving rows, the slowest, that set the shortest period."""
+FEWEST_PERIODS = 3.0
+"""of rows that count, at least."""
 
 
 def find_period(position: Array, rate: Array, residuals: Array) -> float | None:
     """The period (rad, or m) at which residuals, of shape (n,), repeat most; None for no travel.
 
-    Force over position and friction over position (with the sign of the rate) count alike. Whether
-    it is worth a term is for blocks that were left out to say.
+    Force over position and friction over position (with the sign of the rate) count alike. Of each
+    period those rows count that are slow enough to show it, whatever the others do. Whether it is
+    worth a term is for blocks that were left out to say.
     """
     travel = float(np.ptp(position))
-    steps = np.abs(np.diff(position))
-    moving = steps[steps > 1e-3 * float(steps.max(initial=0.0))]
-    if travel == 0.0 or len(moving) == 0:
+    steps = np.abs(np.gradient(position)) if len(position) > 1 else np.zeros(len(position))
+    moving = (rate != 0.0) & (steps > 1e-3 * float(steps.max(initial=0.0)))
+    if travel == 0.0 or not np.any(moving):
         return None
-    most = min(MOST, travel / (FEWEST_ROWS * float(np.median(moving))))
-    if most <= FEWEST:
-        return None
+    most = min(MOST, travel / (FEWEST_ROWS * float(np.quantile(steps[moving], SLOW))))
     counts = np.arange(FEWEST, most, 1.0 / FINE)
-    direction = np.sign(rate)
-    gains = []
-    for count in counts:
-        angle = 2.0 * np.pi * count * position / travel
-        wave = np.column_stack([np.sin(angle), np.cos(angle)])
-        both = np.column_stack([wave, direction[:, None] * wave])
-        values = np.linalg.lstsq(both.T @ both, both.T @ residuals, rcond=None)[0]
-        gains.append(float(values @ (both.T @ residuals)))
+    gains = [_gain(travel / count, position, rate, residuals, steps, moving) for count in counts]
+    if not any(gains):
+        return None
     return float(travel / counts[int(np.argmax(gains))])
+
+
+def _gain(
+    period: float,
+    position: Array,
+    rate: Array,
+    residuals: Array,
+    steps: Array,
+    moving: NDArray[np.bool_],
+) -> float:
+    """Rise of the log-likelihood, but for a factor, by waves of this period; 0 for too few rows."""
+    own = moving & (steps * FEWEST_ROWS <= period)
+    left = residuals[own]
+    square = float(left @ left)
+    if float(steps[own].sum()) < FEWEST_PERIODS * period or square == 0.0:
+        return 0.0
+    angle = 2.0 * np.pi * position[own] / period
+    wave = np.column_stack([np.sin(angle), np.cos(angle)])
+    both = np.column_stack([wave, np.sign(rate[own])[:, None] * wave])
+    right = both.T @ left
+    explained = float(right @ np.linalg.lstsq(both.T @ both, right, rcond=None)[0])
+    return -len(left) * float(np.log(max(1.0 - explained / square, 1e-12)))

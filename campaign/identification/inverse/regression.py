@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.identification.gate import MATTERS
 from campaign.identification.intervals import student
 from campaign.identification.inverse.motion import Array
 
@@ -64,6 +65,7 @@ class Regression:
         relative: norm of the residuals over norm of the force.
         condition: condition number of the columns as they are.
         likeness: the same of columns of unit length, which units do not change.
+        matters: size of each coefficient below which its force does not matter, shape (k,).
     """
 
     values: Array
@@ -79,6 +81,7 @@ class Regression:
     relative: float
     condition: float
     likeness: float
+    matters: Array
 
     @property
     def correlation(self) -> Array:
@@ -152,6 +155,7 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
         relative=float(np.linalg.norm(whole) / np.linalg.norm(force)),
         condition=float(np.linalg.cond(design)),
         likeness=float(np.linalg.cond(design / np.linalg.norm(design, axis=0))),
+        matters=MATTERS * float(np.abs(force).max()) / np.abs(design).max(axis=0),
     )
 
 

@@ -12,10 +12,14 @@ from campaign.estimate import Estimate
 from campaign.identification.intervals import LEVEL
 from campaign.identification.inverse.motion import Array
 from campaign.identification.inverse.regression import effective_count
+from campaign.reason import Cause
 
 REPEATS = 2000
 FEWEST_BLOCKS = 8
 """Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
+TOO_FEW_BLOCKS = Cause(
+    "too few independent blocks", "only {blocks} parts of the motion do not know of each other"
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def _by_blocks(name: str, sides: tuple[Prediction, ...], seed: int) -> Estimate:
     blocks = count // length
     method = f"{REPEATS} resamplings of {blocks} blocks of {length} rows"
     if blocks < FEWEST_BLOCKS:
-        reason = f"only {blocks} parts of the motion do not know of each other"
+        reason = TOO_FEW_BLOCKS(blocks=blocks)
         return Estimate.without_interval(name, here, "", reason, method=method)
     random = np.random.Generator(np.random.PCG64(seed))
     starts = random.integers(0, count, (REPEATS, blocks, 1))

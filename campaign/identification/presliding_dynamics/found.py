@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, judged, shifted_by, student, with_error
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import (
+    LEVEL,
+    MODEL_MISFIT,
+    shifted_by,
+    student,
+    with_error,
+)
 from campaign.identification.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.identification.presliding_dynamics.fitted import Fitted
 from campaign.identification.presliding_dynamics.parameters import FARTHEST, LOGARITHMIC
@@ -22,6 +29,7 @@ from campaign.identification.presliding_dynamics.uncertainty import (
     profile_end,
     spread_of,
 )
+from campaign.reason import NONE, Cause, Reason
 
 METHOD = "joint output-error fit below breakaway"
 UNITS = {
@@ -44,6 +52,18 @@ PROFILED = ("bristle_stiffness", "bristle_damping", "damping", "inertia")
 """Whose limits are looked for along the profile where an interval is wide."""
 SLIPPING = 0.95
 """Bristle torque over that at which they slip, as fitted, from which on a load breaks away."""
+NO_MINIMUM = Cause("no minimum", "the search did not end in a minimum")
+BREAKS_AWAY = Cause(
+    "breakaway in a record",
+    "the load breaks away in {records}: leave that out, or ask for less torque",
+)
+SPANS_DECADES = Cause(
+    "interval over decades", "its interval spans more than a factor of a thousand"
+)
+FLAT_PROFILE = Cause(
+    "flat profile", "its profile never rises: the records say nothing of it on one side"
+)
+TOO_LITTLE = Cause("too little of it", "the records have it {where}: they show too little of it")
 
 
 @dataclass(frozen=True)
@@ -55,14 +75,14 @@ class PreslidingDynamics:
             the sum of sigma1 and sigma2 (N m s/rad), `damping_ratio` of that, and
             `natural_frequency` (Hz).
         fit, spread, misfit: what they rest on.
-        reason: why none of them has an interval; empty: it is each one's own.
+        reason: why none of them has an interval; none: it is each one's own.
     """
 
     estimates: dict[str, Estimate]
     fit: Fitted
     spread: Spread
     misfit: Misfit
-    reason: str
+    reason: Reason
 
     @property
     def plant(self) -> Plant:
@@ -94,22 +114,20 @@ def identify_presliding_dynamics(
     return PreslidingDynamics(found, fit, spread, misfit, reason)
 
 
-def _reason(fit: Fitted, misfit: Misfit) -> str:
+def _reason(fit: Fitted, misfit: Misfit) -> Reason:
     if not fit.reached:
-        return "the search did not end in a minimum"
+        return NO_MINIMUM()
     slipping = [
         record.named
         for number, record in enumerate(fit.records)
         if fit.largest_yielding(number) > SLIPPING
     ]
     if slipping:
-        return (
-            f"the load breaks away in {', '.join(slipping)}: leave that out, or ask for less torque"
-        )
-    return f"misfit: {misfit.reason}" if misfit.reason else ""
+        return BREAKS_AWAY(records=", ".join(slipping))
+    return MODEL_MISFIT(why=misfit.reason) if misfit.reason else NONE
 
 
-def _without(fit: Fitted, name: str, reason: str) -> Estimate:
+def _without(fit: Fitted, name: str, reason: Reason) -> Estimate:
     value, _ = fit.parameters.in_units(fit.vector, name)
     return Estimate.without_interval(name, value, UNITS[name], reason, method=METHOD)
 
@@ -120,8 +138,7 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
     value, scale = fit.parameters.in_units(fit.vector, name)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
     if name in LOGARITHMIC and deviation > FARTHEST:
-        reason = "its interval spans more than a factor of a thousand"
-        return replace(_without(fit, name, reason), origin=Origin.NOT_DETERMINED)
+        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
     quantile = student(freedom)
     ends = [float(fit.vector[index]) + way * quantile * deviation for way in (-1.0, 1.0)]
     size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
@@ -129,8 +146,7 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
         try:
             ends = [profile_end(fit, spread, index, quantile, way) for way in (-1.0, 1.0)]
         except ValueError:
-            reason = "its profile never rises: the records say nothing of it on one side"
-            return replace(_without(fit, name, reason), origin=Origin.NOT_DETERMINED)
+            return replace(_without(fit, name, FLAT_PROFILE()), origin=Origin.NOT_DETERMINED)
     low, high = (_in_units(fit, name, end) for end in ends)
     found = Estimate(
         name,
@@ -145,11 +161,11 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
     )
     found = _missed(_shifted(found, float(misfit.shift[index]) * scale), misfit)
     if name in POSITIVE and low <= 0.0:
-        bound = "at or below nothing" if value <= 0.0 else "an interval that holds nothing"
-        reason = f"the records have it {bound}: they show too little of it"
+        where = "at or below nothing" if value <= 0.0 else "an interval that holds nothing"
+        reason = TOO_LITTLE(where=where)
         origin = Origin.AT_BOUND if value <= 0.0 else Origin.NOT_DETERMINED
         return replace(found, origin=origin, reason=reason)
-    return found if name.endswith("delay") or name == "yielding" else judged(found)
+    return found if name.endswith("delay") or name == "yielding" else admitted(found)
 
 
 def _in_units(fit: Fitted, name: str, at: float) -> float:
@@ -201,5 +217,5 @@ def _derived(fit: Fitted, spread: Spread, misfit: Misfit) -> dict[str, Estimate]
         error = float(np.sqrt(of @ spread.covariance @ of))
         freedom = float(np.min(spread.freedom[of != 0.0], initial=np.inf))
         estimate = with_error(name, value, unit, error, freedom, METHOD)
-        found[name] = judged(_missed(_shifted(estimate, float(of @ misfit.shift)), misfit))
+        found[name] = admitted(_missed(_shifted(estimate, float(of @ misfit.shift)), misfit))
     return found

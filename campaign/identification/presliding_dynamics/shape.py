@@ -18,6 +18,7 @@ import numpy as np
 from campaign.identification.presliding_dynamics.fitted import Fitted, products, with_torque
 from campaign.identification.presliding_dynamics.long_run import at_bandwidths
 from campaign.identification.presliding_dynamics.plant import Array, Bristles
+from campaign.reason import NONE, Cause, Reason
 
 BANDS = 10
 """into which the answer is cut, evenly over the logarithm of frequency."""
@@ -45,6 +46,16 @@ SHAPES = (
     "bristles that stiffen",
     "bristles that differ by direction",
     "damping that grows with the rate",
+)
+
+ANSWER_MISSED = Cause(
+    "answer missed",
+    "one inertia on one bristle misses the answer by {share_percent:.2g} %, "
+    "most near {frequency:.3g} Hz",
+)
+SHAPE_MISSED = Cause(
+    "shape missed",
+    "one bristle misses the answer by {share_percent:.2g} %, as would be by {shape}",
 )
 
 
@@ -79,20 +90,14 @@ class Misfit:
     shift: Array
 
     @property
-    def reason(self) -> str:
-        """Why no interval can be built on the fit; empty: it can."""
+    def reason(self) -> Reason:
+        """Why no interval can be built on the fit; none: it can."""
         if self.band_chance < SURELY and self.band_share > LARGE:
             worst = max(self.bands, key=lambda band: abs(band.error))
-            return (
-                f"one inertia on one bristle misses the answer by {100 * self.band_share:.2g} %, "
-                f"most near {worst.frequency:.3g} Hz"
-            )
+            return ANSWER_MISSED(share_percent=100 * self.band_share, frequency=worst.frequency)
         if self.shape_chance < SURELY and self.shape_share > LARGE:
-            return (
-                f"one bristle misses the answer by {100 * self.shape_share:.2g} %, as would be by "
-                f"{self.shape}"
-            )
-        return ""
+            return SHAPE_MISSED(share_percent=100 * self.shape_share, shape=self.shape)
+        return NONE
 
 
 def misfit_of(plain: Fitted, whitened: Fitted) -> Misfit:

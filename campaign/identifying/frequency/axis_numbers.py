@@ -17,8 +17,10 @@ from typing import Any
 from campaign.estimate import Estimate
 from campaign.identification.frequency.distortion import total
 from campaign.identification.frequency.drive import TwoMass
-from campaign.identification.intervals import judged, shifted_by
+from campaign.identification.gate import admitted
+from campaign.identification.intervals import shifted_by
 from campaign.identifying.frequency.sources import Source
+from campaign.reason import Cause
 
 BENT = 0.03
 """Odd distortion over the output from which on one amplitude tells no number of the axis."""
@@ -26,9 +28,10 @@ SLOWEST = 0.5
 """Least power of the rms by which friction's share falls: between that of bristles, which does not
 fall before they slip, and 1, that of Coulomb friction."""
 FRICTION = "friction, at this excitation"
-UNKNOWN = (
+UNKNOWN = Cause(
+    "friction at one amplitude",
     "friction has a part in it, and no second amplitude tells how large: measure at half or twice "
-    "of this one"
+    "of this one",
 )
 BY_RULE = {
     "motor_inertia": 1.0,
@@ -94,13 +97,13 @@ def by_rule(one: Estimate, odd: float) -> Estimate:
     if not odd or not one.has_interval:
         return one
     if odd > BENT or one.name not in BY_RULE:
-        return Estimate.without_interval(one.name, math.nan, one.unit, UNKNOWN)
+        return Estimate.without_interval(one.name, math.nan, one.unit, UNKNOWN())
     return with_part(one, BY_RULE[one.name] * odd * abs(one.value))
 
 
 def with_part(one: Estimate, part: float) -> Estimate:
     """With friction's part (1 sigma)."""
-    return judged(shifted_by(one, FRICTION, part))
+    return admitted(shifted_by(one, FRICTION, part))
 
 
 def _extrapolated(one: Estimate, name: str, weaker: Sequence[Weaker]) -> Iterator[float]:

@@ -10,14 +10,24 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.identification.frequency.best_linear import BestLinear
-from campaign.identification.frequency.distortion import Distortion, Level, Parity, total
+from campaign.identification.frequency.distortion import (
+    WITHIN_NOISE,
+    Distortion,
+    Level,
+    Parity,
+    total,
+)
 from campaign.identification.frequency_response import Array
 from campaign.identification.intervals import LEVEL
 from campaign.identifying.frequency.found import Found
 from campaign.identifying.frequency.tables import NAME, SENSOR
+from campaign.reason import Cause
 from campaign.result import Column, Table
 
 EXCITATION = Column("excitation", "Excitation", exact=True)
+LEVEL_ONLY = Cause("level", "a level, not a number of the rig")
+NOT_FROM_ZERO = Cause("not told from zero", "not told from zero")
+ONE_REALISATION = Cause("distortion not shown", "a single realisation does not show it")
 
 
 def distortion_tables(found: Sequence[Found]) -> Iterator[Table]:
@@ -60,10 +70,10 @@ def distortion_tables(found: Sequence[Found]) -> Iterator[Table]:
             SENSOR,
             Column("line", "Line", exact=True),
             Column("frequency", "Frequency", "Hz", "Hz", exact=True),
-            Column("output", "Output, dB of its unit", reason="a level, not a number of the rig"),
+            Column("output", "Output, dB of its unit", reason=LEVEL_ONLY()),
             Column("level", "Distortion over output", "dB", "dB"),
-            Column("noise", "Noise over output, dB", reason="a level, not a number of the rig"),
-            Column("recorded", "As recorded, dB", reason="a level, not a number of the rig"),
+            Column("noise", "Noise over output, dB", reason=LEVEL_ONLY()),
+            Column("recorded", "As recorded, dB", reason=LEVEL_ONLY()),
         ),
         tuple(lines),
         note="Over the linear output, that is the best linear approximation times the excitation, "
@@ -87,7 +97,7 @@ def _decibels(share: Estimate) -> Estimate:
         return Estimate(name, value, "dB", method=share.method, kind="at most", reason=share.reason)
     if share.low is None or share.high is None or not share.low > 0:
         return Estimate.without_interval(
-            name, value, "dB", share.reason or "not told from zero", method=share.method
+            name, value, "dB", share.reason or NOT_FROM_ZERO(), method=share.method
         )
     return Estimate(
         name, value, "dB", _db(share.low), _db(share.high), LEVEL, share.method,
@@ -127,8 +137,9 @@ def _level(level: Level, low: Array, high: Array, beside: Array, k: int) -> Esti
     # The noise that is taken off is an estimate itself: nothing is bounded below its level.
     most = _db(max(float(high[k]), math.sqrt(float(level.noise[k]))) / float(beside[k]))
     if not level.significant[k] or not level.rms[k] > 0:
-        reason = "not more than the noise shows; a bound"
-        return Estimate("distortion", most, "dB", method=method, kind="at most", reason=reason)
+        return Estimate(
+            "distortion", most, "dB", method=method, kind="at most", reason=WITHIN_NOISE()
+        )
     value = _db(float(level.rms[k] / beside[k]))
     least = _db(float(low[k] / beside[k])) if low[k] > 0 else None
     return Estimate("distortion", value, "dB", least, max(most, value), LEVEL, method)
@@ -145,9 +156,7 @@ def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
         whole = math.sqrt(count * float(best.response.variance[k])) / float(size[k])
         method = "scatter over realisations less noise"
         if count < 2:
-            level = Estimate.without_interval(
-                "distortion", math.nan, "dB", "a single realisation does not show it"
-            )
+            level = Estimate.without_interval("distortion", math.nan, "dB", ONE_REALISATION())
         else:
             ends = [
                 max(whole**2 * freedom / chi2.ppf(share, freedom) - noise**2, 0.0)
@@ -163,7 +172,7 @@ def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
                 level = Estimate(
                     "distortion", _db(max(math.sqrt(ends[1]), noise)), "dB", method=method,
                     kind="at most",
-                    reason="not more than the noise shows; a bound",
+                    reason=WITHIN_NOISE(),
                 )  # fmt: skip
         yield {
             "line": "excited",

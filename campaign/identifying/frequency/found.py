@@ -263,7 +263,7 @@ def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Ban
             tried.append(Weaker(_weaker_drive(told, each, band), source.rms / each.rms))
     axis = of_axis(told.drive, odd, tried)
     bent = ""
-    if UNKNOWN in (axis.total_inertia.reason, axis.resonance.reason):
+    if axis.total_inertia.reason in UNKNOWN or axis.resonance.reason in UNKNOWN:
         bent = (
             f"Odd distortion is {100 * odd:.0f} % of the output: friction bends the response, by "
             "how much one amplitude does not tell. Repeat it at half the amplitude or at twice of "

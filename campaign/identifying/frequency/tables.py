@@ -64,7 +64,7 @@ def fits_table(found: Sequence[Found], masses: Masses) -> Table:
                     "excess": chosen.fit.excess,
                     "delay": late,
                     "condition": chosen.fit.condition,
-                    "says": chosen.fit.misfit or "fits",
+                    "says": str(chosen.fit.misfit) or "fits",
                 }
             )
         drive = masses.drive
@@ -77,7 +77,7 @@ def fits_table(found: Sequence[Found], masses: Masses) -> Table:
                     "order": drive_name(drive),
                     "excess": drive.excess,
                     "condition": drive.condition,
-                    "says": drive.misfit or "fits",
+                    "says": str(drive.misfit) or "fits",
                 }
             )
     return Table(

@@ -24,6 +24,7 @@ from campaign.identifying.frequency.signals import Signals, signals, whole_stret
 from campaign.identifying.frequency.sources import Reading, Source, fitted_part, sources
 from campaign.identifying.frequency.tables import drive_name
 from campaign.physics.bench import Bench
+from campaign.reason import Reason
 from campaign.signals import MultiSine
 
 FUNCTION = "rational function"
@@ -42,7 +43,7 @@ class Model:
         value, jacobian: response (n,), and its derivative by the parameters (n, p), by Hz.
         covariance: of the parameters, shape (p, p).
         poles: (rad/s).
-        misfit: why it is no model of what it was fitted to; "" where it may be one.
+        misfit: why it is no model of what it was fitted to; none where it may be one.
     """
 
     name: str
@@ -54,7 +55,7 @@ class Model:
     jacobian: Callable[[Array], ComplexArray]
     covariance: Array
     poles: ComplexArray
-    misfit: str
+    misfit: Reason
 
 
 @dataclass(frozen=True)

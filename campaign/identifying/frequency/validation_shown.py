@@ -13,6 +13,7 @@ from campaign.identifying.frequency.figures import FREQUENCY, TORQUE, decibel, p
 from campaign.identifying.frequency.found import Found
 from campaign.identifying.frequency.tables import NAME, SENSOR
 from campaign.identifying.frequency.validation import Model, Prediction, Validation, apart
+from campaign.reason import Cause
 from campaign.result import Amount, Axis, Column, Conclusion, Curve, Figure, Mark, Panel, Table
 
 FINE = 800
@@ -21,7 +22,10 @@ SELDOM = math.sqrt(-math.log(0.05))
 """Size of a complex error over its root of the mean square that chance passes once in twenty."""
 LAGS = 30
 MODEL = Column("model", "Model", exact=True)
-OF_LINES = "over these lines: what it would be of others, their deviations say"
+OF_LINES = Cause(
+    "over these lines", "over these lines: what it would be of others, their deviations say"
+)
+IN_LAST_COLUMN = Cause("deviation in a column", "how sure it is, the last column says")
 
 
 def validation_tables(validation: Validation) -> Iterator[Table]:
@@ -58,7 +62,7 @@ def _together(predictions: Sequence[Prediction]) -> Table:
             MODEL,
             Column("fitted", "Fitted to", exact=True),
             Column("lines", "Frequencies", exact=True),
-            Column("difference", "Difference, rms", "", "percent", reason=OF_LINES),
+            Column("difference", "Difference, rms", "", "percent", reason=OF_LINES()),
             Column("square", "Square over expected", exact=True),
             Column("verdict", "Verdict", exact=True),
         ),
@@ -88,7 +92,7 @@ def _lines(predictions: Sequence[Prediction]) -> Table:
                     "deviations": float(size) if math.isfinite(size) else None,
                 }
             )
-    reason = "how sure it is, the last column says"
+    reason = IN_LAST_COLUMN()
     return Table(
         "validation-lines",
         "Unseen responses, line by line",

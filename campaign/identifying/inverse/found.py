@@ -33,10 +33,15 @@ from campaign.identifying.inverse.instrumented import (
     told_delay,
 )
 from campaign.identifying.inverse.motions import Moved, never_moved
+from campaign.reason import Cause
 
 ROUNDS = 4
 """Most times that terms are chosen at a delay, and the delay is found anew with them."""
-BENDS = "friction bends over these rates: it is one share of a sum, and nothing by itself"
+BENDS = Cause(
+    "friction bends",
+    "friction bends over these rates: it is one share of a sum, and nothing by itself",
+)
+STATED = Cause("stated", "stated")
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,11 @@ class InverseDynamics:
         """Of the chosen structure."""
         return self.best.structure.fit
 
+    @property
+    def matters(self) -> dict[str, float]:
+        """Size of each coefficient, by name, below which its force does not matter here."""
+        return dict(zip(self.best.structure.names, map(float, self.fit.matters), strict=True))
+
 
 def find(
     pieces: Sequence[Moved],
@@ -137,7 +147,7 @@ def find(
             shift = before
             # Beside gravity no ripple shows: it is looked for again in what the new terms leave.
             again = _period(motions, more[picked].terms, filtering, shift)
-            if again == period or _repeats(more[picked]):
+            if again == period or repeats(more[picked]):
                 break
     else:
         more = [structure(motions, each.terms, filtering, shift) for each in more]
@@ -192,7 +202,7 @@ def _delay(
     motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering, stated: float | None
 ) -> Estimate:
     if stated is not None:
-        return Estimate.without_interval("delay", stated, "s", "stated", origin=Origin.GIVEN)
+        return Estimate.without_interval("delay", stated, "s", STATED(), origin=Origin.GIVEN)
     return find_delay(motions, terms, filtering)
 
 
@@ -232,7 +242,7 @@ def _period(
     return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals))
 
 
-def _repeats(which: Structure) -> bool:
+def repeats(which: Structure) -> bool:
     """Whether something that repeats over position is in it."""
     return any(name.startswith(("cogging", "ripple")) for name in which.names)
 
@@ -313,7 +323,7 @@ def _without_shares(
     shares = {term.name for term in terms if term.family == "bend"}
     return {
         name: Estimate.without_interval(
-            name, one.value, one.unit, BENDS, method=one.method, origin=Origin.NOT_DETERMINED
+            name, one.value, one.unit, BENDS(), method=one.method, origin=Origin.NOT_DETERMINED
         )
         if name in shares or name.startswith(("coulomb", "viscous"))
         else one

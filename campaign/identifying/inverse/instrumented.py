@@ -17,6 +17,7 @@ import numpy as np
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.intervals import LEVEL, shifted_by
+from campaign.identification.inverse.coefficients import TOO_FEW_ROWS
 from campaign.identification.inverse.delay import LONGEST
 from campaign.identification.inverse.instruments import WEAK, Instrumented, by_instruments
 from campaign.identification.inverse.motion import Array, Filtering, Motion
@@ -287,8 +288,7 @@ def _estimate(
     error = float(fit.robust[index])
     half = fit.quantile * error
     if fit.freedom < 1.0 or not math.isfinite(half):
-        reason = "what is left over is worth too few independent rows"
-        return Estimate.without_interval(name, value, unit, reason)
+        return Estimate.without_interval(name, value, unit, TOO_FEW_ROWS())
     one = Estimate(
         name, value, unit, value - half, value + half, LEVEL,
         f"instruments {along}", standard_error=error, freedom=fit.freedom,

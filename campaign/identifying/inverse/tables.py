@@ -10,11 +10,15 @@ from campaign.identification.inverse.regression import Regression
 from campaign.identification.inverse.terms import Term
 from campaign.identifying.inverse.found import InverseDynamics, Tried
 from campaign.identifying.inverse.instrumented import Instruments, differs
+from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 
 STRONG = 0.9
 """Correlation from which on two coefficients are told to go together."""
-AS_THEY_ARE = "a sum over all rows: what it would be of other rows, blocks say"
+AS_THEY_ARE = Cause(
+    "sum over rows", "a sum over all rows: what it would be of other rows, blocks say"
+)
+DEVIATION = Cause("deviation", "a deviation, not a quantity of the rig")
 
 
 def structures_table(found: InverseDynamics) -> Table:
@@ -22,10 +26,10 @@ def structures_table(found: InverseDynamics) -> Table:
     columns = [
         Column("terms", "Terms"),
         Column("delay", "Delay", "s", "ms", exact=True),
-        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE),
-        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE),
+        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
+        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
         Column("criterion", "BIC", exact=True),
-        Column("simulated", "Rate after 1 s", "", "percent", reason=AS_THEY_ARE),
+        Column("simulated", "Rate after 1 s", "", "percent", reason=AS_THEY_ARE()),
     ]
     validated = found.tried[0].validation is not None
     if validated:
@@ -71,7 +75,7 @@ def deviations_table(key: str, title: str, tried: Tried) -> Table:
     """Coefficients of one structure with ordinary deviations and those with autocorrelation."""
     fit = tried.structure.fit
     half, rule, twice = fit.by_bandwidth
-    reason = "a deviation, not a quantity of the rig"
+    reason = DEVIATION()
     columns = (
         Column("term", "Coefficient"),
         Column("unit", "Unit"),

@@ -19,6 +19,7 @@ from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.one_inertia import RIGID
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
+from campaign.identification.intervals import MODEL_MISFIT
 from campaign.identifying.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identifying.frequency.distortion_tables import distortion_tables
 from campaign.identifying.frequency.figures import figures
@@ -183,7 +184,7 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
         return
     hangs_on_load = dict(told.places) == {"load": "motor"}
     if told.drive.misfit:
-        reason = f"misfit: {told.drive.misfit}"
+        reason = MODEL_MISFIT(why=told.drive.misfit)
         local = _local_of_axis(told, best)
         for name, meaning, unit, advice in MEANINGS:
             nothing = Estimate.without_interval(name, math.nan, unit, reason)
@@ -254,7 +255,7 @@ def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iter
             "what the drive answers is not theirs alone, as friction makes it."
         )
     if told.drive is not None and told.drive.rigid:
-        yield f"Two inertias are not told: {RIGID}."
+        yield f"Two inertias are not told: {RIGID()}."
     if told.how:
         place = "at the driven inertia" if "motor" in told.places.values() else "behind the spring"
         yield f"The load's sensor is taken to be {place}: {told.how}."

@@ -19,10 +19,12 @@ from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.gate import MATTERS, admitted_together
 from campaign.identification.over_a_turn import OverATurn
 from campaign.identification.steady_stretches import SHORTEST_TIME
 from campaign.identification.stribeck import stribeck
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.directions import with_offset
+from campaign.identifying.method import Identified, Material, Method, Parameter, is_value
 from campaign.identifying.sliding import (
     DIRECTIONS,
     Point,
@@ -117,7 +119,7 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
             "or that of the motion, has the other sign, as of a sensor on the part that rests. "
             "In the mapping `sign = -1` turns it round."
         )
-    parameters = tuple(each for one in maps for each in _parameters(one, maps[0], material))
+    parameters = tuple(each for one in maps for each in _parameters(one, maps[0], points, material))
     return Identified(
         parameters,
         Result(
@@ -127,7 +129,7 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
             notes=tuple(dict.fromkeys(notes)),
             conclusions=tuple(_conclusions(parameters)),
         ),
-        settings=_settings(maps[0].found) if maps[0].quantity is FRICTION else {},
+        settings=_settings(maps[0].found, parameters) if maps[0].quantity is FRICTION else {},
     )
 
 
@@ -144,29 +146,38 @@ def _over_a_turn(held: OverATurn) -> str:
     )
 
 
-def _parameters(mapped: Mapped, first: Mapped, material: Material) -> Iterator[Parameter]:
+def _parameters(
+    mapped: Mapped, first: Mapped, points: Sequence[Point], material: Material
+) -> Iterator[Parameter]:
     quantity = mapped.quantity
+    names = {}
+    found = {}
     for direction, estimates in mapped.found.items():
         for name, estimate in estimates.items():
             if mapped is not first and name.startswith("stribeck"):
                 continue  # the same rate, from the same stretches
-            unit, meaning = quantity.meanings[name]
             named = f"{quantity.called(name)}_{direction}"
-            if name == "friction":
-                named = f"friction_{direction}"
-                if quantity is COEFFICIENT:
-                    named = f"friction_coefficient_{direction}"
-            one = _scaled(replace(estimate, name=named, unit=unit), quantity, material)
-            prefix = "negative." if direction == "negative" else ""
-            goes = quantity is FRICTION and name in KEYS and _goes(estimate, mapped.found)
-            key = f"friction.load.{prefix}{KEYS[name]}" if goes else ""
-            yield Parameter(one, f"{meaning}, {direction} direction.", "", key, ADVICE[name])
-
-
-def _goes(estimate: Estimate, found: dict[str, dict[str, Estimate]]) -> bool:
-    """A bench's curve needs both directions, and no negative friction."""
-    both = all("coulomb_torque" in found.get(name, {}) for name in DIRECTIONS)
-    return both and estimate.origin is Origin.MEASURED and estimate.value > 0.0
+            if name == "friction" and quantity is COEFFICIENT:
+                named = f"friction_coefficient_{direction}"
+            names[named] = name, direction
+            one = replace(estimate, name=named, unit=quantity.meanings[name][0])
+            found[named] = _scaled(one, quantity, material)
+    largest = max(abs(quantity.read(point).value) for point in points)
+    fastest = max(point.speed for point in points)
+    matters = {
+        named: MATTERS * largest / (fastest if name == "viscous_friction" else 1.0)
+        for named, (name, _) in names.items()
+        if not name.startswith("stribeck")
+    }
+    told = with_offset(admitted_together(found, matters), quantity.called("coulomb_torque"))
+    dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
+    both = all(one is not None and is_value(one) for one in dry)
+    for named, (name, direction) in names.items():
+        prefix = "negative." if direction == "negative" else ""
+        goes = quantity is FRICTION and name in KEYS and both
+        key = f"friction.load.{prefix}{KEYS[name]}" if goes else ""
+        meaning = f"{quantity.meanings[name][1]}, {direction} direction."
+        yield Parameter(told[named], meaning, "", key, ADVICE[name])
 
 
 def _scaled(one: Estimate, quantity: Quantity, material: Material) -> Estimate:
@@ -179,22 +190,26 @@ def _scaled(one: Estimate, quantity: Quantity, material: Material) -> Estimate:
     return with_scale(one, data, NORMAL_LOAD) if quantity is COEFFICIENT else one
 
 
-def _settings(found: dict[str, dict[str, Estimate]]) -> dict[str, tuple[object, str, str]]:
-    """All that a curve needs; of a straight line static friction is Coulomb's."""
-    if not all("coulomb_torque" in found.get(name, {}) for name in DIRECTIONS):
+def _settings(
+    found: dict[str, dict[str, Estimate]], parameters: Sequence[Parameter]
+) -> dict[str, tuple[object, str, str]]:
+    """All that a curve needs besides: what is not measured is that of the fitted curve.
+
+    So that nothing stands beside a measured number that the data contradict.
+    """
+    keys = {each.bench for each in parameters if each.bench}
+    if not keys:
         return {}
     told: dict[str, tuple[object, str, str]] = {
         "friction.load.model": ("stribeck", "", "friction of steady sliding")
     }
     for direction, estimates in found.items():
         prefix = "friction.load." + ("negative." if direction == "negative" else "")
-        coulomb = estimates["coulomb_torque"].value
-        for name in ("static_torque", "stribeck_velocity", "viscous_friction"):
-            one = estimates.get(name)
-            if one is not None and one.origin is Origin.MEASURED and one.value > 0.0:
-                continue
-            value = {"static_torque": coulomb, "stribeck_velocity": 1e-3}.get(name, 0.0)
-            told[prefix + name] = (value, MEANINGS[name][0], "these points leave it open")
+        line = {"static_torque": estimates["coulomb_torque"].value, "stribeck_velocity": 1e-3}
+        fitted = {name: one.value for name, one in estimates.items() if one.kind == "number"}
+        for name, value in ({"viscous_friction": 0.0} | line | fitted).items():
+            if name in KEYS and prefix + name not in keys:
+                told[prefix + name] = (max(value, 0.0), MEANINGS[name][0], "of the fitted curve")
     return told
 
 

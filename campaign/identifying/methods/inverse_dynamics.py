@@ -8,7 +8,7 @@ against instruments from a simulated motion. Delay first, then structure.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from pydantic import Field
 
@@ -16,10 +16,12 @@ from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.gate import admitted_together
 from campaign.identification.inverse.motion import Filtering
 from campaign.identification.inverse.terms import TERMS
+from campaign.identifying.directions import with_offset
 from campaign.identifying.inverse.figures import figures
-from campaign.identifying.inverse.found import BENDS, InverseDynamics, find
+from campaign.identifying.inverse.found import BENDS, InverseDynamics, find, repeats
 from campaign.identifying.inverse.motions import Moved, force_of, moved, usable, with_slowest
 from campaign.identifying.inverse.tables import (
     correlated,
@@ -28,9 +30,10 @@ from campaign.identifying.inverse.tables import (
     instruments_table,
     structures_table,
 )
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.method import Identified, Material, Method, Parameter, is_value
 from campaign.identifying.tables import words
 from campaign.options import Options
+from campaign.reason import Cause
 from campaign.result import Amount, Conclusion, Finding, Result, Table
 from campaign.units import AngularRate, Frequency, Time
 
@@ -46,6 +49,9 @@ BENCH = {
 }
 """Where coefficients go that a bench has a place for: a plain friction model of steady sliding."""
 PLAIN = frozenset(BENCH) | {"offset"}
+SEARCHED = Cause(
+    "searched", "it is the best of a search, an eighth of a period apart over the travel"
+)
 ADVICE = {
     "inertia": "move with more acceleration at the same speeds: a multisine, or shorter ramps",
     "viscous": "move at more, and further apart, steady speeds",
@@ -117,7 +123,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
             conclusions=tuple(_conclusions(found, parameters)),
         ),
         correlations=_correlations(found),
-        settings=_settings(found, material),
+        settings=_settings(parameters, material),
         again={"terms": found.best.structure.names},
     )
 
@@ -129,10 +135,13 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
         for one, two, share in correlated(fit, found.best.structure.terms)
         for name, other in ((one, two), (two, one))
     }
-    plain, dissipates = _is_plain(found), not _impossible(found, "coulomb")
+    scaled = {name: _scaled(one, material) for name, one in found.estimates.items()}
+    told = with_offset(admitted_together(scaled, found.matters), "coulomb")
+    dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
+    slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
     for term in found.best.structure.terms:
-        one = _scaled(found.estimates[term.name], material)
-        bench = BENCH.get(term.name, "") if plain or term.name == "inertia" else ""
+        one = told[term.name]
+        bench = BENCH.get(term.name, "") if slides or term.name == "inertia" else ""
         advice = next((text for key, text in ADVICE.items() if term.name.startswith(key)), "")
         if term.name in together:
             other, share = together[term.name]
@@ -141,11 +150,10 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
                 if advice
                 else f"move so that it differs from {other} (correlation {share:.2f})"
             )
-        if bench and not _possible(term.name, one):
-            bench = ""
-        if bench.startswith(FRICTION) and (not dissipates or one_way(found)):
-            bench = ""
         yield Parameter(one, term.meaning, bench=bench, advice=advice)
+    if found.period is not None and repeats(found.best.structure):
+        period = Estimate.without_interval("position_period", found.period, "rad", SEARCHED())
+        yield Parameter(period, "Distance over which force or friction repeats.", "deg")
     late = found.delay
     if late.origin is not Origin.GIVEN:
         yield Parameter(
@@ -154,25 +162,6 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
             display="ms",
             advice="record faster, or with sharper reversals",
         )
-
-
-def _possible(name: str, one: Estimate) -> bool:
-    """A bench has no negative friction; a number that is none goes to no bench."""
-    if math.isnan(one.value):
-        return False
-    if name.startswith("viscous"):
-        return one.value >= 0
-    low = one.combined[0]
-    return one.value > 0 and (low is None or low > 0)
-
-
-def _impossible(found: InverseDynamics, begin: str) -> list[str]:
-    """Names of estimates that are, or may be, negative, and cannot be."""
-    return [
-        name
-        for name, one in found.estimates.items()
-        if name in BENCH and name.startswith(begin) and not _possible(name, one)
-    ]
 
 
 def one_way(found: InverseDynamics) -> str:
@@ -231,7 +220,7 @@ def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
         yield f"No instruments along the wanted motion: {found.no_instruments}."
     if found.biased:
         yield instruments_note(found)
-    if BENDS in {each.reason for each in found.estimates.values()}:
+    if any(each.reason in BENDS for each in found.estimates.values()):
         yield (
             "A term that bends over the rate was added because it predicts better. It stands in "
             "for whatever bends friction, most often a Stribeck curve, which `--model whole_model` "
@@ -255,14 +244,6 @@ def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
         yield (
             f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
             "the motion hardly tells them apart, and only their sum is known well."
-        )
-    doubtful = _impossible(found, "inertia") + _impossible(found, "coulomb")
-    if doubtful:
-        yield (
-            f"{' and '.join(map(words, doubtful))}: negative, or not told from zero, "
-            "which no rig has. Either force and motion do not belong together (sign or unit of a "
-            "column, a constant load), "
-            "or the motion does not show it; it goes to no bench file."
         )
     if not _is_plain(found):
         yield (
@@ -305,17 +286,25 @@ def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
     }
 
 
-def _settings(found: InverseDynamics, material: Material) -> dict[str, tuple[object, str, str]]:
+def _settings(
+    parameters: Sequence[Parameter], material: Material
+) -> dict[str, tuple[object, str, str]]:
     """What a friction model needs besides: no Stribeck part was looked for, so it has none."""
-    if not _is_plain(found) or one_way(found) or "load" in material.bench.friction:
+    if "load" in material.bench.friction:
         return {}
-    coulomb = found.estimates.get("coulomb", found.estimates.get("coulomb_positive"))
-    if coulomb is None or not coulomb.value > 0:
+    by_name = {each.estimate.name: each for each in parameters}
+    coulomb = by_name.get("coulomb", by_name.get("coulomb_positive"))
+    if coulomb is None or not coulomb.bench:
         return {}
+    dry = coulomb.estimate.value
     return {
         f"{FRICTION}.model": ("stribeck", "", "the plain friction of steady sliding"),
-        f"{FRICTION}.static_torque": (coulomb.value, "N m", "no static friction was looked for"),
+        f"{FRICTION}.static_torque": (dry, "N m", "no static friction was looked for"),
         f"{FRICTION}.stribeck_velocity": (1e-3, "rad/s", "without static friction it is nothing"),
+    } | {
+        BENCH[name]: (0.0, "N m s/rad", "too small to be told")
+        for name, each in by_name.items()
+        if name.startswith("viscous") and not is_value(each.estimate)
     }
 
 

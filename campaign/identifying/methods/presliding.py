@@ -45,9 +45,11 @@ from campaign.identifying.presliding.small_motions import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import Cause
 from campaign.result import Amount, Column, Conclusion, Finding, Result, Table
 from campaign.units import RotationalDamping
 
+WITH_NOISE = Cause("noise of the sensor", "noise of the sensor is in it")
 MEANINGS = {
     "stiffness_at_rest": "Slope of friction over angle before any interface slips, of all of them.",
     "damping_at_rest": "Damping of small motions, bristles' and viscous friction's together.",
@@ -210,7 +212,7 @@ def _tables(
             Column("trial", "Trial"),
             Column("use", "Use"),
             Column("amplitude", "Largest torque", "N m", "N m", exact=True),
-            Column("missed", "Missed", "", "percent", reason="noise of the sensor is in it"),
+            Column("missed", "Missed", "", "percent", reason=WITH_NOISE()),
         ),
         tuple(
             {

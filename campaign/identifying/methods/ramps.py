@@ -22,11 +22,13 @@ from campaign.identification.intervals import of_repeats
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.options import Options
 from campaign.physics.complete import IncompleteBenchError
+from campaign.reason import Cause
 from campaign.result import Amount, Cell, Column, Conclusion, Finding, Result, Table
 
 BREAKAWAY = "breakaway_torque"
 STRONGEST = "strongest_stiffness"
 WEAKER = "weaker_share"
+OF_ONE_RAMP = Cause("scatter of ramps", "its ramps scatter")
 OF_A_RAMP = {BREAKAWAY: BREAKAWAY, STRONGEST: "bristle_stiffness"}
 """Numbers of the rig by what an analysis of one ramp calls them."""
 MEANINGS = {
@@ -118,7 +120,7 @@ def _table(rows: Sequence[dict[str, Cell]]) -> Table:
             Column("trial", "Trial", exact=True),
             Column(BREAKAWAY, "Breakaway torque", "N m", "N m"),
             Column(STRONGEST, "Stiffness of the strongest interface", "N m/rad", "N m/rad"),
-            Column(WEAKER, "Share of weaker ones", "", "percent", reason="its ramps scatter"),
+            Column(WEAKER, "Share of weaker ones", "", "percent", reason=OF_ONE_RAMP()),
         ),
         tuple(rows),
         note="Of a ramp that shows one interface alone the share of weaker ones is 0.",

@@ -193,7 +193,7 @@ def _settings(best: Fit) -> dict[str, tuple[object, str, str]]:
     for name, estimate in best.fit.estimates.items():
         if name in flat and estimate.origin is not Origin.MEASURED:
             each = flat[name]
-            told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, estimate.reason)
+            told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, str(estimate.reason))
     for each in best.model.numbers:
         if each.over and best.fit.estimates[each.unknown.name].origin is not Origin.MEASURED:
             base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)

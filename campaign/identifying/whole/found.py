@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, USELESS, shifted_by
+from campaign.identification.gate import USELESS
+from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.identification.inverse.choosing import criterion, structure
 from campaign.identification.inverse.motion import (
     Array,
@@ -38,6 +39,7 @@ from campaign.identifying.inverse.found import together
 from campaign.identifying.inverse.motions import Moved, never_moved
 from campaign.identifying.whole.along import Along
 from campaign.identifying.whole.models import Model, Sizes, models
+from campaign.reason import Cause, Reason
 
 DELAYS = 5.0
 """Samples to either side between which the force's delay is looked for."""
@@ -48,6 +50,15 @@ BAND = 0.4
 RESOLVED = 3.0
 """Time constants of the low-pass that something must take to be seen as more than a jump."""
 NORMAL_95 = 1.96
+DELAY_UNKNOWN = Cause("delay unknown", "a delay of {shown} more or less leaves it open")
+HALF_BAND = Cause("half band differs", "half the band finds {shown}")
+LOOP_IN_DELAY = Cause("loop in the delay", "it takes what a loop makes of noise as well")
+COULOMB_AT_BOUND = Cause(
+    "Coulomb friction at bound", "it says how a Coulomb friction changes that went to its bound"
+)
+NO_STIFFNESS = Cause("no stiffness", "without a stiffness it means nothing")
+UNRESOLVED = Cause("faster than rows", "{what} takes {shown}, and rows show {least_shown}")
+FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
 WIDE = 5.0
 """How many times more or less than plain inverse dynamics the inertia may be."""
 
@@ -207,7 +218,7 @@ def _with_delay(fit: ModelFit, doubt: float) -> ModelFit:
             continue
         found[name] = shifted_by(one, "delay", abs(moved[name]))
         if found[name].half_width > USELESS * abs(one.value):
-            reason = f"a delay of {1e3 * doubt:.2g} ms more or less leaves it open"
+            reason = DELAY_UNKNOWN(shown=f"{1e3 * doubt:.2g} ms", delay=doubt)
             found[name] = _open(one, reason)
     return replace(fit, estimates=found)
 
@@ -228,7 +239,7 @@ def _doubt(delay: Estimate, again: float, sample: float, known: Estimate | None)
     return min(doubt, told)
 
 
-def _open(one: Estimate, reason: str) -> Estimate:
+def _open(one: Estimate, reason: Reason) -> Estimate:
     return Estimate.without_interval(
         one.name, one.value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
     )
@@ -240,25 +251,23 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     for name, one in fit.estimates.items():
         told = shifted_by(one, "band", abs(other[name] - one.value)) if one.has_interval else one
         if told.half_width > USELESS * abs(told.value):
-            reason = f"half the band finds {other[name]:.3g} {one.unit}".rstrip()
+            shown = f"{other[name]:.3g} {one.unit}".rstrip()
+            reason = HALF_BAND(shown=shown, value=other[name])
             told = _open(one, reason)
         found[name] = told
     delay = found["delay"]
     found["delay"] = Estimate.without_interval(
-        "delay", delay.value, "s", "it takes what a loop makes of noise as well", method=METHOD
+        "delay", delay.value, "s", LOOP_IN_DELAY(), method=METHOD
     )
     dry = [name for name in found if name.startswith("coulomb")]
     lost = [name for name in dry if found[name].origin is Origin.AT_BOUND]
     of_it = [name.replace("coulomb", "static_over_coulomb") for name in lost]
     for name in (*of_it, *(["stribeck_velocity"] if lost == dry else [])):
         if name in found:
-            why = "it says how a Coulomb friction changes that went to its bound"
-            found[name] = _open(found[name], why)
+            found[name] = _open(found[name], COULOMB_AT_BOUND())
     stiffness = found.get("bristle_stiffness")
     if stiffness is not None and stiffness.origin is not Origin.MEASURED:
-        found["bristle_damping"] = _open(
-            found["bristle_damping"], "without a stiffness it means nothing"
-        )
+        found["bristle_damping"] = _open(found["bristle_damping"], NO_STIFFNESS())
     return replace(fit, estimates=found)
 
 
@@ -279,7 +288,13 @@ def resolved(
     def refuse(names: Sequence[str], takes: float, what: str) -> None:
         if takes >= shortest:
             return
-        reason = f"{what} takes {takes * 1e3:.2g} ms, and rows show {shortest * 1e3:.2g} ms"
+        reason = UNRESOLVED(
+            what=what,
+            shown=f"{takes * 1e3:.2g} ms",
+            least_shown=f"{shortest * 1e3:.2g} ms",
+            duration=takes,
+            least=shortest,
+        )
         for name in names:
             if name in found:
                 found[name] = _open(found[name], reason)
@@ -362,7 +377,7 @@ def product(name: str, ratio: Estimate, base: Estimate, correlation: float) -> E
     value = ratio.value * base.value
     if ratio.origin is not Origin.MEASURED or base.origin is not Origin.MEASURED:
         which = ratio if ratio.origin is not Origin.MEASURED else base
-        reason = f"{which.name.replace('_', ' ')}: {which.reason}"
+        reason = FACTOR_UNKNOWN(factor=which.name.replace("_", " "), reason=which.reason)
         return Estimate.without_interval(
             name, value, base.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
         )

@@ -14,13 +14,13 @@ from campaign.identification.inverse.validation import Prediction
 from campaign.identifying.inverse.figures import FORCE, LEFT, PLACE, RATE, TIME, apart
 from campaign.identifying.inverse.found import InverseDynamics, Tried, together
 from campaign.identifying.inverse.motions import Moved
+from campaign.identifying.inverse.tables import AS_THEY_ARE
 from campaign.identifying.whole.found import Fit, Whole
 from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
 
 FINE = 200
 PLAIN = "plain regression"
-OVER_ALL = "a sum over all rows: what it would be of other rows, blocks say"
 
 
 def models_table(found: Whole) -> Table:
@@ -28,8 +28,8 @@ def models_table(found: Whole) -> Table:
     columns = [
         Column("model", "Friction model"),
         Column("numbers", "Numbers", exact=True),
-        Column("residual", "Residual", "", "percent", reason=OVER_ALL),
-        Column("held_out", "Blocks left out", "", "percent", reason=OVER_ALL),
+        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
+        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
         Column("criterion", "BIC", exact=True),
         Column("agreeing", "Starts that agree"),
     ]

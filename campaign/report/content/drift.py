@@ -19,11 +19,15 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.errors import ArchiveError
+from campaign.reason import Cause
 from campaign.recording import Outcome, Recording
 from campaign.result import Array, Axis, Column, Curve, Figure, Mark, Panel, Table, Value
 from campaign.trial import Role, Task
 
-ONE_EACH = "one recording each: how they scatter from one to the next is what this table shows"
+ONE_EACH = Cause(
+    "one recording each",
+    "one recording each: how they scatter from one to the next is what this table shows",
+)
 
 
 @dataclass(frozen=True)
@@ -113,9 +117,9 @@ def drift_table(drift: Drift) -> Table:
         Column("role", "Role"),
         Column("started", "Started"),
         Column(
-            "rms", f"RMS of the {_lower(drift.label)}", drift.unit, drift.display, reason=ONE_EACH
+            "rms", f"RMS of the {_lower(drift.label)}", drift.unit, drift.display, reason=ONE_EACH()
         ),
-        Column("change", "Change from the first", "", "percent", reason=ONE_EACH),
+        Column("change", "Change from the first", "", "percent", reason=ONE_EACH()),
     )
     title = f"The same trial of {drift.test} again and again"
     return Table(f"drift-{drift.test}", title, columns, tuple(rows))

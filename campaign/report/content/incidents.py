@@ -14,11 +14,12 @@ from campaign.archive import RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
 from campaign.archive.layout.story import Lines
 from campaign.archive.reading.damage import Damage
+from campaign.reason import Cause
 from campaign.report.content.drift import drift_figure, drift_table, drifts_of
 from campaign.report.content.low_margins import low_margin_table
 from campaign.result import Column, Figure, Table, Value
 
-BY_THE_BACKEND = "the backend says one number of each trial"
+BY_THE_BACKEND = Cause("one number of a backend", "the backend says one number of each trial")
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def _faults(run: RunReader) -> Table:
         Column("trial", "Trial", exact=True),
         Column("fault", "Fault"),
         Column("why", "Reason"),
-        *(Column(name, _label(name), reason=BY_THE_BACKEND) for name in names),
+        *(Column(name, _label(name), reason=BY_THE_BACKEND()) for name in names),
     )
     note = "What the backend measured of its own work has its unit in the name."
     return Table("faults", "Faults, and the work of the backend", columns, tuple(rows), note=note)

@@ -74,7 +74,7 @@ def shown_line(line: Line) -> ShownLine:
 def _of_one_trial(line: Line) -> str:
     """What is not in its interval; a sentence leaves such an interval of a ratio out."""
     found = line.found
-    if found is None or not found.has_interval or OF_ONE_TRIAL not in found.reason:
+    if found is None or not found.has_interval or found.reason not in OF_ONE_TRIAL:
         return ""
     return "the interval is of one trial: how trials scatter is not in it"
 

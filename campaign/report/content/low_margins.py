@@ -13,10 +13,11 @@ from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of, words_here
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
 from campaign.physics.loops_used import LoopUse, loops_used
+from campaign.reason import Cause
 from campaign.result import Column, Table, Value
 from campaign.trial import Task, canonical_json
 
-COMPUTED = "computed from the description of the bench, and not measured"
+COMPUTED = Cause("computed", "computed from the description of the bench, and not measured")
 NOTE = (
     "The loop is opened at the rate error, or under a torque command at the compensation torque, "
     "for small motions: stuck, with every interface in presliding, and in fast sliding. Below 20° "
@@ -46,10 +47,10 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
         Column("compensation", "Compensation"),
         Column("regime", "Regime"),
         Column("state", "Loop"),
-        Column("crossover", "Crossover", "rad/s", "rad/s", reason=COMPUTED),
-        Column("phase", "Phase margin", "rad", "deg", reason=COMPUTED),
-        Column("gain", "Gain margin (dB)", reason=COMPUTED),
-        Column("growth", "Fastest pole (1/s)", reason=COMPUTED),
+        Column("crossover", "Crossover", "rad/s", "rad/s", reason=COMPUTED()),
+        Column("phase", "Phase margin", "rad", "deg", reason=COMPUTED()),
+        Column("gain", "Gain margin (dB)", reason=COMPUTED()),
+        Column("growth", "Fastest pole (1/s)", reason=COMPUTED()),
     )
     kinds = set(sides.values())
     with speaking_of(kinds.pop() if len(kinds) == 1 else BOTH_ROTARY):

@@ -9,6 +9,7 @@ from campaign.access.analysis import AnalysedTest
 from campaign.access.sentences import is_decided, remarks, sentence, told_with_intervals
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.axis_kind import speaking_of
 from campaign.published.headline import NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
 from campaign.report.content.predicted import Predicted
@@ -183,17 +184,22 @@ def _answer(test: AnalysedTest, truth: Table | None, prediction: Predicted | Non
     result = test.result
     said = tuple(sentence(each) for each in result.conclusions)
     figure = _figure(result)
+    with speaking_of(test.sides):
+        every, first = (
+            tuple(remarks(each)) for each in (result.conclusions, result.conclusions[:1])
+        )
+        true = "" if truth is None else _held(truth)
     return Answer(
         test.name,
         test.title,
         said,
         "" if figure is None else figure.key,
-        tuple(remarks(result.conclusions)),
-        "" if truth is None else _held(truth),
+        every,
+        true,
         "" if prediction is None else prediction.told,
         test.problem or ("" if said else _nothing(test)),
         test.kind.replace("_", " "),
-        tuple(remarks(result.conclusions[:1])),
+        first,
     )
 
 

@@ -168,7 +168,7 @@ def _row(pair: _Pair, p: float, units: TestUnits) -> Mapping[str, Cell]:
         "found": pair.finding.known,
         "difference": pair.difference.difference,
         "change": change,
-        "verdict": verdict or pair.again or pair.difference.reason,
+        "verdict": verdict or pair.again or str(pair.difference.reason),
     }
 
 

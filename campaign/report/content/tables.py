@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
+from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.published.headline import Headline, headline
 from campaign.published.scoreboard import Line, Scoreboard, place_columns
 from campaign.published.values import heading_of
+from campaign.reason import NONE
 from campaign.report.content.lines import cell_name
 from campaign.result import Cell, Column, Table, Value, bare
 from campaign.text import interval, minus, number, pretty_unit
@@ -193,22 +195,24 @@ def _given(cell: Estimate) -> bool:
 def _without_interval(cell: Estimate | float | int, column: Column) -> Sequence[str]:
     if isinstance(cell, Estimate) and (cell.has_interval or _open(cell) or _given(cell)):
         return ()
-    reason = (cell.reason if isinstance(cell, Estimate) else "") or column.reason
-    return (reason,) if reason else ()
+    reason = (cell.reason if isinstance(cell, Estimate) else NONE) or column.reason
+    return (str(reason),) if reason else ()
 
 
 def _not_determined(cell: Estimate | float | int, column: Column) -> Sequence[str]:
     if not isinstance(cell, Estimate) or not _open(cell):
         return ()
     reason = cell.reason or column.reason
-    return (reason,) if reason else ()
+    return (str(reason),) if reason else ()
 
 
 def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
     """The systematic parts that intervals of a column do not have in them."""
     for cell in _numbers(table, column):
         if isinstance(cell, Estimate) and cell.has_interval:
-            yield from (p.source for p in cell.systematic if p.standard_uncertainty is None)
+            yield from (
+                words_here(p.source) for p in cell.systematic if p.standard_uncertainty is None
+            )
 
 
 def published_csv(lines: Sequence[Line]) -> str:

@@ -295,7 +295,7 @@ def _metric(found: Estimate) -> Mapping[str, Value]:
         "name": words_here(found.name.replace("_", " ")),
         "value": interval(value, low, high),
         "unit": pretty_unit(unit),
-        "reason": found.reason,
+        "reason": str(found.reason),
     }
 
 

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunReader
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import speaking_of, words_here
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.identification.intervals import student
@@ -173,7 +173,7 @@ def _bias(quantity: str, off: Array, source: str) -> str:
             f" {_signed(high)} %), more than the scatter of the {len(off)}"
         )
     told = f"{quantity}: {where} explains"
-    return f"{told} (largest systematic part: {source})" if source else told
+    return f"{told} (largest systematic part: {words_here(source)})" if source else told
 
 
 def _signed(value: float) -> str:

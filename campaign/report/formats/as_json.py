@@ -14,6 +14,7 @@ from campaign.access.estimates import row_of
 from campaign.access.results import code_of
 from campaign.access.sentences import sentence
 from campaign.archive.reading.damage_words import in_words
+from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.published.headline import headline
 from campaign.published.scoreboard import Line
@@ -120,33 +121,34 @@ def _run(document: Document) -> data.Run:
 
 def _test(section: Section) -> data.Test:
     test, found = section.test, section.test.result
-    return data.Test(
-        name=test.name,
-        kind=test.kind,
-        title=test.title,
-        description=test.description,
-        anchor=section.anchor,
-        reproduces=test.reproduces,
-        problems=section.problems,
-        trials=tuple(each.trial.number for each in test.trials),
-        options=plain(test.options),
-        conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
-        conclusions=tuple(map(_sentence, found.conclusions)),
-        notes=found.notes,
-        findings=tuple(
-            data.Finding(
-                number=number(each.known),
-                conditions=plain(each.conditions),
-                recomputed=each.recomputed,
-            )
-            for each in found.findings
-        ),
-        comparisons=tuple(map(_comparison, section.comparisons)),
-        figures=tuple(map(_figure, section.figures)),
-        tables=tuple(map(_table, section.tables)),
-        truth=None if section.truth is None else _table(section.truth),
-        prediction=None if section.prediction is None else _table(section.prediction),
-    )
+    with speaking_of(test.sides):
+        return data.Test(
+            name=test.name,
+            kind=test.kind,
+            title=test.title,
+            description=test.description,
+            anchor=section.anchor,
+            reproduces=test.reproduces,
+            problems=section.problems,
+            trials=tuple(each.trial.number for each in test.trials),
+            options=plain(test.options),
+            conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
+            conclusions=tuple(map(_sentence, found.conclusions)),
+            notes=found.notes,
+            findings=tuple(
+                data.Finding(
+                    number=number(each.known),
+                    conditions=plain(each.conditions),
+                    recomputed=each.recomputed,
+                )
+                for each in found.findings
+            ),
+            comparisons=tuple(map(_comparison, section.comparisons)),
+            figures=tuple(map(_figure, section.figures)),
+            tables=tuple(map(_table, section.tables)),
+            truth=None if section.truth is None else _table(section.truth),
+            prediction=None if section.prediction is None else _table(section.prediction),
+        )
 
 
 def _sentence(conclusion: result.Conclusion) -> data.Sentence:
@@ -187,7 +189,7 @@ def _table(shown: ShownTable) -> data.Table:
                 display=each.display or each.unit,
                 factor=_factor(each.unit, each.display),
                 exact=each.exact,
-                reason=each.reason,
+                reason=str(each.reason),
             )
             for each in table.columns
         ),

@@ -46,6 +46,10 @@ class Number(_Part):
     """`number`, `share`, `count`, `quantile`, `at least` or `at most`."""
     reason: str
     """Why it has no interval, or no value."""
+    reason_code: str
+    """Which reason that is: the same for all of its kind; "" for none."""
+    reason_values: dict[str, JsonValue]
+    """What `reason` has in it, by name (SI, or a percentage called so)."""
     method: str
     systematic: dict[str, float | None]
     """What repetitions do not show: source to standard uncertainty, null where nobody knows it."""

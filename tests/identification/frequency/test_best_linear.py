@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.identification.frequency.best_linear import best_linear
-from campaign.identification.frequency.distortion import total
+from campaign.identification.frequency.distortion import SHARED_LINES, SINGLE_REALISATION, total
 from campaign.identification.frequency.multisine import (
     OddGrid,
     crest_factor,
@@ -93,7 +93,7 @@ def test_parities_are_not_told_where_even_lines_are_excited() -> None:
     for parity in ("even", "odd"):
         told = total(found.distortion, parity)  # type: ignore[arg-type]
         assert np.isnan(told.value)
-        assert "share lines" in told.reason
+        assert told.reason in SHARED_LINES
 
 
 def test_static_nonlinearity_has_its_closed_form() -> None:
@@ -222,7 +222,7 @@ def test_what_too_little_leaves_open_is_said(realisations: int, periods: int, to
     if realisations == 1 and found.distortion is not None:
         even = total(found.distortion, "even")
         assert not even.has_interval
-        assert "single realisation" in even.reason
+        assert even.reason in SINGLE_REALISATION
         v = inputs(7, 2)
         several = best_linear(v, distorted(v, 0.002, 1), RATE, 2, GRID.excited).distortion
         assert several is not None

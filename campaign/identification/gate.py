@@ -1,0 +1,121 @@
+"""The judgement that every parameter of a rig passes before it is a finding.
+
+A parameter is *determined* where its interval is narrow against its value, or against what matters
+on this rig. It is *possible* where a rig can have it. One that may be zero and cannot be negative
+gets an upper bound. What does not pass keeps value and interval, is *not determined* and says why:
+it has no key, and no place in a bench file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from campaign.estimate import Estimate, Origin
+from campaign.reason import Cause, Reason
+
+USELESS = 0.5
+"""Half-width over the larger of value and what matters beyond which nothing is determined."""
+MATTERS = 0.05
+"""Share of the largest force that was recorded below which a force does not matter on a rig."""
+NOT_NEGATIVE = (
+    "breakaway", "bristle", "coulomb", "damping", "friction_coefficient", "friction_negative",
+    "friction_positive", "inertia", "static", "stiffness", "stribeck", "viscous",
+)  # fmt: skip
+"""How names begin of what no rig has below zero."""
+SIGNED = ("coulomb_over", "viscous_over")
+"""How names begin of what may be negative all the same: by how much something changes."""
+
+TOO_WIDE = Cause("interval too wide", "its interval is wider than ±{percent:.0f} % of it")
+UNPHYSICAL = Cause("unphysical", "it is negative, which no rig has: {cause}")
+OPPOSITE_SIGNS = Cause(
+    "opposite signs",
+    "inertia and friction both are, so force and motion have opposite signs (`sign = -1` in the "
+    "mapping turns one round)",
+)
+COMPENSATED = Cause(
+    "friction compensated",
+    "the inertia is not, so the recorded force was probably compensated for friction before "
+    "(record the whole force)",
+)
+SCALE_OR_DELAY = Cause(
+    "scale or delay",
+    "friction is not, so the acceleration is not that of this force (check scale, time base and "
+    "filters of the motion)",
+)
+CONSTANT_FORCE = Cause(
+    "constant force",
+    "only in one direction, so a constant force is larger than friction (take off the sensor's "
+    "zero, or the weight)",
+)
+ONE_SIDED = Cause("counterpart unphysical", "friction of the other direction is negative: {cause}")
+NEGATIVE = Cause("negative", "check sign, scale and zero of force and motion")
+
+
+def admitted(estimate: Estimate, matters: float = 0.0, cause: Reason | None = None) -> Estimate:
+    """The estimate as it may be reported.
+
+    Args:
+        matters: size (in the estimate's unit) below which it does not matter on this rig; 0 where
+            that is not known.
+        cause: why a negative one is likely to be so.
+    """
+    if estimate.origin is not Origin.MEASURED or estimate.kind != "number":
+        return estimate
+    positive, (low, high) = cannot_be_negative(estimate.name), estimate.combined
+    if positive and (estimate.value if high is None else high) < 0.0:
+        return refused(estimate, UNPHYSICAL(cause=cause or NEGATIVE()))
+    if estimate.half_width > USELESS * max(abs(estimate.value), matters):
+        return refused(estimate, TOO_WIDE(percent=100.0 * USELESS))
+    if positive and low is not None and high is not None and low <= 0.0:
+        unknown = tuple(p for p in estimate.systematic if p.standard_uncertainty is None)
+        return replace(
+            estimate, value=high, low=None, high=None, standard_error=None, freedom=None,
+            kind="at most", systematic=unknown,
+        )  # fmt: skip
+    return estimate
+
+
+def admitted_together(
+    found: Mapping[str, Estimate], matters: Mapping[str, float]
+) -> dict[str, Estimate]:
+    """Parameters of one model, by name: which of them are negative tells the likely cause."""
+    negative = {name for name, one in found.items() if _surely_negative(one)}
+    passed = {}
+    for name, one in found.items():
+        other = _counterpart(name) in negative
+        alone = name.startswith("coulomb") and (name in negative) != other
+        cause = CONSTANT_FORCE() if alone else _likely(negative)
+        passed[name] = admitted(one, matters.get(name, 0.0), cause)
+        if alone and name not in negative and one.origin is Origin.MEASURED:
+            passed[name] = refused(one, ONE_SIDED(cause=cause))
+    return passed
+
+
+def refused(estimate: Estimate, reason: Reason) -> Estimate:
+    """Not determined, with value and interval as they are: a reader sees how little they say."""
+    return replace(estimate, origin=Origin.NOT_DETERMINED, reason=reason)
+
+
+def cannot_be_negative(name: str) -> bool:
+    """Whether no rig has a parameter of this name below zero."""
+    return name.startswith(NOT_NEGATIVE) and not name.startswith(SIGNED)
+
+
+def _surely_negative(one: Estimate) -> bool:
+    high = one.combined[1]
+    return cannot_be_negative(one.name) and high is not None and high < 0.0
+
+
+def _counterpart(name: str) -> str:
+    """The name of the other direction; the same name where there is none."""
+    swapped = {"positive": "negative", "negative": "positive"}
+    stem, _, way = name.rpartition("_")
+    return f"{stem}_{swapped[way]}" if way in swapped else name
+
+
+def _likely(negative: set[str]) -> Reason:
+    heavy = any(name.startswith(("inertia", "mass")) for name in negative)
+    if not heavy:
+        return COMPENSATED()
+    return OPPOSITE_SIGNS() if len(negative) > 1 else SCALE_OR_DELAY()

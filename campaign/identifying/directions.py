@@ -1,0 +1,37 @@
+"""Friction by direction, and the constant force that a motion cannot tell from its asymmetry.
+
+A sensor's zero, or a weight, of size c adds c to the friction of the positive direction and takes c
+from that of the negative one. Half of the difference is what may be such a force; the mean of both
+directions does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from campaign.estimate import Estimate, Origin
+from campaign.reason import Cause
+
+OFFSET_OR_ASYMMETRY = Cause(
+    "offset or asymmetry",
+    "{half:.3g} of it, half of the difference between the directions, may be a constant force "
+    "such as a sensor's zero or a weight, which this motion does not tell from asymmetric friction "
+    "(the mean of both directions holds none of it)",
+)
+
+
+def with_offset(found: Mapping[str, Estimate], name: str) -> dict[str, Estimate]:
+    """Numbers by name, those of both directions with the constant force that may be in them.
+
+    name: of the friction, e.g. `coulomb`, told as `coulomb_positive` and `coulomb_negative`. Where
+        the two differ by less than the wider of their intervals, nothing is added.
+    """
+    both = [found.get(f"{name}_{way}") for way in ("positive", "negative")]
+    told = [each for each in both if each is not None and each.origin is Origin.MEASURED]
+    widest = max((each.half_width for each in told), default=0.0)
+    if len(told) < 2 or not abs(told[0].value - told[1].value) > widest:
+        return dict(found)
+    reason = OFFSET_OR_ASYMMETRY(half=0.5 * abs(told[0].value - told[1].value))
+    names = [key for key, each in found.items() if each in told and not each.reason]
+    return {**found, **{key: replace(found[key], reason=reason) for key in names}}
