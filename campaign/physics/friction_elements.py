@@ -30,10 +30,13 @@ from campaign.physics.rows import (
     MEETS_STEP,
 )
 from campaign.physics.sliding_torque import address_of_sliding, single_sliding
-from campaign.physics.step_function import ROOM_TEMPERATURE, Motion, address_of, single_step
-
-AN_INSTANT = 1e-15
-"""s; over it nothing moves, and differences are still numbers."""
+from campaign.physics.step_function import (
+    AN_INSTANT,
+    ROOM_TEMPERATURE,
+    Motion,
+    address_of,
+    single_step,
+)
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,7 @@ def plant_elements(
 def compensation_elements(
     interfaces: Sequence[Sequence[Interface]], steps: Sequence[float], *, reads_sensors: bool
 ) -> Elements:
-    """Those that compensate; from `steps` to `steps`, a sampled controller's being its periods."""
+    """Those that compensate. A sampled controller sets the steps of its models itself."""
     rates = [0.0] * len(steps)
     return _elements(interfaces, steps, rates, in_plant=False, reads_sensors=reads_sensors)
 

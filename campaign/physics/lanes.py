@@ -206,9 +206,7 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
         system=_system(lanes),
         friction=plant_elements([lane.friction for lane in lanes], steps, rates),
         compensation=compensation_elements(
-            [lane.compensation for lane in lanes],
-            [_period(lane) for lane in lanes] if controller.every else steps,
-            reads_sensors=controller.every > 0,
+            [lane.compensation for lane in lanes], steps, reads_sensors=controller.every > 0
         ),
         controller=controller,
         memory=_memory(lanes, controller),

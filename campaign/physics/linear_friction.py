@@ -32,8 +32,7 @@ class FrictionPath:
 
     Attributes:
         stiffness: N m/rad.
-        damping, viscous: N m s/rad; apart, because a sampled compensation runs them on different
-            rates.
+        damping, viscous: N m s/rad; apart, because the matrices of a loop hold the viscous part.
         motor_side: whether a sampled compensation reads it from the resolver.
     """
 

@@ -241,14 +241,12 @@ class _Sampled:
         pole = math.exp(-self.period / low_pass) if low_pass > 0.0 else 0.0
         for model in self.models:
             side = 1 if model.motor_side else 0
-            now, before = rates[side], self.state("rates")[side]
-            # Bristles answer where their line ends; a curve without a state by its mean.
-            met = now if model.stiffness else 0.5 * (before + now)
-            torque = torque + model.viscous * now + model.damping * met
+            now = rates[side]
+            torque = torque + (model.viscous + model.damping) * now
             if model.stiffness:
-                # z, the trapezoidal sum of the filtered differences, is the angle less what
-                # the low-pass still holds back and half a step.
-                behind = self.period * (pole / (1.0 - pole) + 0.5)
+                # z, the sum of the filtered differences, is the angle less what the low-pass
+                # still holds back.
+                behind = self.period * pole / (1.0 - pole)
                 z = angle[self.sensor_delays[1 + side]] - behind * now
                 torque = torque + model.stiffness * z
         if not len(block.c):

@@ -7,9 +7,8 @@ from typing import Any
 from campaign.physics.blocks import Array, Controller, Elements, Memory
 from campaign.physics.compiled import inlined
 from campaign.physics.elementary import nearest, where
-from campaign.physics.friction_lines import ask, on_a_line
+from campaign.physics.friction_lines import ask
 from campaign.physics.rows import (
-    CHANGE,
     CURRENT,
     CURRENT_SENSOR,
     ENCODER,
@@ -24,13 +23,17 @@ from campaign.physics.rows import (
     KEPT_RESOLVER,
     KEPT_TORQUE,
     MEAN,
+    MEETS_PER_STEP,
     MEETS_POSITION,
     MEETS_RATE_END,
+    MEETS_RATE_MEAN,
     MEETS_RATE_START,
+    MEETS_STEP,
     RATE,
     RELATIVE_ANGLE,
     RESOLVER,
 )
+from campaign.physics.step_function import AN_INSTANT
 from campaign.physics.vector import rows_on_the_stack
 
 
@@ -62,7 +65,7 @@ def sample(
     resolver = _reading(controller, memory.readings, RESOLVER, place) / controller.ratio
     current = _reading(controller, memory.readings, CURRENT_SENSOR, place)
     memory.kept[KEPT_CURRENT] = current
-    _rates(controller, memory.kept, number == 0, gyro, encoder, resolver, compensation)
+    _rates(controller, memory.kept, number == 0, gyro, encoder, resolver)
     motor_torque = controller.torque_per_current * current
     torque = _compensate(lanes, controller, compensation, memory, gyro, motor_torque)
     memory.kept[KEPT_TORQUE] = torque
@@ -111,11 +114,8 @@ def _rates(
     gyro: float,
     encoder: float,
     resolver: float,
-    compensation: Elements,
 ) -> None:
     """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates."""
-    load, motor = compensation.met[0], compensation.met[1]
-    load[MEETS_RATE_START], motor[MEETS_RATE_START] = kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE]
     if first:
         kept[KEPT_ENCODER], kept[KEPT_RESOLVER] = encoder, resolver
     else:
@@ -127,10 +127,6 @@ def _rates(
     motor_rate = pole * kept[KEPT_MOTOR_RATE] + share * (resolver - kept[KEPT_RESOLVER])
     kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE] = load_rate, motor_rate
     kept[KEPT_ENCODER], kept[KEPT_RESOLVER], kept[KEPT_GYRO] = encoder, resolver, gyro
-    load[MEETS_RATE_END], motor[MEETS_RATE_END] = load_rate, motor_rate
-    load[MEETS_POSITION], motor[MEETS_POSITION] = encoder, encoder
-    on_a_line(load)
-    on_a_line(motor)
 
 
 @inlined
@@ -147,12 +143,39 @@ def _compensate(
     torque: float = d[0] * gyro + d[1] * motor_torque + d[2] * relative
     torque = _linear(lanes, controller, memory.linear, gyro, motor_torque, relative, torque)
     if compensation.viscous.shape[0] > 0:
-        ask(compensation)
-        torque = torque + (compensation.answer[MEAN] + 0.5 * compensation.answer[CHANGE])
+        _meet(compensation, memory.kept)
+        _ask_over(compensation, controller.period)
+        _ask_over(compensation, AN_INSTANT)
+        torque = torque + compensation.answer[MEAN]
         for e in range(compensation.viscous.shape[0]):
             rate = compensation.met[compensation.side[e], MEETS_RATE_END]
             torque = torque + compensation.viscous[e] * rate
     return torque
+
+
+@inlined
+def _meet(compensation: Elements, kept: Array) -> None:
+    """Give the friction models the newest filtered rates and the newest angle.
+
+    A rate is constant: a difference of angles is the mean rate of the sample that has ended.
+    """
+    load, motor = compensation.met[0], compensation.met[1]
+    for row in (MEETS_RATE_START, MEETS_RATE_MEAN, MEETS_RATE_END):
+        load[row], motor[row] = kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE]
+    load[MEETS_POSITION], motor[MEETS_POSITION] = kept[KEPT_ENCODER], kept[KEPT_ENCODER]
+
+
+@inlined
+def _ask_over(compensation: Elements, duration: float) -> None:
+    """Ask the friction models over `duration` (s).
+
+    Over the sample that has ended it advances their states; then, over an instant, it gives the
+    torque of the states and rates that are there now.
+    """
+    load, motor = compensation.met[0], compensation.met[1]
+    load[MEETS_STEP], motor[MEETS_STEP] = duration, duration
+    load[MEETS_PER_STEP], motor[MEETS_PER_STEP] = 1.0 / duration, 1.0 / duration
+    ask(compensation)
 
 
 @inlined

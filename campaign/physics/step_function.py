@@ -65,6 +65,8 @@ Array = NDArray[np.float64]
 
 ROOM_TEMPERATURE = 293.15
 """K; no bench tells another one yet."""
+AN_INSTANT = 1e-15
+"""s; over it nothing moves, and differences are still numbers."""
 
 
 class Motion(NamedTuple):

@@ -169,27 +169,54 @@ def simulate_events(
     return found, history
 
 
-def simulate_sampled(loop: DryLoop, samples: int, period: float = 1e-3) -> dict[str, np.ndarray]:
+def simulate_sampled(
+    loop: DryLoop, samples: int, period: float = 1e-3, compensate: Function = still
+) -> dict[str, np.ndarray]:
     """As `simulate_events`, of a rate controller that reads ideal sensors and holds its output.
 
     Each period (s) is solved for itself; the integral is summed backwards. Values at the samples.
+    compensate: torque (N m) over the newest relative rate, a backward difference of the encoder
+    behind the discrete `low_pass` of the loop; it is called once a sample.
     """
     y, direction = at_start(loop, 0.0)
     gain, integral = loop.proportional * DEG, 0.0
+    pole = math.exp(-period / loop.low_pass) if loop.low_pass else 0.0
+    rate, angle = 0.0, y[2]
     found = []
     for n in range(samples):
         t = n * period
+        rate = pole * rate + (1.0 - pole) * (y[2] - angle) / period
+        angle, added = y[2], compensate(rate)
         error = loop.command(t) - y[0]
         integral += gain * loop.integral * period * error
-        torque = RATIO * KT * (gain * error + integral)
+        torque = RATIO * KT * (gain * error + integral) + added
         held = replace(loop, torque=lambda _, torque=torque: torque)
         times = np.array([t, t + period])
         # Stuck, the new command is what decides.
         direction = direction or held.regime(t, y)
         out, history, y = _simulate(held, times, y, direction, 1e-10, period)
         direction = history[-1][1]
-        found.append([values[0] for values in out.values()])
-    return dict(zip((*NAMES, "friction_torque"), np.transpose(found), strict=True))
+        found.append([*(values[0] for values in out.values()), rate, added])
+    names = (*NAMES, "friction_torque", "relative_rate", "compensation_torque")
+    return dict(zip(names, np.transpose(found), strict=True))
+
+
+class SampledBristles:
+    """LuGre feedforward of a sampled controller, for `simulate_sampled`: N m over the newest rate.
+
+    dz/dt = v - sigma0 |v| z / s(v) has a closed form while v is constant, as it is over a `period`.
+    """
+
+    def __init__(self, period: float) -> None:
+        self.period, self.deflections = period, [0.0, 0.0]
+
+    def __call__(self, rate: float) -> float:
+        for k, p in enumerate((LOAD, MOTOR)):
+            s = p["tc"] + (p["ts"] - p["tc"]) * math.exp(-((rate / p["vs"]) ** 2))
+            steady = math.copysign(s / p["s0"], rate)
+            left = math.exp(-p["s0"] * abs(rate) * self.period / s)
+            self.deflections[k] = steady + (self.deflections[k] - steady) * left
+        return bristles(rate, *self.deflections)[0]
 
 
 def at_start(loop: DryLoop, t: float) -> tuple[np.ndarray, int]:

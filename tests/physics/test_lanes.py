@@ -81,6 +81,7 @@ CASES: dict[str, tuple[Callable[[Tree], object] | None, dict[str, object]]] = {
     "dry, spring": (dry, {"mode": "spring", "command": PUSH, "spring_stiffness": 900.0}),
     "elastic": (elastic, SWING),
     "sampled": (sampled, {**SWING, "command": TURN}),
+    "sampled, static": (sampled, {**SWING, "compensation": "static"}),
     "sampled, lugre": (sampled, {**SWING, "compensation": "lugre"}),
     "torque": (None, {"mode": "torque", "command": PUSH, "disturbance": TURN}),
     "prescribed": (rippled, {"mode": "prescribed", "command": TURN, "compensation": "lugre"}),

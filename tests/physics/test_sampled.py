@@ -13,6 +13,8 @@ from campaign.physics.simulate import make_grid
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task
 from tests.physics.benches import KT, RATIO, bench, run, task
+from tests.physics.dry_cases import swing
+from tests.physics.event_reference import THESIS_DRY, DryLoop, SampledBristles, simulate_sampled
 
 SWING = Sine(amplitude=1.5, frequency=1.0, phase=np.pi / 2)
 SENSORS = {"gyro": "rad/s", "encoder": "rad", "resolver": "rad", "current": "A"}
@@ -38,6 +40,33 @@ def test_goes_to_the_continuous_controller_as_the_rate_rises(compensation: str) 
         errors.append(float(np.sqrt(np.mean(difference**2))))
     assert errors[1] < 0.25 * float(np.sqrt(np.mean(continuous["load_rate"] ** 2)))
     assert 0.8 < np.log2(errors[0] / errors[1]) < 1.2
+
+
+def newest_static(rate: float) -> float:
+    """Equation 4.6 with sgn(0) = 0 and the appendix' parameters, N m at the load."""
+    return DryLoop().sliding(THESIS_DRY, int(np.sign(rate)), rate)
+
+
+@pytest.mark.parametrize("compensation", ["static", "lugre"])
+@pytest.mark.parametrize(("rate", "low_pass"), [(1000, 0.0), (1000, 3e-3), (200, 3e-3)])
+def test_compensation_runs_on_the_newest_filtered_rate(
+    compensation: str, rate: int, low_pass: float
+) -> None:
+    """Through a reversal, against scipy from sample to sample; 1e-6 of each output's rms.
+
+    Of the load's rate, which is what compensation leaves, 1e-4.
+    """
+    compensate = newest_static if compensation == "static" else SampledBristles(1 / rate)
+    loop = DryLoop(bristles=True, low_pass=low_pass, **swing(SWING))  # type: ignore[arg-type]
+    expected = simulate_sampled(loop, round(0.7 * rate), 1 / rate, compensate)
+    on = sampled(f"{rate} Hz", relative_rate_filter=f"{low_pass} s")
+    moving = task(
+        base_acceleration=SWING, compensation=compensation, duration=0.7, sample_rate=rate
+    )
+    _, out = run(on, moving, 1 / 16e3)
+    for name in ("relative_rate", "compensation_torque", "motor_current", "load_rate"):
+        error = np.std(out[name] - expected[name]) / np.std(expected[name])
+        assert error < (1e-4 if name == "load_rate" else 1e-6), name
 
 
 def test_readings_are_multiples_of_the_resolution() -> None:
