@@ -14,7 +14,7 @@ from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
 from campaign.access.sentences import remarks, sentence
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import speaking_of, words_here
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identifying.agreement import disagreements
@@ -50,6 +50,7 @@ class ShownSection:
 
     anchor: str
     section: Section
+    warnings: tuple[str, ...]
     conclusions: tuple[str, ...]
     remarks: tuple[str, ...]
     figures: tuple[ShownFigure, ...]
@@ -172,6 +173,7 @@ def _section(
     return ShownSection(
         anchor=f"method-{name.replace('_', '-')}",
         section=section,
+        warnings=tuple(f"{name}: {words_here(each.text)}" for each in section.warnings),
         conclusions=tuple(sentence(each) for each in result.conclusions),
         remarks=tuple(remarks(result.conclusions)),
         figures=tuple(figures),
@@ -238,6 +240,10 @@ def _method_tree(section: Section) -> dict[str, Any]:
             for table in section.identified.result.tables
         },
         "notes": list(section.identified.result.notes),
+        "warnings": [
+            {"code": each.code, "text": words_here(each.text), "values": dict(each.values)}
+            for each in section.warnings
+        ],
         "changes": [
             {"before": row_of(each.before), "after": row_of(each.after),
              "difference": row_of(each.difference.difference), "p": each.difference.p,

@@ -86,6 +86,11 @@ class Motion:
         """Hz."""
         return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
 
+    def part(self, which: slice) -> Motion:
+        """Samples of it that follow each other."""
+        own = {name: values for name, values in vars(self).items() if values is not None}
+        return Motion(**{name: values[which] for name, values in own.items()})
+
 
 def motion_of_position(
     time: Array, position: Array, force: Array, low_pass: float, temperature: Array | None = None

@@ -28,7 +28,7 @@ from campaign.identifying.inverse.tables import (
     instruments_table,
     structures_table,
 )
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.method import Identified, Material, Method, Parameter, Unseen
 from campaign.identifying.tables import words
 from campaign.options import Options
 from campaign.result import Amount, Conclusion, Finding, Result, Table
@@ -90,6 +90,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         options.decimation or plain.decimation,
         round(options.skip * rate),
     )
+    material.say("step 1 of 4, the motion")
     pieces = moved(material.trials, filtering)
     unseen: tuple[Moved, ...] = ()
     if material.validation:
@@ -105,6 +106,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         delay=options.delay,
         terms=terms,
         linear=material.bench.is_linear,
+        say=material.say,
     )
     parameters = tuple(_parameters(found, material))
     return Identified(
@@ -119,6 +121,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         correlations=_correlations(found),
         settings=_settings(found, material),
         again={"terms": found.best.structure.names},
+        unseen=Unseen(found.best.validation.value) if found.best.validation is not None else None,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,15 +100,21 @@ def find(
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
     fits: list[Fit] = []
-    for model in models(sizes):
+    tried = models(sizes)
+    for number, model in enumerate(tried, 1):
+        done = partial(_say_fit, say, f"model {number} of {len(tried)} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
-        one = _fitted(model, terms, motions, filtering, inertia, starts, say, known)
+        one = _fitted(model, terms, motions, filtering, inertia, starts, done, known)
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
     best = min(range(len(fits)), key=lambda i: fits[i].held_out)
     return Whole(tuple(fits), best, filtering, tuple(pieces))
+
+
+def _say_fit(say: Callable[[str], None], which: str, text: str) -> None:
+    say(f"{which}, {text}")
 
 
 def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
@@ -155,14 +162,16 @@ def _fitted(
         units,
         residuals,
         starts=starts,
-        display=lambda p: say(f"{model.name}, {p.phase}, {p.evaluations} evaluations"),
+        display=lambda progress: say(progress.phase),
     )
+    say("half the band")
     # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
     other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
     fit = _with_delay(_with_band(fit, again), doubt)
     fit = resolved(fit, model, motions, filtering)
+    say("blocks left out")
     forces = [
         late_force(motion, filtering).at(0.0) * moving(motion, filtering) for motion in motions
     ]
