@@ -13,7 +13,7 @@ from rich.text import Text
 
 from campaign.access.sentences import of_unknown_size
 from campaign.archive.layout.files import why, write_atomically
-from campaign.axis_kind import speaking_of, words_here
+from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError, worst_exit_code
@@ -179,7 +179,7 @@ def _say(found: Identification) -> None:
 def _tell(section: Section) -> None:
     print_line(f"{section.method.name} ({section.method.summary})")
     for warning in section.warnings:
-        print_note(f"{section.method.name}: {words_here(warning.text)}", style="yellow")
+        print_note(f"{section.method.name}: {warning.text}", style="yellow")
     rows = [
         (
             words(each.estimate.name),

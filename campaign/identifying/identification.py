@@ -228,7 +228,8 @@ def _of_its_axis(found: Identified) -> Identified:
         )
         for each in found.parameters
     )
-    return replace(found, parameters=parameters, result=of_its_axis(found.result))
+    unseen = found.unseen and replace(found.unseen, what=words_here(found.unseen.what))
+    return replace(found, parameters=parameters, result=of_its_axis(found.result), unseen=unseen)
 
 
 def fitted_again(

@@ -82,7 +82,7 @@ class Unseen:
     @property
     def warning(self) -> Reason:
         """None where the model predicts it."""
-        if self.share <= MOST_LEFT:
+        if self.share <= MOST_LEFT:  # NaN predicts nothing
             return NONE
         return UNPREDICTED(percent=100.0 * self.share, what=self.what)
 

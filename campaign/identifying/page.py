@@ -14,7 +14,7 @@ from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
 from campaign.access.sentences import remarks, sentence
-from campaign.axis_kind import speaking_of, words_here
+from campaign.axis_kind import speaking_of
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identifying.agreement import disagreements
@@ -173,7 +173,7 @@ def _section(
     return ShownSection(
         anchor=f"method-{name.replace('_', '-')}",
         section=section,
-        warnings=tuple(f"{name}: {words_here(each.text)}" for each in section.warnings),
+        warnings=tuple(f"{name}: {each.text}" for each in section.warnings),
         conclusions=tuple(sentence(each) for each in result.conclusions),
         remarks=tuple(remarks(result.conclusions)),
         figures=tuple(figures),
@@ -241,7 +241,7 @@ def _method_tree(section: Section) -> dict[str, Any]:
         },
         "notes": list(section.identified.result.notes),
         "warnings": [
-            {"code": each.code, "text": words_here(each.text), "values": dict(each.values)}
+            {"code": each.code, "text": each.text, "values": dict(each.values)}
             for each in section.warnings
         ],
         "changes": [

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -145,12 +146,12 @@ def decimated(columns: Array, factor: int) -> Array:
 
 def _smooth(columns: Array, factor: int) -> Array:
     """`columns`, shape (n, k), behind the low-pass of a decimation by `factor`."""
-    from scipy.signal import cheby1, filtfilt
+    from scipy.signal import filtfilt
 
     if factor == 1:
         return columns
     _refuse_short(len(columns), 3 * DECIMATOR_ORDER)
-    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
+    b, a = _decimator(factor)
     smooth = filtfilt(b, a, columns, axis=0, padlen=3 * DECIMATOR_ORDER)
     return np.asarray(smooth * (a.sum() / b.sum()) ** 2)
 
@@ -177,6 +178,15 @@ def later(samples: Array, delay: float, sample_rate: float) -> Array:
     place = np.arange(len(samples), dtype=float)
     wanted = np.clip(place - delay * sample_rate, 0.0, len(samples) - 1.0)
     return np.asarray(CubicSpline(place, samples)(wanted))
+
+
+@lru_cache(maxsize=16)
+def _decimator(factor: int) -> tuple[Array, Array]:
+    """Coefficients of the low-pass; they take longer than to filter a short motion."""
+    from scipy.signal import cheby1
+
+    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
+    return b, a
 
 
 class LateRows:
