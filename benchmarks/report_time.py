@@ -1,6 +1,6 @@
-"""How long `campaign report` takes beside another checkout's, for one and the same run.
+"""How long `campaign report`, or `identify`, takes beside another checkout's, for the same run.
 
-    python -m benchmarks.report_time RUN.nxs OTHER [--python PYTHON] [--repeats 5]
+    python -m benchmarks.report_time RUN.nxs OTHER [--identify] [--python PYTHON] [--repeats 5]
 
 RUN must be one that both can read; OTHER is a folder with another checkout of campaign, and PYTHON
 an interpreter that has what it needs (this one where none is named). Each works on a copy of its
@@ -28,18 +28,20 @@ HERE = Path(__file__).parents[1]
 
 @dataclass
 class Checkout:
-    """One of the two, and how many seconds each of its reports took."""
+    """One of the two, and how many seconds each of its reports, or identifications, took."""
 
     name: str
     source: Path
     python: str
     run: Path
+    command: str = "report"
     seconds: list[float] = field(default_factory=list)
 
-    def report(self) -> None:
-        """Make the report, and take the time of it."""
-        command = [self.python, "-m", "campaign", "report", str(self.run)]
-        command += ["--output", str(self.run.parent / "report")]
+    def make(self) -> None:
+        """Make the page, and take the time of it."""
+        output = "--output" if self.command == "report" else "--page"
+        command = [self.python, "-m", "campaign", self.command, str(self.run)]
+        command += [output, str(self.run.parent / "page")]
         began = time.perf_counter()
         # Begun in its folder, as what lies there is imported before what is installed.
         subprocess.run(
@@ -72,21 +74,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("run", type=Path)
     parser.add_argument("other", type=Path)
+    parser.add_argument("--identify", action="store_true", help="and not a report")
     parser.add_argument("--python", default=sys.executable, help="of the other checkout")
     parser.add_argument("--repeats", type=int, default=5)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         run, other = arguments.run.resolve(), arguments.other.resolve()
+        command = "identify" if arguments.identify else "report"
         pair = (
-            Checkout("this", HERE, sys.executable, copied(run, Path(folder, "this"))),
-            Checkout("other", other, arguments.python, copied(run, Path(folder, "other"))),
+            Checkout("this", HERE, sys.executable, copied(run, Path(folder, "this")), command),
+            Checkout("other", other, arguments.python, copied(run, Path(folder, "other")), command),
         )
         for turn in range(arguments.repeats + 1):
             for each in pair:
-                each.report()
+                each.make()
                 if turn == 0:
                     each.seconds.clear()
-    print(f"{machine()}, {os.cpu_count()} cores. `campaign report` of {run.name}.\n")
+    print(f"{machine()}, {os.cpu_count()} cores. `campaign {command}` of {run.name}.\n")
     print(table(["", "median", "fastest", "slowest"], rows(pair)))
 
 

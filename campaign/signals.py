@@ -7,6 +7,7 @@ is the business of the field that holds it (rad/s, N m ...), so the fields here 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -59,7 +60,12 @@ class Polyline(Options):
 
     def sample(self, time: Array) -> Array:
         """Values at `time` (s), shape (n,)."""
-        return np.interp(time, self.times, self.values)
+        return np.interp(time, *self._points)
+
+    @cached_property
+    def _points(self) -> tuple[Array, Array]:
+        """Times and values: a simulation samples a long series thousands of times."""
+        return np.asarray(self.times), np.asarray(self.values)
 
 
 class MultiSine(Options):

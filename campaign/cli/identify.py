@@ -178,6 +178,8 @@ def _say(found: Identification) -> None:
 
 def _tell(section: Section) -> None:
     print_line(f"{section.method.name} ({section.method.summary})")
+    for warning in section.warnings:
+        print_note(f"{section.method.name}: {warning.text}", style="yellow")
     rows = [
         (
             words(each.estimate.name),

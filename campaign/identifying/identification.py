@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from campaign.axis_kind import speaking_of, unit_here, words_here
@@ -25,6 +26,7 @@ from campaign.plugins import Kinds
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
+from campaign.reason import Reason
 
 FRICTION = "friction."
 WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
@@ -66,6 +68,11 @@ class Section:
     def parameters(self) -> tuple[Parameter, ...]:
         """None where nothing was identified."""
         return self.identified.parameters if self.identified is not None else ()
+
+    @property
+    def warnings(self) -> tuple[Reason, ...]:
+        """What a reader has to know before the parameters."""
+        return self.identified.warnings if self.identified is not None else ()
 
 
 @dataclass(frozen=True)
@@ -119,13 +126,19 @@ def identify(
     bench = _bench(chosen)
     given = _options(settings, methods, bench)
     sections = []
-    for name in models or methods:
-        section = _section(methods[name], given[name], bench, chosen, validation, say)
+    names = list(models or methods)
+    for number, name in enumerate(names, 1):
+        say_of = partial(_say_of, f"method {number} of {len(names)}", say)
+        section = _section(methods[name], given[name], bench, chosen, validation, say_of)
         if compared is not None and section.identified is not None:
-            section = _compared(section, section.identified, bench, compared, say)
+            section = _compared(section, section.identified, bench, compared, say_of)
         sections.append(section)
     sections.sort(key=lambda each: each.identified is None)
     return Identification(chosen, validation, compared, bench, tuple(_adjusted(sections)))
+
+
+def _say_of(step: str, say: Callable[[str], None], text: str) -> None:
+    say(f"{step}, {text}")
 
 
 def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
@@ -221,7 +234,8 @@ def _of_its_axis(found: Identified) -> Identified:
         )
         for each in found.parameters
     )
-    return replace(found, parameters=parameters, result=of_its_axis(found.result))
+    unseen = found.unseen and replace(found.unseen, what=words_here(found.unseen.what))
+    return replace(found, parameters=parameters, result=of_its_axis(found.result), unseen=unseen)
 
 
 def fitted_again(

@@ -10,7 +10,17 @@ from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.reason import NONE, Cause, Reason
 from campaign.result import Result
+
+MOST_LEFT = 1.0 / 3.0
+"""RMS of a validation's residual, over that of what was measured, up to which a model predicts it:
+a ninth of the power. What it lacks beyond that is no small correction, as friction is not."""
+UNPREDICTED = Cause(
+    "validation residual",
+    "validation residual (RMS): {percent:.2g} % of the measured {what}; the model does not predict "
+    "this motion",
+)
 
 
 def nobody_listens(text: str) -> None:
@@ -68,6 +78,26 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Unseen:
+    """What a model leaves over of a validation.
+
+    Attributes:
+        share: RMS of the residual over that of what was measured.
+        what: which was measured: `torque`, `motion`.
+    """
+
+    share: float
+    what: str = "torque"
+
+    @property
+    def warning(self) -> Reason:
+        """None where the model predicts it."""
+        if self.share <= MOST_LEFT:  # NaN predicts nothing
+            return NONE
+        return UNPREDICTED(percent=100.0 * self.share, what=self.what)
+
+
+@dataclass(frozen=True)
 class Identified:
     """What one method found.
 
@@ -78,6 +108,8 @@ class Identified:
         settings: further values that the bench file needs for these parameters to be of use, by
             key: value, SI unit (rotary; "" for none) and what they rest on; nobody measured them.
         again: options that fit the same model to other data, by name.
+        unseen: how the model does on the validation; None without any.
+        left_out: of the recordings, and why.
     """
 
     parameters: tuple[Parameter, ...]
@@ -85,6 +117,14 @@ class Identified:
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
     settings: Mapping[str, tuple[Any, str, str]] = field(default_factory=dict)
     again: Mapping[str, Any] = field(default_factory=dict)
+    unseen: Unseen | None = None
+    left_out: Reason = NONE
+
+    @property
+    def warnings(self) -> tuple[Reason, ...]:
+        """What a reader has to know before any number."""
+        told = (self.left_out, self.unseen.warning if self.unseen else NONE)
+        return tuple(each for each in told if each)
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ class ShownSection:
 
     anchor: str
     section: Section
+    warnings: tuple[str, ...]
     conclusions: tuple[str, ...]
     remarks: tuple[str, ...]
     figures: tuple[ShownFigure, ...]
@@ -173,6 +174,7 @@ def _section(
     return ShownSection(
         anchor=f"method-{name.replace('_', '-')}",
         section=section,
+        warnings=tuple(f"{name}: {each.text}" for each in section.warnings),
         conclusions=tuple(sentence(each) for each in result.conclusions),
         remarks=tuple(remarks(result.conclusions)),
         figures=tuple(figures),
@@ -239,6 +241,10 @@ def _method_tree(section: Section) -> dict[str, Any]:
             for table in section.identified.result.tables
         },
         "notes": list(section.identified.result.notes),
+        "warnings": [
+            {"code": each.code, "text": each.text, "values": dict(each.values)}
+            for each in section.warnings
+        ],
         "changes": [
             {"before": row_of(each.before), "after": row_of(each.after),
              "difference": row_of(each.difference.difference), "p": each.difference.p,

@@ -17,6 +17,7 @@ from campaign.estimate import Systematic
 from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
 from campaign.identifying.material import choose
+from campaign.identifying.method import Unseen
 from campaign.identifying.page import write_identification
 from campaign.identifying.tables import parameters_table
 from campaign.physics.bench import Bench
@@ -263,3 +264,38 @@ def test_the_first_table_of_the_page_is_the_first(results: Path, run: str, tmp_p
     page, _ = identify_run(f"{run}:monday", results, models=PLAIN, page=tmp_path / "page")
     html = page.read_text(encoding="utf-8").split("</style>")[1]
     assert re.findall(r"Table (\d+)", re.sub(r"<[^>]+>", "", html))[0] == "1"
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.33, False), (0.74, True), (float("nan"), True)])
+def test_a_validation_that_the_model_does_not_predict_is_a_warning(
+    found: Identification,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    share: float,
+    warned: bool,
+) -> None:
+    """At the terminal, on the page and in the data, with its size."""
+    (section,) = found.sections
+    assert section.identified is not None
+    own = replace(section.identified, unseen=Unseen(share, "force"))
+    told = replace(found, sections=(replace(section, identified=own),))
+    page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
+    _say(told)
+    text = f"validation residual (RMS): {100 * share:.2g} % of the measured force"
+    data = json.loads((page.parent / "identification.json").read_text(encoding="utf-8"))
+    said = " ".join(capsys.readouterr().err.split())
+    for each in (said, page.read_text(encoding="utf-8"), str(data["methods"][0]["warnings"])):
+        assert (text in each) is warned
+    codes = [each["code"] for each in data["methods"][0]["warnings"]]
+    assert codes == (["validation residual"] if warned else [])
+
+
+def test_methods_that_validate_tell_what_they_leave(found: Identification) -> None:
+    (section,) = found.sections
+    assert section.identified is not None
+    assert section.identified.unseen is not None
+    assert section.identified.unseen.what == "force"  # of an axis that travels
+    [table] = [t for t in section.identified.result.tables if t.key == "structures"]
+    left = [row["validation"].value for row in table.rows]  # type: ignore[union-attr]
+    assert section.identified.unseen.share in left
+    assert section.warnings == ()

@@ -40,7 +40,7 @@ def swinging() -> Motion:
 def test_friction_along_a_motion_is_that_of_its_curve() -> None:
     motion = swinging()
     options = StribeckOptions.model_validate(CURVE, context={"si": True})
-    found = Along(motion).friction(CURVE)
+    found = Along(motion.rate, motion.sample_rate).friction(CURVE)
     moves = np.abs(motion.rate) > 0.02
     assert found[moves] == pytest.approx(steady_state(options, motion.rate)[moves], rel=2e-3)
 

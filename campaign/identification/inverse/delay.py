@@ -13,9 +13,9 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.identification.intervals import LEVEL, shifted_by
-from campaign.identification.inverse.motion import Array, Filtering, Motion, decimated, later
+from campaign.identification.inverse.motion import Array, Filtering, Motion
 from campaign.identification.inverse.regression import Piece, fitted, regress, stacked
-from campaign.identification.inverse.rows import all_rows, moving, rows
+from campaign.identification.inverse.rows import all_rows, late_force, moving, rows
 from campaign.identification.inverse.terms import Terms
 from campaign.reason import Cause
 
@@ -64,9 +64,10 @@ def _in_band(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> E
     moves = np.concatenate([moving(motion, filtering) for motion in motions])
     design, _ = stacked([rows(motion, terms, filtering) for motion in motions])
     basis = np.linalg.qr(design)[0]
+    forces = [late_force(each, filtering) for each in motions]
 
     def left(delay: float) -> float:
-        force = np.concatenate([_force(each, delay, filtering) for each in motions]) * moves
+        force = np.concatenate([each.at(delay) for each in forces]) * moves
         rest = force - basis @ (basis.T @ force)
         return float(rest @ rest)
 
@@ -114,8 +115,3 @@ def _own_share(design: Array) -> float:
     others, last = design[:, :-1], design[:, -1]
     rest = last - others @ np.linalg.lstsq(others, last, rcond=None)[0]
     return float(np.linalg.norm(rest) / max(float(np.linalg.norm(last)), 1e-300))
-
-
-def _force(motion: Motion, delay: float, filtering: Filtering) -> Array:
-    force = later(motion.force, delay, motion.sample_rate)[filtering.skip :]
-    return decimated(force[:, None], filtering.decimation)[:, 0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -62,7 +63,7 @@ class Filtering:
         return replace(self, slowest=2.0 * self.slowest)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """An evenly sampled motion and what drove it, before decimation; arrays of shape (n,).
 
@@ -85,6 +86,11 @@ class Motion:
     def sample_rate(self) -> float:
         """Hz."""
         return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+
+    def part(self, which: slice) -> Motion:
+        """Samples of it that follow each other."""
+        own = {name: values for name, values in vars(self).items() if values is not None}
+        return Motion(**{name: values[which] for name, values in own.items()})
 
 
 def motion_of_position(
@@ -135,15 +141,19 @@ def decimated(columns: Array, factor: int) -> Array:
     of a regression pass the same filter, so that it weights them alike. What is constant passes as
     it is: a filter of even order would take its ripple from it.
     """
-    from scipy.signal import cheby1, filtfilt
+    return _smooth(columns, factor)[first_kept(len(columns), factor) :: factor]
+
+
+def _smooth(columns: Array, factor: int) -> Array:
+    """`columns`, shape (n, k), behind the low-pass of a decimation by `factor`."""
+    from scipy.signal import filtfilt
 
     if factor == 1:
         return columns
     _refuse_short(len(columns), 3 * DECIMATOR_ORDER)
-    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
+    b, a = _decimator(factor)
     smooth = filtfilt(b, a, columns, axis=0, padlen=3 * DECIMATOR_ORDER)
-    smooth *= (a.sum() / b.sum()) ** 2
-    return np.asarray(smooth[first_kept(len(columns), factor) :: factor])
+    return np.asarray(smooth * (a.sum() / b.sum()) ** 2)
 
 
 def first_kept(count: int, factor: int) -> int:
@@ -168,6 +178,40 @@ def later(samples: Array, delay: float, sample_rate: float) -> Array:
     place = np.arange(len(samples), dtype=float)
     wanted = np.clip(place - delay * sample_rate, 0.0, len(samples) - 1.0)
     return np.asarray(CubicSpline(place, samples)(wanted))
+
+
+@lru_cache(maxsize=16)
+def _decimator(factor: int) -> tuple[Array, Array]:
+    """Coefficients of the low-pass; they take longer than to filter a short motion."""
+    from scipy.signal import cheby1
+
+    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
+    return b, a
+
+
+class LateRows:
+    """Decimated rows of a signal, for one delay after the other.
+
+    A delay and a low-pass may be exchanged: the signal is filtered once, and each delay asks for
+    the rows alone. The ends differ from those of `decimated(later(...))` by what is held there.
+    """
+
+    def __init__(self, samples: Array, sample_rate: float, filtering: Filtering) -> None:
+        """samples: shape (n,), evenly spaced."""
+        from scipy.interpolate import CubicSpline
+
+        smooth = _smooth(samples[filtering.skip :, None], filtering.decimation)[:, 0]
+        first = first_kept(len(smooth), filtering.decimation)
+        place = np.arange(len(smooth), dtype=float)
+        self._rate = sample_rate
+        self._between = CubicSpline(place, smooth)
+        self._kept = place[first :: filtering.decimation]
+        self._last = place[-1]
+
+    def at(self, delay: float) -> Array:
+        """The rows of a signal that is `delay` (s) later, shape (rows,)."""
+        wanted = np.clip(self._kept - delay * self._rate, 0.0, self._last)
+        return np.asarray(self._between(wanted))
 
 
 def whole_pieces(good: NDArray[np.bool_], fewest: int) -> Sequence[slice]:

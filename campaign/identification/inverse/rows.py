@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from itertools import pairwise
+from typing import Any, TypeVar, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from campaign.identification.inverse.motion import (
     Array,
     Filtering,
+    LateRows,
     Motion,
     decimated,
     kept_times,
-    later,
 )
 from campaign.identification.inverse.regression import Piece
-from campaign.identification.inverse.terms import Terms, columns
+from campaign.identification.inverse.terms import TERMS, Term, Terms, columns
+
+T = TypeVar("T")
 
 END_ROWS, END_PERIODS = 5, 3.0
 """Rows, or periods of the low-pass, that its beginning and its end spoil; a tenth at most."""
@@ -37,10 +41,37 @@ def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0)
 
 def all_rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
     """The same with those that stand still."""
-    force = later(motion.force, delay, motion.sample_rate)
-    whole = np.column_stack([columns(motion, terms), force])[filtering.skip :]
-    fewer = decimated(whole, filtering.decimation)
-    return Piece(fewer[:, :-1], fewer[:, -1], kept_times(motion, filtering))
+    made = [_column(motion, term, filtering) for term in terms]
+    force = late_force(motion, filtering).at(delay)
+    return Piece(np.column_stack(made), force, kept_times(motion, filtering))
+
+
+_MADE: WeakKeyDictionary[Motion, dict[Hashable, Any]] = WeakKeyDictionary()
+"""Filtered columns by motion: dozens of structures share them, and filtering is what takes time."""
+
+
+def _once(motion: Motion, key: Hashable, make: Callable[[], T]) -> T:
+    kept = _MADE.setdefault(motion, {})
+    if key not in kept:
+        kept[key] = make()
+    return cast("T", kept[key])
+
+
+def _column(motion: Motion, term: Term, filtering: Filtering) -> Array:
+    def make() -> Array:
+        whole = columns(motion, [term])[filtering.skip :]
+        return decimated(whole, filtering.decimation)[:, 0]
+
+    return _once(motion, (term, filtering.decimation, filtering.skip), make)
+
+
+def late_force(motion: Motion, filtering: Filtering) -> LateRows:
+    """The rows of the force, for any delay."""
+    return _once(
+        motion,
+        (filtering.decimation, filtering.skip),
+        lambda: LateRows(motion.force, motion.sample_rate, filtering),
+    )
 
 
 def moving(motion: Motion, filtering: Filtering) -> Array:
@@ -48,7 +79,7 @@ def moving(motion: Motion, filtering: Filtering) -> Array:
 
     Those at both ends are among the others: differentiated noise is large there.
     """
-    rate = decimated(motion.rate[filtering.skip :, None], filtering.decimation)[:, 0]
+    rate = _column(motion, TERMS["viscous"], filtering)
     slow = np.abs(rate) < filtering.slowest
     beside = slow.copy()
     beside[1:] |= slow[:-1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,6 +119,7 @@ def find(
     delay: float | None = None,
     terms: Sequence[Term] | None = None,
     linear: bool = False,
+    say: Callable[[str], None] = lambda text: None,
 ) -> InverseDynamics:
     """Identify from `pieces`; `unseen` is predicted when everything is chosen.
 
@@ -126,10 +127,12 @@ def find(
         delay: of the force (s); None: it is found, and taken out where it is surely there.
         terms: the structure; None: it is chosen.
         linear: whether the axis travels: no gravity over an angle then.
+        say: is told which step of four this is; the first has read the motion.
 
     Raises ValueError where the motions cannot tell even the symmetric model.
     """
     motions = [each.motion for each in pieces]
+    say("step 2 of 4, delay and terms")
     plain = _plain(motions, filtering)
     start = tuple(terms) if terms is not None else plain[-1].terms
     late = _delay(motions, start, filtering, delay)
@@ -156,8 +159,10 @@ def find(
     picked += offset
     unseen_motions = [each.motion for each in unseen]
     told = {*range(len(plain)), picked}
+    say("step 3 of 4, predictions")
     tried = _validated(found, motions, unseen_motions, filtering, told)
     best = tried[picked]
+    say("step 4 of 4, instruments")
     squares = _estimates(best, motions, filtering, late)
     held, why = instruments(
         pieces,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -259,7 +259,7 @@ def _regressed(
     own: list[Piece] = []
     other: list[Piece] = []
     for piece, one in zip(pieces, made, strict=True):
-        motion = _cut(piece.motion, len(one.time))
+        motion = piece.motion.part(slice(len(one.time)))
         both = moving(motion, filtering) * moving(one, filtering)
         rows = [all_rows(motion, terms, filtering, delay), all_rows(one, terms, filtering)]
         for each, into in zip(rows, (own, other), strict=True):
@@ -296,17 +296,3 @@ def _estimate(
     for source, shifts in parts.items():
         one = shifted_by(one, source, None if shifts is None else float(shifts[index]))
     return one
-
-
-def _cut(motion: Motion, count: int) -> Motion:
-    """Its first samples."""
-    warm = None if motion.temperature is None else motion.temperature[:count]
-    return replace(
-        motion,
-        time=motion.time[:count],
-        position=motion.position[:count],
-        rate=motion.rate[:count],
-        acceleration=motion.acceleration[:count],
-        force=motion.force[:count],
-        temperature=warm,
-    )

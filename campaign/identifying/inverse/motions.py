@@ -60,6 +60,11 @@ class Moved:
     wanted: Motion | None
     of_rate: bool = False
 
+    def part(self, which: slice) -> Moved:
+        """Samples of it that follow each other."""
+        wanted = None if self.wanted is None else self.wanted.part(which)
+        return replace(self, motion=self.motion.part(which), wanted=wanted)
+
 
 def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
     """Trials with a force and a motion, or why there are none; too many are cut."""

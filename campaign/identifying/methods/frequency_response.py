@@ -41,7 +41,7 @@ from campaign.identifying.frequency.validation_shown import (
     validation_figures,
     validation_tables,
 )
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.method import Identified, Material, Method, Parameter, Unseen
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Conclusion, Finding, Result
@@ -146,7 +146,14 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
             ),
         ),
         correlations=_correlations(told, parameters),
+        unseen=_unseen(validation),
     )
+
+
+def _unseen(validation: Validation) -> Unseen | None:
+    """Of the model that does best: the output that it makes of the unseen torque."""
+    outputs = [each.output for each in validation.predictions if each.output is not None]
+    return Unseen(min(each.value for each in outputs), "motion") if outputs else None
 
 
 def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tuple[str, str], float]:

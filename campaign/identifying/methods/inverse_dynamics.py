@@ -30,7 +30,14 @@ from campaign.identifying.inverse.tables import (
     instruments_table,
     structures_table,
 )
-from campaign.identifying.method import Identified, Material, Method, Parameter, is_value
+from campaign.identifying.method import (
+    Identified,
+    Material,
+    Method,
+    Parameter,
+    Unseen,
+    is_value,
+)
 from campaign.identifying.tables import words
 from campaign.options import Options
 from campaign.reason import Cause
@@ -96,6 +103,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         options.decimation or plain.decimation,
         round(options.skip * rate),
     )
+    material.say("step 1 of 4, the motion")
     pieces = moved(material.trials, filtering)
     unseen: tuple[Moved, ...] = ()
     if material.validation:
@@ -111,6 +119,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         delay=options.delay,
         terms=terms,
         linear=material.bench.is_linear,
+        say=material.say,
     )
     parameters = tuple(_parameters(found, material))
     return Identified(
@@ -125,6 +134,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         correlations=_correlations(found),
         settings=_settings(parameters, material),
         again={"terms": found.best.structure.names},
+        unseen=Unseen(found.best.validation.value) if found.best.validation is not None else None,
     )
 
 

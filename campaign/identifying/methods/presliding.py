@@ -36,7 +36,7 @@ from campaign.identification.presliding_dynamics.found import (
 )
 from campaign.identification.presliding_dynamics.prediction import unexplained
 from campaign.identification.presliding_dynamics.record import Record
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.method import Identified, Material, Method, Parameter, Unseen
 from campaign.identifying.presliding.small_motions import (
     is_planned,
     small_motion,
@@ -99,6 +99,7 @@ def _identify(material: Material, options: PreslidingOptions) -> Identified:
         if name in told and told[name].has_interval:
             told[name] = with_scale(told[name], material.trials[0], DRIVE_TORQUE)
     told |= _bristle_damping(told, material.bench, options)
+    missed = [unexplained(found.fit, each) for each in unseen]
     planned = all(map(is_planned, material.trials))
     parameters = tuple(_parameters(told, material.bench, planned or _gives_way(found)))
     shown = tuple(each.trial.number for each in material.trials)
@@ -109,13 +110,14 @@ def _identify(material: Material, options: PreslidingOptions) -> Identified:
     return Identified(
         parameters,
         Result(
-            tables=tuple(_tables(found, told, unseen)),
+            tables=tuple(_tables(found, told, unseen, missed)),
             figures=tuple(figures),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
             notes=(*remarks(found), *_notes(material.bench, found, planned)),
             conclusions=tuple(_conclusions(told)),
         ),
         correlations=_correlations(found),
+        unseen=Unseen(max(missed), "motion") if missed else None,
     )
 
 
@@ -191,7 +193,10 @@ def _parameters(told: dict[str, Estimate], bench: Bench, bristles: bool) -> Iter
 
 
 def _tables(
-    found: PreslidingDynamics, told: dict[str, Estimate], unseen: Sequence[Record]
+    found: PreslidingDynamics,
+    told: dict[str, Estimate],
+    unseen: Sequence[Record],
+    missed: Sequence[float],
 ) -> Iterator[Table]:
     yield Table(
         "presliding",
@@ -203,8 +208,9 @@ def _tables(
         ),
         note="Stiffness and damping at rest are the sums over all interfaces of the axis.",
     )
-    rows = [(each, "fitted") for each in found.fit.records]
-    rows += [(each, "unseen") for each in unseen]
+    fitted = found.fit.records
+    rows = [(each, "fitted", unexplained(found.fit, each)) for each in fitted]
+    rows += [(each, "unseen", share) for each, share in zip(unseen, missed, strict=True)]
     yield Table(
         "presliding-missed",
         "What the fitted model misses of each trial",
@@ -219,9 +225,9 @@ def _tables(
                 "trial": record.named,
                 "use": use,
                 "amplitude": record.amplitude,
-                "missed": unexplained(found.fit, record),
+                "missed": share,
             }
-            for record, use in rows
+            for record, use, share in rows
         ),
         note="Rms of measured less simulated motion over that of the motion. Of unseen trials "
         "nothing was fitted but the sensor's offset and drift.",

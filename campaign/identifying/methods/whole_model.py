@@ -6,13 +6,12 @@ linear terms are fitted with them. What has no information goes to no bench file
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
 from pydantic import Field
 
-from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
@@ -21,11 +20,13 @@ from campaign.identification.inverse.terms import Term
 from campaign.identifying.inverse.found import InverseDynamics
 from campaign.identifying.inverse.found import find as find_inverse
 from campaign.identifying.inverse.motions import Moved, force_of, moved, usable, with_slowest
-from campaign.identifying.method import Identified, Material, Method, Parameter
+from campaign.identifying.method import Identified, Material, Method, Parameter, Unseen
 from campaign.identifying.tables import words
 from campaign.identifying.whole.found import Fit, find, product
+from campaign.identifying.whole.parts import telling_parts
 from campaign.identifying.whole.shown import figures, models_table, values_table
 from campaign.options import Options
+from campaign.reason import NONE, Cause, Reason
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.units import Frequency, Time
 
@@ -41,10 +42,13 @@ FORCES = (
     "cogging",
 )
 """Beginnings of names whose numbers grow with the force's constant."""
-MOST_SAMPLES = 60_000
-"""of all trials together that are fitted: a fit simulates them some hundred times."""
 RATIO = "static_over_coulomb"
 """of both directions, or the beginning of the name of one's own."""
+PARTS = Cause(
+    "parts of the motion",
+    "fitted to {used:.0f} of {recorded:.0f} s, in the {parts} parts that tell most of friction: a "
+    "fit of all takes too long",
+)
 STILL = 0.25
 """of the rate below which a plain regression takes an axis for standing: curves begin there."""
 LINEAR = ("spring", "gravity", "cogging")
@@ -83,15 +87,16 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
         options.decimation or plain.decimation,
         round(options.skip * rate),
     )
-    used = _few(material.trials)
-    pieces = moved(used, filtering)
+    material.say("the motion")
+    whole = moved(material.trials, filtering)
     unseen: tuple[Moved, ...] = ()
     if material.validation:
         trials, why = usable(material.validation)
         if why:
             raise ValueError(f"of the validation {why}")
         unseen = moved(trials, filtering)
-    moves = with_slowest(filtering, pieces, None)
+    moves = with_slowest(filtering, whole, None)
+    pieces = telling_parts(whole, moves)
     filtering = replace(filtering, slowest=STILL * moves.slowest)
     regression = find_inverse(pieces, unseen, moves, linear=material.bench.is_linear)
     extra = _linear_terms(regression)
@@ -111,32 +116,26 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
             tables=(models_table(found), *(values_table(each) for each in found.fits)),
             figures=tuple(figures(found, regression, unseen)),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=(*_left_out(material.trials, used), *_notes(best)),
+            notes=tuple(_notes(best)),
             conclusions=tuple(_conclusions(best)),
         ),
         correlations=best.fit.correlation,
         settings=_settings(best),
         again={"model": best.model.name},
+        unseen=Unseen(best.validation.value) if best.validation is not None else None,
+        left_out=_left_out(whole, pieces),
     )
 
 
-def _few(trials: Sequence[ArchivedTrial]) -> Sequence[ArchivedTrial]:
-    """As many trials, evenly over all of them, as do not make a fit take minutes."""
-    lengths = [round(t.trial.task.duration * t.trial.task.sample_rate) for t in trials]
-    for count in range(len(trials), 1, -1):
-        chosen = np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int))
-        if sum(lengths[i] for i in chosen) <= MOST_SAMPLES:
-            return [trials[i] for i in chosen]
-    return trials[:1]
-
-
-def _left_out(trials: Sequence[ArchivedTrial], used: Sequence[ArchivedTrial]) -> Iterator[str]:
-    if len(used) < len(trials):
-        numbers = ", ".join(str(each.trial.number) for each in used)
-        yield (
-            f"Of {len(trials)} trials {len(used)} were fitted ({numbers}): all of them have more "
-            f"than the {MOST_SAMPLES} samples that a fit takes."
-        )
+def _left_out(whole: Sequence[Moved], parts: Sequence[Moved]) -> Reason:
+    """Of long recordings."""
+    if len(parts) == len(whole) and all(map(operator.is_, parts, whole)):
+        return NONE
+    used, recorded = (
+        sum(len(each.motion.time) / each.motion.sample_rate for each in side)
+        for side in (parts, whole)
+    )
+    return PARTS(used=used, recorded=recorded, parts=len(parts))
 
 
 def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.identification.inverse.motion import Array, Motion
+from campaign.identification.inverse.motion import Array
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.lanes import Lane
@@ -44,18 +44,18 @@ _NOBODYS: Mapping[str, Any] = {
 class Along:
     """A motion, ready to be met by friction again and again."""
 
-    def __init__(self, motion: Motion) -> None:
-        rate = motion.sample_rate
-        count = len(motion.time)
-        times = np.arange(count) / rate
-        self._step = 1.0 / rate
+    def __init__(self, rates: Array, sample_rate: float, start: float = 0.0) -> None:
+        """rates: rad/s (or m/s), shape (n,), at `sample_rate` (Hz). start: position (rad, or m)."""
+        count = len(rates)
+        times = np.arange(count) / sample_rate
+        self._step = 1.0 / sample_rate
         self._task = Task(
             mode="prescribed",
-            command=Polyline(times=tuple(times.tolist()), values=tuple(motion.rate.tolist())),
-            duration=count / rate,
-            window=(0.0, count / rate),
-            sample_rate=rate,
-            start_angle=float(motion.position[0]),
+            command=Polyline(times=tuple(times.tolist()), values=tuple(rates.tolist())),
+            duration=count / sample_rate,
+            window=(0.0, count / sample_rate),
+            sample_rate=sample_rate,
+            start_angle=start,
         )
         self._count = count
 

@@ -14,22 +14,14 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.gate import USELESS
 from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.identification.inverse.choosing import criterion, structure
-from campaign.identification.inverse.motion import (
-    Array,
-    Filtering,
-    Motion,
-    decimated,
-    kept_times,
-    later,
-)
-from campaign.identification.inverse.rows import moving
-from campaign.identification.inverse.terms import DIRECTIONAL, TERMS, Term, columns
+from campaign.identification.inverse.motion import Filtering, Motion, kept_times
+from campaign.identification.inverse.rows import late_force, moving
+from campaign.identification.inverse.terms import DIRECTIONAL, TERMS, Term
 from campaign.identification.inverse.validation import Prediction, improvement, relative_error
 from campaign.identification.unknowns import Unknown
 from campaign.identification.whole_model import (
     METHOD,
     ModelFit,
-    Values,
     fit_model,
     held_out,
     moved_with,
@@ -37,8 +29,8 @@ from campaign.identification.whole_model import (
 )
 from campaign.identifying.inverse.found import together
 from campaign.identifying.inverse.motions import Moved, never_moved
-from campaign.identifying.whole.along import Along
 from campaign.identifying.whole.models import Model, Sizes, models
+from campaign.identifying.whole.residuals import Residuals, steps_between
 from campaign.reason import Cause, Reason
 
 DELAYS = 5.0
@@ -119,15 +111,21 @@ def find(
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
     fits: list[Fit] = []
-    for model in models(sizes):
+    tried = models(sizes)
+    for number, model in enumerate(tried, 1):
+        done = partial(_say_fit, say, f"model {number} of {len(tried)} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
-        one = _fitted(model, terms, motions, filtering, inertia, starts, say, known)
+        one = _fitted(model, terms, motions, filtering, inertia, starts, done, known)
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
     best = min(range(len(fits)), key=lambda i: fits[i].held_out)
     return Whole(tuple(fits), best, filtering, tuple(pieces))
+
+
+def _say_fit(say: Callable[[str], None], which: str, text: str) -> None:
+    say(f"{which}, {text}")
 
 
 def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
@@ -154,7 +152,6 @@ def _fitted(
     say: Callable[[str], None],
     known: Estimate | None,
 ) -> Fit:
-    along = [Along(motion) for motion in motions]
     rate = motions[0].sample_rate
     force = max(float(np.abs(motion.force).max()) for motion in motions)
     unknowns = (
@@ -167,28 +164,28 @@ def _fitted(
     units |= {"inertia": "kg m^2", "delay": "s"} | {term.name: term.unit for term in extra}
     names = [unknown.name for unknown in unknowns]
 
-    def left_in(band: Filtering, values: Values) -> list[Array]:
-        named = dict(zip(names, values, strict=True))
-        return [
-            _rows(_left(one, motion, model, extra, named), band) * moving(motion, band)
-            for one, motion in zip(along, motions, strict=True)
-        ]
+    def left_in(band: Filtering) -> Residuals:
+        return Residuals(names, model, extra, motions, band, steps_between(filtering))
 
-    residuals = partial(left_in, filtering)
+    residuals = left_in(filtering)
     fit = fit_model(
         unknowns,
         units,
         residuals,
         starts=starts,
-        display=lambda p: say(f"{model.name}, {p.phase}, {p.evaluations} evaluations"),
+        display=lambda progress: say(progress.phase),
     )
+    say("half the band")
     # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
-    other = refitted(unknowns, partial(left_in, filtering.half_band), fit.found.shares)
+    other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
     fit = _with_delay(_with_band(fit, again), doubt)
     fit = resolved(fit, model, motions, filtering)
-    forces = [_rows(motion.force, filtering) * moving(motion, filtering) for motion in motions]
+    say("blocks left out")
+    forces = [
+        late_force(motion, filtering).at(0.0) * moving(motion, filtering) for motion in motions
+    ]
     norm = float(np.sqrt(sum(float(each @ each) for each in forces)))
     masks = [_left_out(len(each)) for each in forces]
     unseen = held_out(unknowns, residuals, fit.found.shares, masks)
@@ -324,28 +321,6 @@ def _linear(term: Term, motions: Sequence[Motion], force: float) -> Unknown:
     return Unknown(term.name, -force / largest, force / largest, 0.0)
 
 
-def modelled(
-    along: Along, motion: Motion, model: Model, extra: Sequence[Term], values: dict[str, float]
-) -> Array:
-    """Force that a model asks for, shape (n,), before decimation."""
-    force = values["inertia"] * motion.acceleration + along.friction(model.options(values))
-    if extra:
-        force = force + columns(motion, extra) @ np.array([values[t.name] for t in extra])
-    return np.asarray(force)
-
-
-def _left(
-    along: Along, motion: Motion, model: Model, extra: Sequence[Term], values: dict[str, float]
-) -> Array:
-    shifted = later(motion.force, values["delay"], motion.sample_rate)
-    return shifted - modelled(along, motion, model, extra, values)
-
-
-def _rows(samples: Array, filtering: Filtering) -> Array:
-    whole = samples[filtering.skip :, None]
-    return np.asarray(decimated(whole, filtering.decimation)[:, 0])
-
-
 def _left_out(count: int) -> NDArray[np.bool_]:
     """Every third block."""
     block = np.minimum(np.arange(count) * BLOCKS // max(count, 1), BLOCKS - 1)
@@ -355,21 +330,20 @@ def _left_out(count: int) -> NDArray[np.bool_]:
 def _validated(
     one: Fit, reference: Fit | None, unseen: Sequence[Moved], filtering: Filtering
 ) -> Fit:
-    predictions = tuple(predicted(one, each.motion, filtering) for each in unseen)
+    predictions = predicted(one, [each.motion for each in unseen], filtering)
     whole = together(predictions)
     gain = improvement("gain", together(reference.predictions), whole) if reference else None
     share = relative_error("validation", whole)
     return replace(one, predictions=predictions, validation=share, gain=gain)
 
 
-def predicted(one: Fit, motion: Motion, filtering: Filtering) -> Prediction:
-    """What a fitted model says of another motion."""
-    values = one.values
-    force = later(motion.force, values["delay"], motion.sample_rate)
-    said = modelled(Along(motion), motion, one.model, one.extra, values)
-    return Prediction(
-        kept_times(motion, filtering), _rows(force, filtering), _rows(said, filtering)
-    )
+def predicted(one: Fit, motions: Sequence[Motion], filtering: Filtering) -> tuple[Prediction, ...]:
+    """What a fitted model says of other motions."""
+    names = [unknown.name for unknown in one.fit.found.unknowns]
+    made = Residuals(names, one.model, one.extra, motions, filtering, steps_between(filtering))
+    values = one.fit.values
+    sides = zip(motions, made.forces(values), made.modelled(values), strict=True)
+    return tuple(Prediction(kept_times(each, filtering), *both) for each, *both in sides)
 
 
 def product(name: str, ratio: Estimate, base: Estimate, correlation: float) -> Estimate:
