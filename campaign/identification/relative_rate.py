@@ -131,7 +131,8 @@ def relative_rate(
     if angle is None:
         reached = max(count, SIGMAS * noise) / math.sqrt(span)
         return RelativeRate(mean(recorded, span), span * step, max(finest, reached), 0.0, "encoder")
-    reached = max(finest, WORST_COUNT * count / (span * step))
+    noisy = math.sqrt(12.0) * SIGMAS * noise / (step * span**1.5)
+    reached = max(finest, WORST_COUNT * count / (span * step), noisy)
     return RelativeRate(slope(angle, step, span), span * step, reached, count, "encoder")
 
 
