@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.identification.intervals import BATCHES, student
-from campaign.identification.relative_rate import RelativeRate, relative_rate
+from campaign.identification.relative_rate import resolved_rate
 from campaign.identification.time_stuck import SIGMAS, count_of
 from campaign.reason import NONE, Cause, Reason
 
@@ -25,6 +25,9 @@ VARIES = 0.1
 """Share of its mean by which the rate may vary in a window (1 sigma): 1 % of Ts - Tc at most."""
 RESOLVED = 0.5 * VARIES
 """Share of the mean rate that a sensor has to tell, smoothed over a tenth of the window at most."""
+CHANCE = 4.0
+"""times the variance of its sensor that a smoothed rate may have: chi-square of the ten means of a
+window is below 3.3 times their number in 99.9 % of cases."""
 STICKS = 0.25
 """Share of the mean rate below which the load all but sticks."""
 DRIFTS = 0.25
@@ -78,7 +81,7 @@ def unsteady(
         return TOO_FEW_COUNTS(counts=counts, needs=FEWEST_COUNTS)
     # Evenly, and NaN where samples were lost: smoothing goes by their number.
     place = np.round((time - time[0]) / step).astype(int)
-    seen = _resolved(
+    seen = resolved_rate(
         _spread_out(rate, place),
         None if angle is None else _spread_out(angle, place),
         step,
@@ -94,12 +97,14 @@ def unsteady(
         return NONE
     values = values[there]
     left = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
-    excess = float(np.mean(left**2)) - (seen.finest / SIGMAS) ** 2
-    if excess <= (VARIES * mean) ** 2:
+    square, explained = float(np.mean(left**2)), (seen.finest / SIGMAS) ** 2
+    if square <= (VARIES * mean) ** 2 + CHANCE * explained:
         return NONE
     least = float(np.min(values * np.sign(np.mean(rate)))) / mean
     cause = STICK_SLIP if least < STICKS else RATE_VARIES
-    return cause(spread_percent=100.0 * math.sqrt(excess) / mean, least_percent=100.0 * least)
+    return cause(
+        spread_percent=100.0 * math.sqrt(square - explained) / mean, least_percent=100.0 * least
+    )
 
 
 def drifting(change: float, half_width: float, mean: float) -> Reason:
@@ -149,26 +154,3 @@ def _spread_out(values: Array, place: NDArray[np.int64]) -> Array:
     found = np.full(int(place[-1]) + 1, np.nan)
     found[place] = values
     return found
-
-
-def _resolved(
-    rate: Array,
-    angle: Array | None,
-    step: float,
-    finest: float,
-    longest: float,
-    *,
-    own_sensor: bool,
-) -> RelativeRate:
-    """The rate by the sensor that tells `finest` (rad/s) within the shortest time, or almost does.
-
-    The sensor that needs longer averages stick-slip away.
-    """
-    still = np.zeros_like(rate)
-    by_rate = relative_rate(rate, None, None, still, step, finest, longest)
-    if angle is None:
-        return by_rate
-    by_angle = relative_rate(rate, angle, None, still, step, finest, longest)
-    if not own_sensor:
-        return by_angle
-    return min(by_rate, by_angle, key=lambda each: (max(each.finest, finest), each.window))

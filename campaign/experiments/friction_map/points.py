@@ -19,12 +19,7 @@ from campaign.identification.ripple import (
     dominant_periods,
     harmonic,
 )
-from campaign.identification.steadiness import (
-    RATE_VARIES,
-    STICK_SLIP,
-    TOO_FEW_COUNTS,
-    drifting,
-)
+from campaign.identification.steadiness import TOO_FEW_COUNTS, drifting
 from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Reason
@@ -180,16 +175,8 @@ class MapPoint:
         return 1.0 if self.speed > 0 else -1.0
 
 
-ADVICE = {
-    STICK_SLIP.code: "raise the proportional gain of the rate loop, or begin at a higher speed",
-    RATE_VARIES.code: "raise the proportional gain of the rate loop, or begin at a higher speed",
-    TOO_FEW_COUNTS.code: "raise max_time, max_travel and window_angle, or begin at a higher speed",
-}
-"""What to do about a reason, by its code ..."""
-SETTLE = (
-    "raise settle_angle, max_time or the integral gain of the rate loop, or begin at a higher speed"
-)
-"""... and about all others."""
+REMEDY = "raise the gains of the rate loop, settle_angle or max_time, or begin at a higher speed"
+MORE_COUNTS = "raise max_time, max_travel and window_angle, or begin at a higher speed"
 
 
 def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint], list[MapPoint]]:
@@ -198,9 +185,10 @@ def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint]
     left = [_with_rule(point, point.unsteady) for point in points if point.unsteady]
     for code in dict.fromkeys(point.unsteady.code for point in left):
         own = [point for point in left if point.unsteady.code == code]
+        remedy = MORE_COUNTS if own[0].unsteady in TOO_FEW_COUNTS else REMEDY
         notes.append(
             f"{len(own)} of {len(points)} points are left out of the fit, for {code} "
-            f"({_speeds(own)}): {ADVICE.get(code, SETTLE)}."
+            f"({_speeds(own)}): {remedy}."
         )
     if moved := [point for point in kept if point.drift]:
         notes.append(
