@@ -30,12 +30,13 @@ from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, wit
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.found_excitation import found_ramp
 from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
+from campaign.identification.relative_rate import RelativeRate, resolved_rate
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
 from campaign.reason import Cause
-from campaign.recording import Array
+from campaign.recording import Array, Recording
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Offered, Task, Trial, TrialRequest
@@ -53,6 +54,8 @@ from campaign.units import (
 
 STOP_FACTOR = 4.0
 """Rate that ends the trial, over the rate that counts as sliding: enough to see it slide."""
+LONGEST = 0.2
+"""s over which a rate of counts is smoothed, at most: a load gathers speed as fast."""
 WAYS = {"positive": 1.0, "negative": -1.0}
 OF_INERTIA = Cause("part of the inertia", "it serves the inertia's part alone")
 ASSUMED_RATIO = Cause(
@@ -136,14 +139,20 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     """The ramp of a recording that nobody planned: up to when the load first slides."""
     known = {RELATIVE_ANGLE} & offered.channels
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
-    sliding = np.abs(recording[GYRO_RATE]) > options.sliding_rate
+    seen = _resolved(recording, options.sliding_rate)
+    rate, threshold = np.abs(seen.values), max(options.sliding_rate, seen.finest)
+    sliding = rate > threshold
     if not sliding.any():
-        rate = rate_here(options.sliding_rate)
-        raise ValueError(f"the load never slides at {rate} (sliding_rate)")
+        raise ValueError(f"the load never slides at {rate_here(threshold)} (sliding_rate)")
     slides = float(recording.time[int(np.argmax(sliding))])
     ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], slides)
-    stops = np.abs(recording[GYRO_RATE]) > STOP_FACTOR * options.sliding_rate
-    stop = float(recording.time[int(np.argmax(stops))]) if stops.any() else offered.duration
+    stops = rate > STOP_FACTOR * threshold
+    stop = offered.duration
+    if stops.any():  # and what the smoothing needs behind it
+        stop = min(stop, float(recording.time[int(np.argmax(stops))]) + 0.5 * seen.window)
+    coarse = ""
+    if threshold > options.sliding_rate:
+        coarse = f"; sliding is {rate_here(threshold)}, the least that its sensor resolves"
     place: dict[str, JsonValue] = {}
     if known and "position" not in offered.conditions:
         place["position"] = round(float(recording[RELATIVE_ANGLE][0]), 4)
@@ -152,11 +161,26 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     yield TrialRequest(
         Task(mode="recorded", duration=stop, window=(ramp.start, stop), sample_rate=1.0),
         point=place | {"direction": "positive" if ramp.slope > 0 else "negative"},
-        note=f"a ramp of {ramp.slope:.3g} N m/s from {ramp.start:.3g} s was found",
+        note=f"a ramp of {ramp.slope:.3g} N m/s from {ramp.start:.3g} s was found{coarse}",
         windows=windows,
         part=(0.0, stop),
-        options={"torque_rate": float(f"{abs(ramp.slope):.3g}"), "rest": ramp.start},
+        options={
+            "torque_rate": float(f"{abs(ramp.slope):.3g}"),
+            "rest": ramp.start,
+            "sliding_rate": threshold,
+        },
     )
+
+
+def _resolved(recording: Recording, finest: float) -> RelativeRate:
+    """The rate of an imported recording, smoothed until its sensor resolves `finest` (rad/s).
+
+    It may be made of an encoder's counts, of which each is many times as fast.
+    """
+    angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
+    step = float(np.ptp(recording.time)) / max(len(recording.time) - 1, 1)
+    rate = recording[GYRO_RATE]
+    return resolved_rate(rate, angle, step, finest, LONGEST, own_sensor=False)
 
 
 def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
@@ -184,6 +208,14 @@ def _samples(data: TrialData) -> tuple[Array, Array, Array]:
     return recording.time, way * recording[GYRO_RATE], way * recording[DRIVE_TORQUE]
 
 
+def _seen(data: TrialData, finest: float) -> Array:
+    """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
+    recording, way = data.recording(), WAYS[direction_of(data.trial)]
+    if data.trial.task.mode != "recorded":
+        return way * recording[GYRO_RATE]
+    return way * _resolved(recording, finest).values
+
+
 def curve_of(data: TrialData, breakaway: float) -> Presliding:
     """The curve of bristles of a ramp whose load slides at `breakaway` (N m).
 
@@ -198,7 +230,8 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     """Breakaway torque; where the curve of bristles shows, stiffness and what follows from it."""
     options, bench = _options(data.trial), bench_of(data.trial)
     inertia = inertia_of(bench, "friction of a load that gathers speed")
-    found = breakaway_torque(*_samples(data), inertia, options.sliding_rate)
+    seen = _seen(data, options.sliding_rate)
+    found = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
     torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
     torque = _by_torque_constant(torque, bench)
     acceleration = Estimate.without_interval(
@@ -277,7 +310,7 @@ def _analyse(data: TestData) -> Result:
 def _slid(item: TrialData) -> bool:
     """Whether the load came to the rate that counts as sliding."""
     bound = _options(item.trial).sliding_rate
-    return bool(np.any(np.abs(item.recording()[GYRO_RATE]) >= bound))
+    return bool(np.any(np.abs(_seen(item, bound)) >= bound))
 
 
 def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:

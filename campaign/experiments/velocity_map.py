@@ -68,7 +68,7 @@ def _one_map(group: tuple[TrialData, ...], suffix: str) -> Result:
         fits = fit_map(kept, bench)
     except ValueError as error:
         notes.append(f"No fit{f' for {where}' if where else ''}: {error}.")
-        return Result(tables=(point_table(points, suffix, where),), notes=tuple(notes))
+        return Result(tables=(point_table((*kept, *left), suffix, where),), notes=tuple(notes))
     tables: list[Table] = [
         parameter_table(fits, suffix, where),
         model_table(fits, suffix, where),

@@ -56,7 +56,12 @@ class Breakaway:
 
 
 def breakaway_torque(
-    time: Array, rate: Array, torque: Array, inertia: float, threshold: float
+    time: Array,
+    rate: Array,
+    torque: Array,
+    inertia: float,
+    threshold: float,
+    seen: Array | None = None,
 ) -> Breakaway:
     """Largest friction torque of a torque ramp from rest, with its interval.
 
@@ -64,17 +69,20 @@ def breakaway_torque(
     load began to slide, which is where the rate passes `threshold` (rad/s); inertia in kg m^2. A
     ramp to the negative side gives a positive torque, too. The interval is by the delta method,
     with Student's t and residuals that may be autocorrelated.
+    `seen` is the rate smoothed until its sensor resolves `threshold`, shape (n,), NaN where it is
+    not known; absent: the rate itself. It decides when the load slides, and its pace.
     Raises ValueError when the load never moved that fast, or for too few samples.
     """
-    moving = np.abs(rate) >= threshold
+    seen = rate if seen is None else np.nan_to_num(seen)
+    moving = np.abs(seen) >= threshold
     if not moving.any():
         raise ValueError(
             f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
         )
     sliding = int(np.argmax(moving))
-    sign = float(np.sign(np.mean(rate[sliding:])))
+    sign = float(np.sign(np.mean(seen[sliding:])))
     interval = float(np.ptp(time)) / max(len(time) - 1, 1)
-    pace = interval * float(np.sum(sign * rate > 0.5 * np.max(sign * rate)))
+    pace = interval * float(np.sum(sign * seen > 0.5 * np.max(sign * seen)))
     stop = float(time[-1]) + interval
     first = _fit(time, sign * rate, sign * torque, inertia, (stop - FIRST_REACH * pace, stop))
     near = (first.peak_time - REACH * pace, first.peak_time + REACH * pace)

@@ -131,8 +131,36 @@ def relative_rate(
     if angle is None:
         reached = max(count, SIGMAS * noise) / math.sqrt(span)
         return RelativeRate(mean(recorded, span), span * step, max(finest, reached), 0.0, "encoder")
-    reached = max(finest, WORST_COUNT * count / (span * step))
+    noisy = math.sqrt(12.0) * SIGMAS * noise / (step * span**1.5)
+    reached = max(finest, WORST_COUNT * count / (span * step), noisy)
     return RelativeRate(slope(angle, step, span), span * step, reached, count, "encoder")
+
+
+def resolved_rate(
+    rate: Array,
+    angle: Array | None,
+    step: float,
+    finest: float,
+    longest: float,
+    *,
+    own_sensor: bool,
+) -> RelativeRate:
+    """The rate of an axis whose hull rests, by the sensor that shows `finest` within the shortest
+    time; else by the one that comes nearest to it.
+
+    Args:
+        rate, angle: rad/s, rad; shape (n,); `angle` None where nobody recorded it.
+        own_sensor: whether the rate has a sensor of its own, and is not made of the angle's counts.
+        step, finest, longest: as for `relative_rate`.
+    """
+    still = np.zeros_like(rate)
+    by_rate = relative_rate(rate, None, None, still, step, finest, longest)
+    if angle is None:
+        return by_rate
+    by_angle = relative_rate(rate, angle, None, still, step, finest, longest)
+    if not own_sensor:
+        return by_angle
+    return min(by_rate, by_angle, key=lambda each: (max(each.finest, finest), each.window))
 
 
 def _resolution(samples: Array) -> tuple[float, float]:

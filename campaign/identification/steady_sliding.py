@@ -16,6 +16,8 @@ from campaign.estimate import Estimate
 from campaign.identification.intervals import of_series
 from campaign.identification.least_squares import Array
 from campaign.identification.ripple import LEAST_PERIODS, harmonics_of
+from campaign.identification.steadiness import drifting, torque_drift, unsteady
+from campaign.reason import NONE, Reason
 
 METHOD = "mean drive torque less J times the residual acceleration, deviation from 10 batches"
 WITHOUT_INERTIA = "mean drive torque with what the residual acceleration takes, from 10 batches"
@@ -33,6 +35,8 @@ class SteadySliding:
         acceleration: residual one (rad/s²), the rate's slope over the window.
         effective: number of independent samples that would give this standard error.
         first, last: angles at which the window begins and ends (rad); NaN without `angle`.
+        unsteady: why it is no steady sliding.
+        drift: that the torque changes across the window, where it does.
     """
 
     rate: Estimate
@@ -42,6 +46,8 @@ class SteadySliding:
     effective: float
     first: float
     last: float
+    unsteady: Reason
+    drift: Reason
 
 
 def steady_sliding(
@@ -51,6 +57,8 @@ def steady_sliding(
     angle: Array | None,
     inertia: float | None,
     periods: float | None = None,
+    *,
+    own_sensor: bool = True,
 ) -> SteadySliding:
     """Rate and friction torque of a settled window.
 
@@ -62,6 +70,7 @@ def steady_sliding(
         angle: where the load is (rad), shape (n,); None where nobody recorded it.
         inertia: J (kg m²); None where nobody knows it.
         periods: of the ripple per revolution, where known.
+        own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
 
     Raises ValueError for fewer than 3 samples.
     """
@@ -71,7 +80,7 @@ def steady_sliding(
     interval = float(np.ptp(time)) / (len(time) - 1)
     slope = float(clock @ rate / (clock @ clock))
     first = last = math.nan
-    noise = torque
+    noise, columns = torque, None
     if angle is not None:
         line = np.polynomial.Polynomial.fit(clock, angle, 1)
         ends = clock[0] - 0.5 * interval, clock[-1] + 0.5 * interval
@@ -81,6 +90,11 @@ def steady_sliding(
             columns -= columns.mean(axis=0)
             noise = torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
     of_rate = of_series("rate", rate, "rad/s")
+    trouble = drifting(slope * float(np.ptp(time)), of_rate.half_width, float(rate.mean()))
+    trouble = unsteady(time, rate, angle, columns, own_sensor=own_sensor) or trouble
+    # Of a window that is shorter than a known ripple, a change is that of the place.
+    short = periods is not None and columns is None
+    judged = trouble, NONE if short else torque_drift(torque, columns)
     of_torque = of_series("friction_torque", noise, "N m")
     mean = float(torque.mean()) - (inertia or 0.0) * slope
     spread = float(np.std(torque))
@@ -89,7 +103,7 @@ def steady_sliding(
     error = of_torque.standard_error
     if error is None:
         told = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
-        return SteadySliding(of_rate, told, spread, slope, 1.0, first, last)
+        return SteadySliding(of_rate, told, spread, slope, 1.0, first, last, *judged)
     both = math.hypot(error, (inertia or 0.0) * of_slope)
     wide = (of_torque.high or 0.0) - of_torque.value
     half = wide * both / error if error > 0 else 0.0
@@ -105,4 +119,4 @@ def steady_sliding(
         freedom=of_torque.freedom,
     )
     effective = (float(np.std(noise)) / both) ** 2 if both > 0 else float(len(time))
-    return SteadySliding(of_rate, told, spread, slope, effective, first, last)
+    return SteadySliding(of_rate, told, spread, slope, effective, first, last, *judged)

@@ -103,12 +103,14 @@ class Stretch:
 
     def point(self, held: OverATurn | None) -> Point:
         """What it comes to, without what follows from the angle."""
-        if held is None or self.angle is None:
-            own = steady_sliding(self.time, self.rate, self.torque, None, self.inertia)
-            return Point(self.trial, own, self.load)
-        left = self.torque - held.at(self.angle)
-        own = steady_sliding(self.time, self.rate, left, None, self.inertia)
-        return Point(self.trial, own, self.load, tuple(held.doubts(self.angle)))
+        torque, angle, doubts = self.torque, self.angle, ()
+        if angle is not None and held is not None:
+            torque, doubts = torque - held.at(angle), tuple(held.doubts(angle))
+        if angle is not None:
+            angle = np.unwrap(angle)
+        # A rate relative to the hull may be made of an encoder's counts.
+        own = steady_sliding(self.time, self.rate, torque, angle, self.inertia, own_sensor=False)
+        return Point(self.trial, own, self.load, doubts)
 
 
 def points_of(

@@ -166,7 +166,7 @@ def _meet(compensation: Elements, kept: Array) -> None:
 
 
 @inlined
-def _ask_over(compensation: Elements, duration: float) -> None:
+def _ask_over(compensation: Elements, duration: Array | float) -> None:
     """Ask the friction models over `duration` (s).
 
     Over the sample that has ended it advances their states; then, over an instant, it gives the

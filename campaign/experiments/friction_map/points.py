@@ -19,15 +19,14 @@ from campaign.identification.ripple import (
     dominant_periods,
     harmonic,
 )
+from campaign.identification.steadiness import TOO_FEW_COUNTS, drifting
 from campaign.identification.steady_sliding import SteadySliding, steady_sliding
 from campaign.physics.bench import Bench
-from campaign.reason import Cause
+from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
 from campaign.units import shown_here
 
-UNSTEADY = 0.25
-"""Share of its mean by which the rate of a window may change, or be uncertain."""
 DESCRIBES = Cause("describes the window", "it describes the window")
 """Why some metrics of a window have no interval."""
 
@@ -63,6 +62,8 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
             cut.angle,
             bench.axis.inertia,
             ripple.periods if ripple else None,
+            # A recording that was imported may have made its rate of an encoder's counts.
+            own_sensor=data.trial.task.mode != "recorded",
         )
         found += _metrics(name, sliding, ripple)
     return tuple(found)
@@ -127,6 +128,9 @@ def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterat
     for word, (value, unit) in plain.items():
         if np.isfinite(value):
             yield Estimate.without_interval(f"{word}_{name}", value, unit, DESCRIBES())
+    for word, reason in (("unsteady", found.unsteady), ("torque_drift", found.drift)):
+        if reason:
+            yield Estimate.without_interval(f"{word}_{name}", 1.0, "", reason)
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,8 @@ class MapPoint:
         first, last: angles between which the window lies (rad); NaN where none was recorded.
         harmonic: the ripple that its run shows, where it is long enough.
         repeat: which repetition it is of.
+        unsteady: why it is no steady sliding; such a point is not fitted.
+        drift: that its torque changes across the window; such a point is fitted.
         ripple: what `without_ripple` has taken out of the torque (N m).
         error: deviation of the torque without its ripple (N m), that of the ripple included; NaN
             where the window shows none.
@@ -159,6 +165,8 @@ class MapPoint:
     harmonic: Harmonic | None
     repeat: int
     error: float
+    unsteady: Reason = NONE
+    drift: Reason = NONE
     ripple: float = 0.0
 
     @property
@@ -166,26 +174,39 @@ class MapPoint:
         """+1 or -1: the direction."""
         return 1.0 if self.speed > 0 else -1.0
 
-    @property
-    def is_steady(self) -> bool:
-        """Whether the load slid all through the window: it neither stuck nor sped up in it."""
-        least = UNSTEADY * abs(self.rate.value)
-        spread = 0.0 if np.isnan(self.rate.half_width) else self.rate.half_width
-        return abs(self.acceleration) * self.window <= least and spread <= least
+
+REMEDY = "raise the gains of the rate loop, settle_angle or max_time, or begin at a higher speed"
+MORE_COUNTS = "raise max_time, max_travel and window_angle, or begin at a higher speed"
 
 
 def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint], list[MapPoint]]:
-    """The points at which the load slid steadily, and the others, which are told in `notes`."""
-    kept = [point for point in points if point.is_steady]
-    left = [replace(p, rule=f"{p.rule}; not steady") for p in points if not p.is_steady]
-    if left:
-        speeds = ", ".join(f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in left)
+    """The points at which the load slid steadily, and the others; `notes` count them by reason."""
+    kept = [_with_rule(point, point.drift) for point in points if not point.unsteady]
+    left = [_with_rule(point, point.unsteady) for point in points if point.unsteady]
+    for code in dict.fromkeys(point.unsteady.code for point in left):
+        own = [point for point in left if point.unsteady.code == code]
+        remedy = MORE_COUNTS if own[0].unsteady in TOO_FEW_COUNTS else REMEDY
         notes.append(
-            f"{len(left)} of {len(points)} points are left out of the fit, for the load did not "
-            f"slide steadily in their windows ({speeds} {unit_here('deg/s')}): raise settle_angle, "
-            "max_time or the integral gain of the rate loop, or begin at a higher speed."
+            f"{len(own)} of {len(points)} points are left out of the fit, for {code} "
+            f"({_speeds(own)}): {remedy}."
+        )
+    if moved := [point for point in kept if point.drift]:
+        notes.append(
+            f"At {len(moved)} of {len(points)} points the torque changes across the window "
+            f"({_speeds(moved)}): running-in, warming, or a ripple that is longer than the "
+            "window. They are fitted; the table of points says by how much."
         )
     return kept, left
+
+
+def _with_rule(point: MapPoint, reason: Reason) -> MapPoint:
+    """The point with a reason behind what set its window."""
+    return replace(point, rule=f"{point.rule}; {reason}") if reason else point
+
+
+def _speeds(points: Sequence[MapPoint]) -> str:
+    told = (f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
+    return f"{', '.join(told)} {unit_here('deg/s')}"
 
 
 def _unknown_inertia(points: Sequence[MapPoint], bench: Bench) -> Iterator[str]:
@@ -225,15 +246,20 @@ def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
         # Of an inertia that nobody knows this is a part of unknown size.
         torque = with_systematic(torque, bench, INERTIA, (bench.axis.inertia or 0.0) * acceleration)
         ripple = None
+        rate, window = found[f"rate_{name}"], windows[name].stop - windows[name].start
+        if f"unsteady_{name}" in found:
+            unsteady = found[f"unsteady_{name}"].reason
+        else:  # as an archive of a program that asked no more
+            unsteady = drifting(acceleration * window, rate.half_width, rate.value)
         if f"ripple_periods_{name}" in found:
             words = ("periods", "cosine", "sine", "error", "centre", "travel")
             ripple = Harmonic(*(found[f"ripple_{word}_{name}"].value for word in words))
         yield MapPoint(
             speed=speed * sign,
-            rate=found[f"rate_{name}"],
+            rate=rate,
             torque=torque,
             spread=found[f"spread_{name}"].value,
-            window=windows[name].stop - windows[name].start,
+            window=window,
             rule=rule,
             acceleration=acceleration,
             first=_value(found, f"first_angle_{name}"),
@@ -241,6 +267,8 @@ def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
             harmonic=ripple,
             repeat=data.trial.repeat,
             error=np.nan if torque.standard_error is None else torque.standard_error,
+            unsteady=unsteady,
+            drift=found[f"torque_drift_{name}"].reason if f"torque_drift_{name}" in found else NONE,
         )
 
 

@@ -8,6 +8,7 @@ the friction coefficient; of it alone where loads differ.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -98,10 +99,13 @@ def _suits(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
 
 
 def _identify(material: Material, options: FrictionMapOptions) -> Identified:
-    points, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
+    found, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
+    points = [point for point in found if not point.own.unsteady]
+    left = [point for point in found if point.own.unsteady]
+    notes = list(_left_out(left, len(found)))
     if not points:
-        raise ValueError("nowhere does the axis slide steadily")
-    notes: list[str] = [] if held is None else [_over_a_turn(held)]
+        raise ValueError(" ".join(["nowhere does the axis slide steadily", *notes]).rstrip("."))
+    notes += [] if held is None else [_over_a_turn(held)]
     quantities = [FRICTION] if loads_alike(points) else []
     quantities += [COEFFICIENT] if loaded(points) else []
     if not quantities:
@@ -123,7 +127,7 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
     return Identified(
         parameters,
         Result(
-            tables=(_points_table(points),),
+            tables=(_points_table(points, left),),
             figures=tuple(_figure(points, each) for each in maps),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
             notes=tuple(dict.fromkeys(notes)),
@@ -213,14 +217,21 @@ def _settings(
     return told
 
 
-def _points_table(points: Sequence[Point]) -> Table:
+def _left_out(left: Sequence[Point], count: int) -> Iterator[str]:
+    """How many stretches are no points, by reason."""
+    for code, number in Counter(point.own.unsteady.code for point in left).items():
+        yield f"{number} of {count} stretches are left out, for {code}."
+
+
+def _points_table(points: Sequence[Point], left: Sequence[Point]) -> Table:
     pressed = loaded(points)
     rows: list[dict[str, Cell]] = []
-    for point in sorted(points, key=lambda point: point.own.rate.value):
+    for point in sorted((*points, *left), key=lambda point: point.own.rate.value):
         row: dict[str, Cell] = {
             "trial": point.trial,
             "rate": point.own.rate,
             "torque": point.own.torque,
+            "left_out": str(point.own.unsteady),
         }
         rows.append(row | {"coefficient": point.coefficient} if pressed else row)
     columns = (
@@ -228,6 +239,7 @@ def _points_table(points: Sequence[Point]) -> Table:
         Column("rate", "Rate", "rad/s", "deg/s"),
         Column("torque", "Friction torque", "N m"),
         *((Column("coefficient", "Friction coefficient"),) if pressed else ()),
+        *((Column("left_out", "Left out"),) if left else ()),
     )
     return Table("stretches", "Steady stretches", columns, tuple(rows))
 
