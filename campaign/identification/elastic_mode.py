@@ -28,6 +28,10 @@ EVIDENCE = 4.0
 """A mode must divide the squared residual of a smooth response by this ..."""
 SMALLEST_PEAK = 0.03
 """... and stand out of it by this share."""
+APART = 0.3
+"""Logarithm of antiresonance over resonance up to which the parabola stands for all else."""
+NEARLY = 0.99
+"""of that is at this bound: the response is no small mode on top of a smooth one."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,11 @@ class ElasticMode:
 
 
 def elastic_mode(response: Response) -> ElasticMode | None:
-    """The most prominent mode of a response; None when the response is smooth without one."""
+    """The most prominent mode of a response.
+
+    None when the response is smooth without one, and where antiresonance and resonance lie too far
+    apart.
+    """
     frequency = response.frequency
     logarithm = np.log(np.maximum(np.abs(response.values), 1e-300)) + 1j * response.phase
     best: tuple[float, float] | None = None
@@ -109,7 +117,7 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
         left = _left(basis, np.asarray(y - _mode(f, p)))
         return np.concatenate([left.real, left.imag])
 
-    lower, upper = [centre / 1.3, 1e-4, -0.3, 1e-4], [centre * 1.3, 0.5, 0.3, 0.5]
+    lower, upper = [centre / 1.3, 1e-4, -APART, 1e-4], [centre * 1.3, 0.5, APART, 0.5]
     fits = [
         least_squares(residual, [centre, 0.03, shift, 0.03], bounds=(lower, upper))
         for shift in (-0.01, 0.01)
@@ -118,7 +126,7 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
     smooth = float(np.sum(np.abs(_left(basis, y)) ** 2))
     explained = smooth / max(2.0 * float(fit.cost), 1e-30)
     peak = float(np.max(np.abs(np.exp(_mode(np.linspace(f[0], f[-1], 2000), fit.x)) - 1.0)))
-    if explained < EVIDENCE or peak < SMALLEST_PEAK:
+    if explained < EVIDENCE or peak < SMALLEST_PEAK or abs(fit.x[2]) > NEARLY * APART:
         return None
     return _mode_found(fit.x, fit.jac, fit.fun, explained)
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from campaign.identification.elastic_mode import elastic_mode
+from campaign.identification.frequency_response import Response
 from tests.identification.coverage import holds, rejected
+from tests.identification.frequency.drives import Drive
 from tests.identification.loops import SWEEP, response
 
 
@@ -36,6 +38,15 @@ def test_a_rigid_axis_has_no_mode() -> None:
     noise = 1 + 0.002 * random.standard_normal(len(SWEEP))
     assert elastic_mode(rigid) is None
     assert elastic_mode(replace(rigid, values=rigid.values * noise)) is None
+
+
+def test_two_masses_of_like_size_are_no_small_mode() -> None:
+    """The antiresonance lies at 0.69 of the resonance: a fit that ends at its bound is none."""
+    drive = Drive(1.0, 1.1, 1.1 * (2 * np.pi * 53.0) ** 2, 20.0, 5.0)
+    frequency = np.arange(20.0, 200.0)
+    found = drive.response(frequency, "motor")
+    error = 1e-4 * np.abs(found)
+    assert elastic_mode(Response(frequency, found, error, np.ones(len(found)))) is None
 
 
 TRUE = (11.0 / np.sqrt(0.98), 0.03 / np.sqrt(0.98), 11.0)

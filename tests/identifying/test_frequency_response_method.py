@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,11 +12,13 @@ from scipy.signal import butter, sosfilt
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, info
 from campaign.estimate import Origin
+from campaign.identification.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
+from campaign.identifying.frequency.found import TOO_FEW
 from campaign.identifying.frequency.repeating import unused
 from campaign.identifying.frequency.signals import base_frequency
-from campaign.identifying.frequency.sources import _lines
+from campaign.identifying.frequency.sources import _lines, by_amplitude
 from campaign.identifying.material import choose
 from campaign.identifying.method import Identified, Material
 from campaign.physics.bench import Bench
@@ -228,12 +230,14 @@ def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
 
 def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(4), "torque", 8.0), driven())
-    # A mode stands out whatever excites it; inertias and stiffness need a fit.
-    assert {each.estimate.name for each in found.parameters} <= {
-        "resonance",
-        "resonance_damping",
-        "antiresonance",
-    }
+    # Between lines a mode stands out; inertias, stiffness and damping need a fit.
+    for name, each in told(found).items():
+        if name in ("resonance", "antiresonance"):
+            assert holds(each.estimate, getattr(DRIVE, name))
+        elif "damping" in name and name != "damping":
+            assert each.estimate.reason in NEEDS_A_FIT
+        else:
+            assert each.estimate.reason in TOO_FEW
     assert not any(each.bench for each in found.parameters)
     assert any("7 are the fewest" in note for note in found.result.notes)
     assert all("record 7 realisations" in each.advice for each in found.parameters)
@@ -263,9 +267,79 @@ def test_lines_that_no_command_names_stand_out_by_a_gap() -> None:
 def test_one_realisation_tells_the_level_of_distortion_and_the_mode(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(1), "torque", 16.0), driven())
     parameters = told(found)
-    assert holds(parameters["resonance"].estimate, DRIVE.resonance)
-    assert not {"total_inertia", "stiffness"} & set(parameters)
+    for name in ("resonance", "antiresonance"):
+        estimate = parameters[name].estimate
+        assert holds(estimate, getattr(DRIVE, name))
+        # Its lines are half a hertz apart, or more where one was left out.
+        assert estimate.high - estimate.low >= 1.0
+    assert parameters["stiffness"].estimate.reason in TOO_FEW
     assert any("A mode stands out" in str(each.parts[0]) for each in found.result.conclusions)
+
+
+def test_of_a_single_period_no_mode_is_told(tmp_path: Path) -> None:
+    """Nothing shows how far its lines scatter: the page says so, and what to record."""
+    found = identified(tmp_path, trials(tmp_path, multisines(1), "torque", PERIOD), driven())
+    assert {each.estimate.origin for each in found.parameters} == {Origin.NOT_DETERMINED}
+    assert told(found)["resonance"].estimate.reason in NO_SCATTER
+    said = " ".join(str(each.parts[0]) for each in found.result.conclusions)
+    assert "Not determined: resonance" in said
+    assert "record 7 realisations" in said
+
+
+def recorded_twice(
+    folder: Path, count: int, conditions: Mapping[str, object]
+) -> tuple[list[Trial], list[MultiSine]]:
+    """Recordings from elsewhere, `count` of 5 N m and `count` of half of it, in turns."""
+    folder.mkdir()
+    sizes = [5.0, 2.5] * count
+    commands = [random_phases(GRID, size, seed) for seed, size in enumerate(sizes)]
+    made = [
+        each.model_copy(update={"point": {k: v for k, v in conditions.items() if number % 3}})
+        for number, each in enumerate(trials(folder, commands, "recorded", 8.0))
+    ]
+    return made, commands
+
+
+@pytest.mark.parametrize("conditions", [{}, {"amplitude": "5 N m"}])
+def test_recordings_are_grouped_by_their_recorded_amplitude(
+    tmp_path: Path, conditions: dict[str, object]
+) -> None:
+    """Whatever is stated of it: some of these are stated falsely."""
+    made, _ = recorded_twice(tmp_path / "one", 4, conditions)
+    found = identified(tmp_path / "one", made, driven(), without=(COMMAND,), excited="input")
+    rows = next(t for t in found.result.tables if t.key == "responses").rows
+    assert [row["trials"] for row in rows] == [4, 4]
+    for row, rms in zip(rows, (5, 2.5), strict=True):
+        assert f"rms {rms} N·m, crest" in str(row["excitation"])
+        assert "4 realisations of 2 periods" in str(row["excitation"])
+    assert any("rms 5 N·m (4 trials), rms 2.5 N·m (4 trials)" in n for n in found.result.notes)
+    # Neither has enough, and each number that is missing has its reason.
+    for each in found.parameters:
+        assert each.estimate.has_interval or each.estimate.reason
+        assert "record 7 realisations" in each.advice
+    assert told(found)["stiffness"].estimate.reason in TOO_FEW
+
+
+@pytest.mark.slow
+def test_two_amplitudes_recorded_elsewhere_tell_what_friction_adds(tmp_path: Path) -> None:
+    made, commands = recorded_twice(tmp_path / "two", 7, {})
+    answer = rubbing(commands, 8.0)
+    found = identified(tmp_path / "two", made, answer, without=(COMMAND,), excited="input")
+    total = told(found)["total_inertia"].estimate
+    assert total.systematic_uncertainty > 0
+    assert holds(total, DRIVE.motor + DRIVE.load)
+
+
+def test_realisations_of_one_amplitude_are_kept_together() -> None:
+    """A torque loop and noise change their rms by a few percent, another command by more."""
+    sizes = [1.0, 0.97, 1.04, 0.5, 0.52]
+    wave = np.sin(2 * np.pi * np.arange(256) / 64)
+    told = [
+        (None, SimpleNamespace(number=k, rate=64.0, leading=np.r_[np.zeros(128 * k), size * wave]))
+        for k, size in enumerate(sizes)
+    ]
+    groups = by_amplitude(told, 2.0)  # type: ignore[arg-type]
+    assert [[signal.number for _, signal in group] for group in groups] == [[0, 1, 2], [3, 4]]
 
 
 def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:

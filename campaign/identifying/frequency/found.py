@@ -11,6 +11,7 @@ import numpy as np
 from campaign.identification.elastic_mode import ElasticMode, elastic_mode
 from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.drive import TwoMass
+from campaign.identification.frequency.extrema import extrema, relative_scatter
 from campaign.identification.frequency.margins import chosen_margins, measured_margins
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency.modes import Mode, chosen_modes
@@ -21,19 +22,27 @@ from campaign.identification.servo import ServoCharacteristics
 from campaign.identifying.frequency.axis_numbers import (
     UNKNOWN,
     Weaker,
+    by_rule,
     odd_distortion,
     of_axis,
 )
 from campaign.identifying.frequency.sources import Source, fitted_part
 from campaign.physics.bench import Bench
+from campaign.reason import NONE, Cause, Reason
 
 TOLD_APART = 10.0
 """Schwarz' criterion by which one place of the sensor must fit better than the other."""
-AMBIGUOUS = (
+AMBIGUOUS = Cause(
+    "place of the sensor not known",
     "the response is that of a sensor at the driven inertia as well as behind the spring: say "
-    "which (place), or excite up to above the antiresonance"
+    "which (place), or excite up to above the antiresonance",
 )
-
+TOO_FEW = Cause(
+    "too few realisations",
+    "{realisations} realisations tell no variance to weigh a fit with; {fewest} are the fewest",
+)
+NOTHING_FITTED = Cause("no response fitted", "no response could be fitted")
+NO_FIT = Cause("fit failed", "{error}")
 
 NARROWER = (2.0, 4.0, 8.0)
 """times the first frequency: from there on two inertias are tried where friction bends the rest."""
@@ -55,7 +64,8 @@ class Found:
     """What one source comes to.
 
     Attributes:
-        fits, modes: by side; a side is missing where nothing could be fitted.
+        fits, modes: by side; a side is missing where nothing could be fitted. Modes of too few
+            realisations are extrema of the response, with friction's part.
         local: modes on top of a response that no function fits, by side.
         margins: of its loop, by a fit where one fits and else between the points.
         loop_fit: of its loop.
@@ -86,7 +96,7 @@ class Masses:
 
     drive: TwoMass | None
     source: Source | None
-    reason: str = ""
+    reason: Reason = NONE
     axis: TwoMass | None = None
     places: Mapping[Side, Side] = field(default_factory=dict)
     how: str = ""
@@ -103,8 +113,13 @@ def found_in(source: Source, band: Band) -> Found:
     """Fits, modes and margins of one source."""
     fits: dict[Side, Chosen] = {}
     remarks: list[str] = []
-    if few := _too_few(source):
-        remarks.append(f"{source.name}: {few}")
+    modes: dict[Side, tuple[Mode, ...]] = {}
+    if few := too_few(source):
+        remarks.append(
+            f"{source.name}: {few}: no function is fitted. Modes are extrema of the response, "
+            "between its lines."
+        )
+        modes = {side: _extrema(source, side, band) for side in source.best}
     else:
         for side in source.responses:
             part = fitted_part(source, side, band.lowest, band.highest)
@@ -112,7 +127,7 @@ def found_in(source: Source, band: Band) -> Found:
                 fits[side] = chosen_order(part, band.order)
             except ValueError as error:
                 remarks.append(f"{source.name}, {side}: {error}.")
-    modes = {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
+    modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
     local: dict[Side, ElasticMode] = {}
     for side in source.responses:
         if side in modes:
@@ -129,16 +144,25 @@ def found_in(source: Source, band: Band) -> Found:
     return Found(source, fits, modes, local, margins, loop_fit, tuple(remarks))
 
 
-def _too_few(source: Source) -> str:
-    """Why nothing is fitted to repeated multisines; empty where there are enough."""
-    for best in source.best.values():
-        few = best.excitation.realisations
-        if few < FEWEST_REALISATIONS:
-            return (
-                f"{few} realisations tell no variance to weigh a fit with; {FEWEST_REALISATIONS} "
-                "are the fewest: modes and parameters are not determined."
-            )
-    return ""
+def too_few(source: Source) -> Reason:
+    """Why nothing is fitted to repeated multisines; false where there are enough."""
+    few = [best.excitation.realisations for best in source.best.values()]
+    if min(few, default=FEWEST_REALISATIONS) < FEWEST_REALISATIONS:
+        return TOO_FEW(realisations=min(few), fewest=FEWEST_REALISATIONS)
+    return NONE
+
+
+def _extrema(source: Source, side: Side, band: Band) -> tuple[Mode, ...]:
+    measured, scatter = source.responses[side], relative_scatter(source.best[side])
+    kept = (measured.frequency >= band.lowest) & (measured.frequency <= band.highest)
+    told = extrema(
+        measured.frequency[kept],
+        np.abs(measured.values[kept]),
+        None if scatter is None else scatter[kept],
+    )
+    # Much friction damps a mode away, and has extrema of its own.
+    odd = odd_distortion(source)
+    return tuple(replace(mode, frequency=by_rule(mode.frequency, odd)) for mode in told)
 
 
 def _margins(
@@ -189,7 +213,7 @@ def masses(
         others: further sources: one of less excitation tells how far friction bends the response.
     """
     if found is None:
-        return Masses(None, None, "no response could be fitted")
+        return Masses(None, None, NOTHING_FITTED())
     source = found.source
     first = min(float(each.frequency[0]) for each in source.responses.values())
     try:
@@ -205,7 +229,7 @@ def masses(
             return replace(told, axis=told.drive)
         return _with_axis(told, source, [each.source for each in others], band)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return Masses(None, source, str(error))
+        return Masses(None, source, NO_FIT(error=str(error)))
 
 
 def _narrower(
@@ -242,7 +266,7 @@ def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float 
         if len(fits) > 1:
             apart = tried["driven"].criterion - tried["behind"].criterion
             if abs(apart) < TOLD_APART:
-                return Masses(None, source, AMBIGUOUS)
+                return Masses(None, source, AMBIGUOUS())
             fits = ["behind"] if apart > 0 else ["driven"]
         place = fits[0]
         how = "" if tried[place].rigid else "the response fits that place better"

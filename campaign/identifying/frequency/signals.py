@@ -54,6 +54,11 @@ class Signals:
     channels: Mapping[Side, str]
     reference: Array | None
 
+    @property
+    def leading(self) -> Array:
+        """What was excited: the reference, or the torque where there is none, shape (n,)."""
+        return self.torque if self.reference is None else self.reference
+
     def is_angle(self, side: Side) -> bool:
         """Whether the answer of that side is an angle and no rate."""
         return self.channels[side] in ANGLES

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,8 +39,17 @@ GAP = 3.0
 """Ratio of neighbours in size from which on the smaller is none of the excited lines."""
 HANN_APART = 2
 """Lines of a Hann window from which on neighbours hardly know of each other."""
+SAME_SIZE = 1.1
+"""Ratio of neighbouring rms below which recordings are realisations of one amplitude. Realisations
+of one command have the same rms whatever their phases, and noise and a torque loop add a few
+percent; amplitudes that are to tell friction's part differ by a quarter or more."""
 EXCITED_SHARE = 0.03
 """of the largest line of a reference, in amplitude, from which on a line counts as excited."""
+
+
+SIZES = ("amplitude", "rms")
+"""Names of conditions that state the amplitude of a multisine, which is measured."""
+Recorded = tuple[ArchivedTrial, Signals]
 
 
 @dataclass(frozen=True)
@@ -92,34 +102,84 @@ def sources(
     for trial in trials:
         groups.setdefault(_key(trial, how), []).append(trial)
     found, remarks = [], list(unused(trials, bench))
-    for (kind, *_), group in groups.items():
+    for (kind, *_, period), group in groups.items():
         make = {"sines": _of_sines, "multisine": _of_multisine, "records": _of_records}[kind]
         label = _label(group)
         try:
-            found.append(make(label, group, bench, how))
+            told, lost = _all_signals(group, bench, how)
         except ValueError as error:
             remarks.append(f"{label}: {error}.")
+            continue
+        remarks += lost
+        parts = {label: told}
+        if kind == "multisine":
+            sized = [
+                (_size(part, float(period)), part) for part in by_amplitude(told, float(period))
+            ]
+            parts = {f"{label}, {size}": part for size, part in sized}
+            if len(sized) > 1:
+                sizes = ", ".join(f"{size} ({len(part)} trials)" for size, part in sized)
+                remarks.append(f"{label}: grouped by the recorded rms of the excitation: {sizes}.")
+        for name, part in parts.items():
+            try:
+                found.append(make(name, part, how))
+            except ValueError as error:
+                remarks.append(f"{name}: {error}.")
     return found, remarks
+
+
+def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:
+    """Groups of one rms of what was excited, the largest first; within each by number of trial.
+
+    A new group begins where neighbours in size differ by more than `SAME_SIZE`.
+
+    Args:
+        period: of the excitation (s).
+    """
+    sizes = {signal.number: _rms(signal.leading, signal, period) for _, signal in told}
+    falling = sorted(told, key=lambda each: -sizes[each[1].number])
+    groups = [falling[:1]]
+    for (_, before), each in pairwise(falling):
+        if sizes[before.number] > SAME_SIZE * sizes[each[1].number]:
+            groups.append([])
+        groups[-1].append(each)
+    return [sorted(group, key=lambda each: each[1].number) for group in groups]
+
+
+def _rms(samples: Array, signal: Signals, period: float) -> float:
+    """Of the last period without its mean: before, there may be rest, or a transient."""
+    return float(np.nanstd(samples[-round(period * signal.rate) :]))
+
+
+def _size(told: Sequence[Recorded], period: float) -> str:
+    """The rms of one amplitude, in words; of a recording that of its torque: its unit is known."""
+    trial, first = told[0]
+    mode = trial.trial.task.mode
+    rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
+    return f"rms {rate_here(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"
 
 
 def _key(trial: ArchivedTrial, how: Reading) -> tuple[str, ...]:
     """Trials of the same key are one measurement."""
     task, command = trial.trial.task, trial.trial.task.command
     own = {"frequency", "seed", "realisation", "realization"}
-    point = [f"{k}={v}" for k, v in trial.trial.point.items() if k.rsplit(".", 1)[-1] not in own]
-    common = (trial.trial.test, task.mode, task.compensation, *point)
+    point = {k: v for k, v in trial.trial.point.items() if k.rsplit(".", 1)[-1] not in own}
+
+    def common(but: Collection[str] = ()) -> tuple[str, ...]:
+        stated = [f"{k}={v}" for k, v in point.items() if k.rsplit(".", 1)[-1] not in but]
+        return (trial.trial.test, task.mode, task.compensation, *stated)
+
     if isinstance(command, Sine) and task.mode in ("rate", "torque"):
-        return ("sines", *common)
+        return ("sines", *common())
     if isinstance(command, MultiSine) and task.mode in ("rate", "torque"):
         period = _period(command, task.duration)
-        rms = _rms(command)
         if period is not None:
             lines = ",".join(f"{each * period:.0f}" for each in command.frequencies)
-            return ("multisine", *common, f"{rms:.3g}", lines, f"{period:.9g}")
+            return ("multisine", *common(SIZES), lines, f"{period:.9g}")
     found = how.period if how.period is not None else repeated(trial, how.excited)
     if found is not None and task.duration >= found:
-        return ("multisine", *common, f"{found:.9g}")
-    return ("records", *common)
+        return ("multisine", *common(SIZES), f"{found:.9g}")
+    return ("records", *common())
 
 
 def _period(command: MultiSine, duration: float) -> float | None:
@@ -130,19 +190,15 @@ def _period(command: MultiSine, duration: float) -> float | None:
 
 def _label(group: Sequence[ArchivedTrial]) -> str:
     first = group[0].trial
-    command, mode = first.task.command, first.task.mode
-    told = [first.test, mode]
+    told = [first.test, first.task.mode]
     if first.task.compensation != "none":
         told.append(first.task.compensation)
-    if isinstance(command, MultiSine):
-        rms = _rms(command)
-        told.append(f"rms {rate_here(rms) if mode == 'rate' else f'{rms:.3g} N·m'}")
     return ", ".join(told)
 
 
 def _all_signals(
     group: Sequence[ArchivedTrial], bench: Bench, how: Reading
-) -> tuple[list[tuple[ArchivedTrial, Signals]], list[str]]:
+) -> tuple[list[Recorded], list[str]]:
     found, remarks = [], []
     for trial in group:
         try:
@@ -161,8 +217,8 @@ def _as_rates(measured: MeasuredResponse, told: Signals, side: Side) -> Measured
     return measured.times(np.asarray(2j * np.pi * measured.frequency))
 
 
-def _of_sines(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: Reading) -> Source:
-    told, remarks = _all_signals(group, bench, how)
+def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
+    remarks: list[str] = []
     points: dict[Side, list[SinePoint]] = {side: [] for side in told[0][1].answers}
     loop = []
     for trial, signal in told:
@@ -214,8 +270,8 @@ def _steady(trial: ArchivedTrial, time: Array) -> slice:
     return slice(int(first), int(last))
 
 
-def _of_multisine(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: Reading) -> Source:
-    told, remarks = _all_signals(group, bench, how)
+def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
+    remarks: list[str] = []
     rate = told[0][1].rate
     period = _period_of(told[0][0], how)
     if how.period is None and not isinstance(told[0][0].trial.task.command, MultiSine):
@@ -272,11 +328,8 @@ def _named(best: BestLinear, trial: ArchivedTrial) -> str:
     command = trial.trial.task.command
     if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
         return torque
-    return f"{torque}, of a rate of rms {rate_here(_rms(command))} that was asked for"
-
-
-def _rms(command: MultiSine) -> float:
-    return float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
+    rms = float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
+    return f"{torque}, of a rate of rms {rate_here(rms)} that was asked for"
 
 
 def _loop_of(
@@ -323,8 +376,7 @@ def _lines(trial: ArchivedTrial, period: float, leading: Array, periods: int) ->
     return np.flatnonzero(size > least).astype(np.int64)
 
 
-def _of_records(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: Reading) -> Source:
-    told, remarks = _all_signals(group, bench, how)
+def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     rates = {round(signal.rate, 6) for _, signal in told}
     if len(rates) > 1:
         raise ValueError("its trials were sampled at different rates")
@@ -353,19 +405,16 @@ def _of_records(name: str, group: Sequence[ArchivedTrial], bench: Bench, how: Re
         responses,
         closed,
         every=HANN_APART,
-        remarks=tuple(remarks),
     )
 
 
-def _what_is_excited(told: Sequence[tuple[ArchivedTrial, Signals]], how: Reading) -> Excitation:
+def _what_is_excited(told: Sequence[Recorded], how: Reading) -> Excitation:
     if how.excited != "auto":
         return how.excited
     return "input" if told[0][0].trial.task.mode == "torque" else "reference"
 
 
-def _records(
-    told: Sequence[tuple[ArchivedTrial, Signals]], side: Side, shortest: int, what: str | None
-) -> list[Record]:
+def _records(told: Sequence[Recorded], side: Side, shortest: int, what: str | None) -> list[Record]:
     """Stretches without a lost sample; `what`: `error` for reference less output as the input."""
     records = []
     for _, signal in told:

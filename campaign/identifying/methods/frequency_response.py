@@ -23,7 +23,15 @@ from campaign.identification.intervals import MODEL_MISFIT
 from campaign.identifying.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identifying.frequency.distortion_tables import distortion_tables
 from campaign.identifying.frequency.figures import figures
-from campaign.identifying.frequency.found import Band, Found, Masses, best_source, found_in, masses
+from campaign.identifying.frequency.found import (
+    Band,
+    Found,
+    Masses,
+    best_source,
+    found_in,
+    masses,
+    too_few,
+)
 from campaign.identifying.frequency.signals import Excited, usable
 from campaign.identifying.frequency.sources import Reading, sources
 from campaign.identifying.frequency.tables import (
@@ -108,7 +116,7 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
     band = Band(options.lowest, options.highest, options.order)
     found = [found_in(each, band) for each in measured]
     best = best_source(found)
-    found.sort(key=lambda each: each is not best)  # what tells most comes first
+    found.sort(key=lambda each: (each is not best, -each.source.rms))  # what tells most comes first
     torque = _torque_uncertainty(material.bench)
     told = masses(best, material.bench, options.place, band, torque, found)
     parameters = tuple(_parameters(told, best or found[0]))
@@ -142,6 +150,7 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
             notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
             conclusions=(
                 *_conclusions(best or found[0], told),
+                *_undetermined(parameters),
                 *validation_conclusions(validation),
             ),
         ),
@@ -181,23 +190,18 @@ def _torque_uncertainty(bench: Bench) -> float | None:
 
 
 def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
-    if told.drive is None:
-        local = _local_of_axis(told, best)
-        counts = [each.excitation.realisations for each in best.source.best.values()]
-        few = bool(counts) and min(counts) < FEWEST_REALISATIONS
-        for name, meaning, unit, advice in MEANINGS:
-            if name in local:
-                yield Parameter(local[name], meaning, unit, "", MORE_PHASES if few else advice)
-        return
     hangs_on_load = dict(told.places) == {"load": "motor"}
-    if told.drive.misfit:
-        reason = MODEL_MISFIT(why=told.drive.misfit)
+    if told.drive is None or told.drive.misfit:
+        few = too_few(best.source)
+        reason = few or told.reason
+        if told.drive is not None:
+            reason = MODEL_MISFIT(why=told.drive.misfit)
         local = _local_of_axis(told, best)
         for name, meaning, unit, advice in MEANINGS:
             nothing = Estimate.without_interval(name, math.nan, unit, reason)
             estimate = local.get(name, nothing)
             key = APPENDAGE.get(name, "") if hangs_on_load and estimate.has_interval else ""
-            yield Parameter(estimate, meaning, unit, key, advice)
+            yield Parameter(estimate, meaning, unit, key, MORE_PHASES if few else advice)
         return
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
     for name, meaning, unit, advice in MEANINGS:
@@ -210,10 +214,15 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
 
 
 def _local(told: Masses, best: Found) -> dict[str, Estimate]:
-    """A mode on top of a smooth response, where no model of the whole drive fits, by name.
+    """Numbers of a mode where no model of the whole drive fits, by name: extrema, of too few
+    realisations, and else a mode on top of a smooth response.
 
-    Its antiresonance is that of a part behind the spring only for a sensor at the driven inertia.
+    The antiresonance of the latter is that of a part behind the spring only for a sensor at the
+    driven inertia. An extremum below the resonance is there for no other.
     """
+    if too_few(best.source):
+        extrema = best.modes.get("motor", best.modes.get("load", ()))
+        return {one.name: one for mode in extrema for one in (mode.frequency, mode.damping)}
     if not best.local:
         return {}
     side: Side = "motor" if "motor" in best.local else "load"
@@ -225,8 +234,8 @@ def _local(told: Masses, best: Found) -> dict[str, Estimate]:
 
 
 def _local_of_axis(told: Masses, best: Found) -> dict[str, Estimate]:
-    """The same, with friction's part."""
-    odd = odd_distortion(best.source)
+    """The same, with friction's part, which extrema have."""
+    odd = 0.0 if too_few(best.source) else odd_distortion(best.source)
     return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
 
 
@@ -292,9 +301,10 @@ def _early(found: Sequence[Found]) -> Iterator[str]:
 def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
     drive = told.drive if told.bent else told.axis
     local = _local(told, best)
-    if (drive is None or drive.misfit) and "resonance" in local:
+    stands_out = [name for name, each in local.items() if each.has_interval]
+    if (drive is None or drive.misfit) and "resonance" in stands_out:
         mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
-        if "antiresonance" in local:
+        if "antiresonance" in stands_out:
             mode += [", with an antiresonance at ", Amount(local["antiresonance"], "Hz")]
         yield Conclusion((*mode, "; no two inertias on a spring were found."))
     whose = "At this excitation the response is that of a drive that" if told.bent else "The drive"
@@ -316,6 +326,19 @@ def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
     if margins.phase_margin.has_interval:
         margin = Amount(margins.phase_margin, "deg")
         yield Conclusion(("The rate loop has a phase margin of ", margin, "."))
+
+
+def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
+    """Where no number is determined: which, why, and what to measure."""
+    if any(each.estimate.origin is Origin.MEASURED for each in parameters):
+        return
+    alike: dict[tuple[str, str], list[str]] = {}
+    for each in parameters:
+        why = str(each.estimate.reason), each.advice
+        alike.setdefault(why, []).append(each.estimate.name.replace("_", " "))
+    for (reason, advice), names in alike.items():
+        told = f"Not determined: {', '.join(names)}. Reason: {reason}. To measure: {advice}."
+        yield Conclusion((told,))
 
 
 METHOD = Method(

@@ -1,0 +1,92 @@
+"""Extrema of few realisations hold the modes of drives, and a free inertia has none."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from campaign.identification.frequency.best_linear import BestLinear, best_linear
+from campaign.identification.frequency.extrema import (
+    NO_EXTREMUM,
+    NO_SCATTER,
+    extrema,
+    relative_scatter,
+)
+from campaign.identification.frequency.modes import Mode
+from campaign.identification.frequency.multisine import odd_grid, random_phases
+from tests.identification.coverage import holds, rejected
+from tests.identification.frequency.drives import Drive, random_drive, with_coulomb
+
+RATE, PERIOD = 512, 4.0
+SAMPLES = int(RATE * PERIOD)
+
+
+def measured(
+    drive: Drive, seed: int, realisations: int = 1, periods: int = 2, friction: float = 0.0
+) -> BestLinear:
+    """Motor rate with 1 % of noise, a period after rest; friction as a share of the rms torque."""
+    grid = odd_grid(1.0, 120.0, PERIOD, seed)
+    commands = [random_phases(grid, 1.0, 1000 * seed + k) for k in range(realisations)]
+    count = (periods + 1) * SAMPLES
+    half = np.array([each.sample(np.arange(2 * count + 2) / (2 * RATE)) for each in commands])
+    if friction:
+        rate = with_coulomb(drive, friction, lambda at: half[:, round(at * 2 * RATE)], count, RATE)
+    else:
+        rate = drive.rates(half, 2 * RATE)[0, :, : 2 * count : 2]
+    rate = rate[:, SAMPLES:]
+    random = np.random.default_rng(seed)
+    noisy = rate + 0.01 * np.std(rate) * random.standard_normal(rate.shape)
+    torque = half[:, 2 * SAMPLES : 2 * count : 2]
+    return best_linear(torque, noisy, RATE, periods, grid.excited)
+
+
+def modes(best: BestLinear) -> tuple[Mode, Mode]:
+    gain = np.abs(best.response.values)
+    return extrema(best.response.frequency, gain, relative_scatter(best))
+
+
+@pytest.mark.parametrize(
+    ("benches", "realisations", "friction"),
+    [
+        (40, 1, 0.0),
+        (40, 3, 0.0),
+        pytest.param(40, 1, 0.03, marks=pytest.mark.slow),
+    ],
+)
+def test_intervals_hold_the_modes_of_two_mass_drives(
+    benches: int, realisations: int, friction: float
+) -> None:
+    """Those of the axis, also with friction of 3 % of the torque."""
+    held: dict[str, list[bool]] = defaultdict(list)
+    random = np.random.default_rng(31)
+    for seed in range(benches):
+        drive = random_drive(random)
+        best = measured(drive, seed, realisations, friction=friction)
+        for mode in modes(best):
+            if not mode.frequency.has_interval:
+                continue
+            low, value, high = mode.frequency.low, mode.frequency.value, mode.frequency.high
+            assert low < value < high
+            lines = best.response.frequency
+            assert np.count_nonzero((lines >= low) & (lines <= high)) >= 3
+            truth = drive.antiresonance if mode.is_zero else drive.resonance
+            held[mode.frequency.name].append(holds(mode.frequency, truth))
+    assert all(len(each) > 0.7 * benches for each in held.values())
+    assert rejected(held, "less") == {}
+
+
+@pytest.mark.parametrize("realisations", [1, 3])
+def test_a_free_inertia_has_no_extremum(realisations: int) -> None:
+    drive = Drive(1.0, 1e-6, 1.0, 1e-3, 1.0)
+    for seed in range(20):
+        for mode in modes(measured(drive, seed, realisations)):
+            assert mode.frequency.reason in NO_EXTREMUM
+
+
+def test_one_period_of_one_realisation_does_not_show_its_scatter() -> None:
+    drive = random_drive(np.random.default_rng(1))
+    for mode in modes(measured(drive, 1, periods=1)):
+        assert mode.frequency.reason in NO_SCATTER
+        assert not mode.frequency.has_interval
