@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.reason import Cause
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,11 @@ BATCHES = 10
 each other (AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""
 USELESS = 0.5
 """Half-width over value from which on a parameter counts as not determined."""
+WIDEST = 0.5 * math.log(1e3)
+"""Largest half-width of an interval in the logarithm: a factor of a thousand from end to end."""
+LARGEST = 700.0
+"""Largest logarithm, either sign, whose exponential and multiples of it are still finite."""
+SPANS_DECADES = Cause("spans decades", "its interval spans more than a factor of a thousand")
 
 
 def student(freedom: float, level: float = LEVEL) -> float:
@@ -89,8 +95,26 @@ def of_positive_repeats(
 
 
 def exponential(logarithm: Estimate, unit: str) -> Estimate:
-    """The estimate of x from one of ln x; its standard error by the delta method."""
-    value = math.exp(logarithm.value)
+    """The estimate of x from one of ln x; its standard error by the delta method.
+
+    *Not determined*, and without an interval, where that spans decades or x is beyond any size.
+    """
+    beyond = abs(logarithm.value) > LARGEST
+    value = math.nan if beyond else math.exp(logarithm.value)
+    ends = (end for end in (logarithm.low, logarithm.high) if end is not None)
+    if beyond or any(abs(end - logarithm.value) > WIDEST for end in ends):
+        return replace(
+            logarithm,
+            value=value,
+            unit=unit,
+            low=None,
+            high=None,
+            level=None,
+            standard_error=None,
+            freedom=None,
+            origin=Origin.NOT_DETERMINED,
+            reason=SPANS_DECADES(),
+        )
     error = logarithm.standard_error
     return replace(
         logarithm,

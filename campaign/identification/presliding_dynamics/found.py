@@ -9,10 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.intervals import LEVEL, judged, shifted_by, student, with_error
+from campaign.identification.intervals import (
+    LEVEL,
+    SPANS_DECADES,
+    WIDEST,
+    judged,
+    shifted_by,
+    student,
+    with_error,
+)
 from campaign.identification.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.identification.presliding_dynamics.fitted import Fitted
-from campaign.identification.presliding_dynamics.parameters import FARTHEST, LOGARITHMIC
+from campaign.identification.presliding_dynamics.parameters import LOGARITHMIC
 from campaign.identification.presliding_dynamics.plant import Array, Plant
 from campaign.identification.presliding_dynamics.record import Assumed, Record
 from campaign.identification.presliding_dynamics.shape import SURELY, Misfit, misfit_of
@@ -119,10 +127,9 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
     name = fit.parameters.names[index]
     value, scale = fit.parameters.in_units(fit.vector, name)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
-    if name in LOGARITHMIC and deviation > FARTHEST:
-        reason = "its interval spans more than a factor of a thousand"
-        return replace(_without(fit, name, reason), origin=Origin.NOT_DETERMINED)
     quantile = student(freedom)
+    if name in LOGARITHMIC and quantile * deviation > WIDEST:
+        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
     ends = [float(fit.vector[index]) + way * quantile * deviation for way in (-1.0, 1.0)]
     size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
     if name in PROFILED and CURVED * size < deviation < size:
