@@ -1,12 +1,13 @@
 """Every error a user can cause or meet, and the exit code each one means.
 
-The codes are part of the public interface (README, `docs/commands.md`):
+The codes are part of the public interface (`docs/commands.md`):
 
 ====  =======================================================================
 code  meaning
 ====  =======================================================================
 0     done
 1     some trials failed
+6     trials completed, and a test has no result, or nothing could be identified
 2     bad usage, protocol or bench file, or no such run
 3     a fault of a backend or of another plug-in, or a limit (also a plan that breaks one)
 4     an unreadable or damaged archive, or one without the signature it should have
@@ -17,6 +18,8 @@ code  meaning
 
 from __future__ import annotations
 
+import os
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -32,6 +35,7 @@ class ExitCode(IntEnum):
     LIMIT_OR_FAULT = 3
     ARCHIVE = 4
     NOT_SAFE = 5
+    NO_RESULT = 6
     INTERRUPTED = 130
 
 
@@ -41,6 +45,7 @@ PRECEDENCE = (
     ExitCode.LIMIT_OR_FAULT,
     ExitCode.ARCHIVE,
     ExitCode.USAGE,
+    ExitCode.NO_RESULT,
     ExitCode.TRIALS_FAILED,
     ExitCode.DONE,
 )
@@ -51,6 +56,16 @@ def worst_exit_code(codes: Sequence[ExitCode]) -> ExitCode:
     return next((code for code in PRECEDENCE if code in codes), ExitCode.DONE)
 
 
+DEBUG = "CAMPAIGN_DEBUG"
+"""Environment variable that asks for tracebacks."""
+
+
+def explain_in_debug() -> None:
+    """Print the traceback of the error that is being handled, where `DEBUG` asks for it."""
+    if os.environ.get(DEBUG):
+        traceback.print_exc()
+
+
 class CampaignError(Exception):
     """An error with one clear message for the user: what, where, what to do."""
 
@@ -59,6 +74,12 @@ class CampaignError(Exception):
 
 class UsageError(CampaignError):
     """A command, option, name or file that cannot be used as given."""
+
+
+class NoResultError(CampaignError):
+    """Trials completed, and nothing that was asked for could be found in them."""
+
+    exit_code = ExitCode.NO_RESULT
 
 
 @dataclass(frozen=True)

@@ -318,6 +318,21 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Doubt:
+    """What is wrong with the recording of a trial.
+
+    Attributes:
+        number, label: of the trial.
+        fatal: whether the analysis does without it.
+    """
+
+    number: int
+    label: str
+    reason: Reason
+    fatal: bool
+
+
+@dataclass(frozen=True)
 class Result:
     """What one test's analysis found.
 
@@ -325,6 +340,8 @@ class Result:
         notes: sentences for the report: caveats, assumptions, what failed and why.
         conclusions: what the test comes to, the most important sentence first.
         telling: key of the figure that tells it best; "" for the first.
+        doubts: recordings that something is wrong with; `notes` say the same. Whoever calls an
+            analysis adds them.
     """
 
     tables: tuple[Table, ...] = ()
@@ -333,3 +350,14 @@ class Result:
     notes: tuple[str, ...] = ()
     conclusions: tuple[Conclusion, ...] = ()
     telling: str = ""
+    doubts: tuple[Doubt, ...] = ()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing but sentences."""
+        return not (self.tables or self.figures or self.findings)
+
+    @property
+    def left_out(self) -> tuple[Doubt, ...]:
+        """Of the trials that it does without."""
+        return tuple(each for each in self.doubts if each.fatal)

@@ -12,9 +12,10 @@ from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of_test
 from campaign.archive.reading.sound_samples import Trials, damaged_records, without_damaged
-from campaign.axis_kind import BOTH_ROTARY, Sides
-from campaign.errors import ArchiveError, UsageError
+from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, words_here
+from campaign.errors import ArchiveError, UsageError, explain_in_debug
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
+from campaign.experiments.preparing.unusable import notes_on
 from campaign.physics.bench import Bench
 from campaign.published.evidence import Evidence, evidence_of
 from campaign.published.provenance import NOTHING_ALTERED, Provenance, provenance_of
@@ -30,7 +31,7 @@ MOVES_NOTHING = ("name", "description", "limits")
 NOT_EXECUTED = "none of its trials was executed"
 NOT_READABLE = "none of its trials can be read"
 GONE_ON = "the run was gone on with on a changed bench"
-MEASURE_ANEW = "; `campaign report --measure-anew` does without the metrics that are archived"
+MEASURE_ANEW = "; `campaign report --measure-anew` does without the archived metrics, and works"
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,26 @@ class AnalysedTest:
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
         return tuple(t for t in self.trials if t.ending.outcome is not Outcome.COMPLETED)
+
+    @property
+    def lacks_result(self) -> bool:
+        """Whether measurements completed, and nothing was found in any of them."""
+        done = any(
+            each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
+            for each in self.trials
+        )
+        measures = self.experiment is not None and self.experiment.measure is not None
+        wanted = measures or bool(self.result.left_out)
+        return done and (bool(self.problem) or (wanted and self.result.is_empty))
+
+    @property
+    def account(self) -> tuple[str, ...]:
+        """What an analysis that did not fail does without: trials, or any result, and why."""
+        with speaking_of(self.sides):
+            told = tuple(map(words_here, notes_on(self.result.left_out, len(self.trials))))
+        if told or self.problem or not self.lacks_result:
+            return told
+        return (f"no result: {' '.join(self.result.notes) or 'nothing was found'}",)
 
     def evidence(self) -> Evidence:
         """What it brings to the scoreboard."""
@@ -163,7 +184,10 @@ def find(
     data = TestData(name, kind, _options(test), trials)
 
     def analyse(trials: Trials) -> tuple[Result, str]:
-        return _result(replace(data, trials=trials), experiment)
+        anew = None
+        if any(trial.estimates for trial in trials):
+            anew = replace(data, trials=tuple(trial.unmeasured() for trial in trials))
+        return _result(replace(data, trials=trials), experiment, anew)
 
     try:
         with run.held_open():
@@ -285,7 +309,10 @@ def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Exper
         return None, str(error)
 
 
-def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]:
+def _result(
+    data: TestData, experiment: Experiment | None, anew: TestData | None
+) -> tuple[Result, str]:
+    """The result, or why there is none; `anew`: without archived metrics, where there are any."""
     if experiment is None:
         return Result(), f"no experiment is called {data.kind!r} here; install what provides it"
     if not data.trials:
@@ -295,8 +322,19 @@ def _result(data: TestData, experiment: Experiment | None) -> tuple[Result, str]
     except ArchiveError:
         raise
     except (Exception, SystemExit) as error:  # noqa: BLE001 (must not cost the other tests)
-        hint = MEASURE_ANEW if any(trial.estimates for trial in data.trials) else ""
+        explain_in_debug()
+        hint = MEASURE_ANEW if _is_analysed(anew, experiment) else ""
         return Result(), f"the analysis failed: {one_line(error)}{hint}"
+
+
+def _is_analysed(data: TestData | None, experiment: Experiment) -> bool:
+    """Whether the analysis of other data finds anything: it is tried."""
+    if data is None:
+        return False
+    try:
+        return not result_of(experiment, data).is_empty
+    except (Exception, SystemExit):  # noqa: BLE001 - as above
+        return False
 
 
 def _bench(trials: tuple[ArchivedTrial, ...]) -> Bench | None:

@@ -16,7 +16,7 @@ from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
-from campaign.errors import ExitCode, UsageError, worst_exit_code
+from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
 from campaign.identifying import methods
 from campaign.identifying.bench_document import bench_text, nothing_to_write
 from campaign.identifying.identification import Identification, Section, identify
@@ -45,11 +45,12 @@ def identify_run(
 ) -> tuple[Path, ExitCode]:
     """Identify, and write the page and, where it is asked for, the bench; the page's path.
 
-    Raises UsageError where no method could use the run, before anything is written.
+    Raises NoResultError where no method identified anything, before anything is written.
     """
     chosen = choose(results, run)
     unseen = choose(results, validate) if validate else None
     compared = choose(results, compare) if compare else None
+    sides = [each for each in (chosen, unseen, compared) if each is not None]
     output = page or _beside(chosen)
     refuse_foreign(output)  # before minutes of work, and before a bench is written
     if bench is not None:
@@ -70,7 +71,11 @@ def identify_run(
             textwrap.fill(each, WIDTH, initial_indent="  ", subsequent_indent="    ")
             for each in told
         ]
-        raise UsageError("\n".join([f"{chosen.name}: nothing can be identified from it", *lines]))
+        refused = NoResultError(
+            "\n".join([f"{chosen.name}: nothing can be identified from it", *lines])
+        )
+        refused.exit_code = worst_exit_code([refused.exit_code, *map(_say_damaged, sides)])
+        raise refused
     command = _command(run, models, validate, compare, settings)
     text = None
     if bench is not None and not nothing_to_write(found):
@@ -86,8 +91,11 @@ def identify_run(
         print_note(f"bench: {bench}")
     if open_it and not webbrowser.open(made.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
-    sides = [each.run for each in (chosen, unseen, compared) if each is not None]
-    return made, worst_exit_code([say_damaged(each.path, each.damaged) for each in sides])
+    return made, worst_exit_code([*map(_say_damaged, sides)])
+
+
+def _say_damaged(chosen: Chosen) -> ExitCode:
+    return say_damaged(chosen.run.path, chosen.run.damaged)
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import traceback
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,12 +12,18 @@ from typer.core import TyperCommand
 from campaign.cli.bench_commands import app  # with all commands
 from campaign.cli.output import others_print_aside, plain_streams, print_note
 from campaign.entry_points import blamed, one_line
-from campaign.errors import CampaignError, ExitCode, ProtocolError, UsageError
+from campaign.errors import (
+    DEBUG,
+    CampaignError,
+    ExitCode,
+    ProtocolError,
+    UsageError,
+    explain_in_debug,
+)
 from campaign.plain_text import printable
 
 PLUG_IN_FAULT = ExitCode.LIMIT_OR_FAULT
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
-DEBUG = "CAMPAIGN_DEBUG"
 
 
 class QuietCommand(TyperCommand):
@@ -55,15 +60,15 @@ def _run() -> None:
             _leave(f"campaign: {plug_in.package} failed: {one_line(leaving)}", PLUG_IN_FAULT)
         raise
     except ProtocolError as error:  # as it is: editors jump to file:line:column
-        _explain_in_debug()
+        explain_in_debug()
         _leave(str(error), error.exit_code)
     except CampaignError as error:
-        _explain_in_debug()
+        explain_in_debug()
         _leave(f"campaign: {error}", error.exit_code)
     except KeyboardInterrupt:
         _leave("campaign: interrupted", ExitCode.INTERRUPTED)
     except Exception as error:  # noqa: BLE001 - a bug: no traceback unless asked for
-        _explain_in_debug()
+        explain_in_debug()
         again = f"Set {DEBUG}=1 and run the command again for its traceback."
         if plug_in := blamed(error):
             _leave(f"campaign: {plug_in.package} failed: {one_line(error)}\n{again}", PLUG_IN_FAULT)
@@ -89,11 +94,6 @@ def _check_texts() -> None:
 def _by_interrupt(leaving: SystemExit) -> bool:
     """Whether typer has made this of a KeyboardInterrupt, without a word."""
     return isinstance(getattr(leaving.__context__, "__cause__", None), KeyboardInterrupt)
-
-
-def _explain_in_debug() -> None:
-    if os.environ.get(DEBUG):
-        traceback.print_exc()
 
 
 def _leave(message: str, code: int) -> NoReturn:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from campaign.archive import RunReader, find_run, open_run
 from campaign.cli.output import print_note
-from campaign.errors import ArchiveError, ExitCode, UsageError
+from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
 from campaign.report.processes import (
     Workers,
@@ -46,7 +46,7 @@ def report_run(
     trials: str = "",
     zoom: bool = False,
 ) -> tuple[Path, ExitCode]:
-    """Build the report of the run that `name` means; its page, and whether all could be read."""
+    """Build the report of the run that `name` means; its page, and the exit code."""
     path = find_run(results, name)
     begin_early(path)
     run = open_run(path)
@@ -68,6 +68,7 @@ def _page(
     """The page of what processes have begun to analyse, and what is told of it."""
     from campaign.cli.damage import say_damaged
     from campaign.cli.keep_results import written_results
+    from campaign.execution.naming import reference
     from campaign.experiments import experiments
     from campaign.report.build import build_report
     from campaign.report.formats import chosen_formats
@@ -99,13 +100,18 @@ def _page(
     finally:
         for each in written:
             each.discard()
-    code = say_damaged(path, report.damaged)
+    lacking = [test for test in report.layout.document.tests if test.lacks_result]
+    codes = [say_damaged(path, report.damaged), *([ExitCode.NO_RESULT] if lacking else [])]
     for problem in (*report.problems, *report.left_out):
         print_note(problem, style="yellow")
+    if any(test.problem and test.experiment for test in lacking):
+        anew = " --measure-anew" if measure_anew else ""
+        command = f"{DEBUG}=1 campaign report {reference(path)}{anew}"
+        print_note(f"to see where an analysis failed:\n  {command}")
     print_note(f"written: {'; '.join([*_told(report.files), *filter(None, kept)])}")
     if open_it and not webbrowser.open(report.path.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
-    return report.path, code
+    return report.path, worst_exit_code(codes)
 
 
 def _published(results: PreparedResults) -> str:

@@ -241,6 +241,8 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
         curve = curve_of(data, found.torque.value)
     except ValueError:
         return torque, acceleration
+    if curve.stiffness.origin is Origin.NOT_DETERMINED and not curve.stiffness.has_interval:
+        return torque, acceleration  # of any size: it would decide the mean of all ramps
     return torque, acceleration, *_of_curve(curve, options, bench)
 
 

@@ -17,13 +17,13 @@ from campaign.estimate import Estimate
 from campaign.experiments.preparing.draws import draws_of, merged
 from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
 from campaign.experiments.preparing.swept_tables import table_names
-from campaign.experiments.preparing.unusable import Doubt, doubt, notes_on
+from campaign.experiments.preparing.unusable import doubt, doubted, not_measured, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
-from campaign.result import Result
+from campaign.result import Doubt, Result
 from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
 
 NOT_TOLD = Cause("not told by the recording", "the recording does not tell it")
@@ -117,7 +117,8 @@ class Experiment:
             with recordings that lack a channel of `can_use`.
         measure: the metrics of one recording, from its samples and its trial's windows alone; they
             are archived with the trial, and `metrics` gives them to `analyse`. Raises ValueError
-            with a message for the user when the recording holds none.
+            with a message for the user when the recording holds none. Whatever it raises costs
+            that trial only: the others are analysed, and a note says which one is left out.
         fit: options that a test does not write, as they suit its bench. Handed the options with
             their plain defaults (`model_fields_set` has those written) and the bench; what it does
             not name keeps its default.
@@ -163,6 +164,11 @@ class Experiment:
 
 
 EMPTY = Result()
+TOO_LONG = Cause(
+    "too long",
+    "it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: cut it by "
+    "start and stop, or by each",
+)
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
@@ -181,8 +187,8 @@ def _sides(data: TestData) -> Sides:
 
 
 def _result_of(experiment: Experiment, data: TestData) -> Result:
-    doubts = [_doubt(experiment, item) for item in data.trials]
-    kept = zip(data.trials, doubts, strict=True)
+    before = [_doubt(experiment, item) for item in data.trials]
+    kept = zip(data.trials, before, strict=True)
     trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
     result = EMPTY
     if trials or not data.trials:
@@ -194,13 +200,48 @@ def _result_of(experiment: Experiment, data: TestData) -> Result:
                 {seed: _of_draw(experiment, part, seed) for seed, part in parts.items()}
             )
         else:
-            result = experiment.analyse(usable)
+            result = _analysed(experiment, usable)
+    doubts = (*result.doubts, *filter(None, before))
     lacking: dict[str, None] = {}
     for item in data.trials:
         if item.trial.can_use and item.ending.outcome == "completed":
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
-    notes = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
-    return replace(result, notes=(*result.notes, *notes_on(filter(None, doubts)), *notes))
+    without = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
+    notes = (*result.notes, *notes_on(doubts, len(data.trials)), *without)
+    return replace(result, notes=notes, doubts=doubts)
+
+
+def _analysed(experiment: Experiment, data: TestData) -> Result:
+    """What an analysis finds; a trial that cannot be measured costs no more than itself."""
+    try:
+        return experiment.analyse(data)
+    except (ArchiveError, UsageError):
+        raise
+    except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
+        good, doubts = _measurable(experiment, data)
+        if not doubts:
+            raise
+    result = experiment.analyse(good) if any(good.completed()) else EMPTY
+    return replace(result, doubts=doubts)
+
+
+def _measurable(experiment: Experiment, data: TestData) -> tuple[TestData, tuple[Doubt, ...]]:
+    """The trials that can be measured, each with what that found; and why the others cannot."""
+    good: list[TrialData] = []
+    doubts: list[Doubt] = []
+    completed = {item.trial.number for item in data.completed()}
+    for item in data.trials:
+        estimates = item.estimates
+        try:
+            if experiment.measure and not estimates and item.trial.number in completed:
+                estimates = tuple(experiment.measure(item))
+        except ArchiveError:
+            raise
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, of one trial
+            doubts.append(not_measured(item.trial, error))
+        else:
+            good.append(_Instead(item, item.trial.point, estimates))
+    return replace(data, trials=tuple(good)), tuple(doubts)
 
 
 def metrics(
@@ -228,7 +269,7 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
     """
     wrong = _doubt(experiment, data)
     if wrong and wrong.fatal:
-        raise ValueError(wrong.what)
+        raise ValueError(wrong.reason.text)
     if experiment.measure is None:
         return ()
     with speaking_of(sides_in(data.trial.bench)):
@@ -240,11 +281,7 @@ def _doubt(experiment: Experiment, data: TrialData) -> Doubt | None:
     most, task = experiment.most_samples, data.trial.task
     samples = task.duration * task.sample_rate
     if most is not None and samples > most:
-        what = (
-            f"it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: "
-            "cut it by start and stop, or by each"
-        )
-        return Doubt(data.trial.label, what, True)
+        return doubted(data.trial, TOO_LONG(samples=samples, most=most))
     return doubt(data)
 
 
@@ -261,7 +298,9 @@ def with_named_tables(data: TestData) -> TestData:
             for path, value in point.items()
         }
 
-    return replace(data, trials=tuple(_At(item, named(item.trial.point)) for item in data.trials))
+    return replace(
+        data, trials=tuple(_Instead(item, named(item.trial.point)) for item in data.trials)
+    )
 
 
 def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
@@ -269,7 +308,7 @@ def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
     if not part.trials:
         return EMPTY
     try:
-        return experiment.analyse(part)
+        return _analysed(experiment, part)
     except (ArchiveError, UsageError):
         raise
     except Exception as error:  # noqa: BLE001 - a fit may wander with one draw of many
@@ -282,22 +321,27 @@ def _draw(data: TestData, seed: Any) -> TestData:
     return replace(
         data,
         trials=tuple(
-            _At(item, {path: v for path, v in item.trial.point.items() if path != SEED})
+            _Instead(item, {path: v for path, v in item.trial.point.items() if path != SEED})
             for item in data.trials
             if item.trial.point.get(SEED) == seed
         ),
     )
 
 
-class _At:
-    """A trial told to be at another point of the sweep; all else is as it was."""
+class _Instead:
+    """A trial told to be at another point of the sweep, or measured; all else is as it was."""
 
-    def __init__(self, data: TrialData, point: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        data: TrialData,
+        point: Mapping[str, Any],
+        estimates: Sequence[Estimate] | None = None,
+    ) -> None:
         self.trial = data.trial.model_copy(update={"point": dict(point)})
         self.ending = data.ending
         self.recording = data.recording
         self.channel_names = data.channel_names
-        self.estimates = data.estimates
+        self.estimates = data.estimates if estimates is None else estimates
 
 
 def lost_without(experiment: Experiment, name: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimate import Estimate, Systematic
+from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
 
 Array = NDArray[np.float64]
@@ -31,6 +31,11 @@ TOO_FEW_SAMPLES = Cause("too few samples", "{samples} samples are too few for {b
 NO_STANDARD_ERROR = Cause("no standard error", "one of {whom} has no standard error")
 NOT_POSITIVE = Cause("not positive", "a ratio of numbers that are not positive")
 MODEL_MISFIT = Cause("model misfit", "misfit: {why}")
+WIDEST = 0.5 * math.log(1e3)
+"""Largest half-width of an interval in the logarithm: a factor of a thousand from end to end."""
+LARGEST = 700.0
+"""Largest logarithm, either sign, whose exponential and multiples of it are still finite."""
+SPANS_DECADES = Cause("spans decades", "its interval spans more than a factor of a thousand")
 
 
 def student(freedom: float, level: float = LEVEL) -> float:
@@ -96,8 +101,26 @@ def of_positive_repeats(
 
 
 def exponential(logarithm: Estimate, unit: str) -> Estimate:
-    """The estimate of x from one of ln x; its standard error by the delta method."""
-    value = math.exp(logarithm.value)
+    """The estimate of x from one of ln x; its standard error by the delta method.
+
+    *Not determined*, and without an interval, where that spans decades or x is beyond any size.
+    """
+    beyond = abs(logarithm.value) > LARGEST
+    value = math.nan if beyond else math.exp(logarithm.value)
+    ends = (end for end in (logarithm.low, logarithm.high) if end is not None)
+    if beyond or any(abs(end - logarithm.value) > WIDEST for end in ends):
+        return replace(
+            logarithm,
+            value=value,
+            unit=unit,
+            low=None,
+            high=None,
+            level=None,
+            standard_error=None,
+            freedom=None,
+            origin=Origin.NOT_DETERMINED,
+            reason=SPANS_DECADES(),
+        )
     error = logarithm.standard_error
     return replace(
         logarithm,

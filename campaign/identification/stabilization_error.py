@@ -117,7 +117,8 @@ def _of_parts(samples: Array, edges: NDArray[np.int_], name: str, unit: str, wha
         return Estimate.without_interval(name, math.sqrt(mean), unit, NO_SCATTER())
     method = f"standard deviation, Student's t over {len(means)} {what}, in the logarithm"
     inner = with_error(name, 0.5 * math.log(mean), "", error, len(means) - 1, method)
-    return replace(exponential(inner, unit), reason=OF_ONE_TRIAL())
+    found = exponential(inner, unit)
+    return replace(found, reason=OF_ONE_TRIAL()) if found.has_interval else found
 
 
 def _without(samples: Array, name: str, unit: str, reason: Reason) -> Estimate:

@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from campaign.axis_kind import speaking_of, unit_here, words_here
-from campaign.errors import Problem, ProtocolError, UsageError
+from campaign.entry_points import one_line
+from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import bench_of
 from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
@@ -221,6 +222,10 @@ def _section(
             return Section(method, options, numbers, _with_place(_of_its_axis(found), bench))
     except ValueError as error:
         return Section(method, options, numbers, problem=str(error))
+    except ArithmeticError as error:  # numbers of these recordings that no float holds
+        explain_in_debug()
+        problem = f"it failed: {one_line(error)}"
+        return Section(method, options, numbers, problem=problem)
 
 
 def _of_its_axis(found: Identified) -> Identified:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from campaign.channels import GYRO_RATE
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import default_positions
@@ -17,7 +18,16 @@ from campaign.experiments.results.breakaway_means import mean
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.result import Result
-from tests.experiments.laboratory import MADE_UP, analyse, execute, failed, finding, table, trials
+from tests.experiments.laboratory import (
+    MADE_UP,
+    Done,
+    analyse,
+    execute,
+    failed,
+    finding,
+    table,
+    trials,
+)
 from tests.identification.coverage import holds, rejected
 from tests.physics.benches import SIMULINK, bench
 
@@ -423,3 +433,24 @@ def test_a_plan_tells_that_without_the_inertia_no_torque_will_be_told() -> None:
     (told,) = experiment.warnings(experiment.options(), unknown)
     assert "axis.inertia" in told
     assert list(experiment.warnings(experiment.options(), bench())) == []
+
+
+def with_a_dead_gyro(item: Done) -> Done:
+    """The same ramp, of which the gyro shows nothing but noise before the load slides."""
+    gyro = item.samples.channels[GYRO_RATE]
+    noise = np.random.default_rng(1).standard_normal(len(gyro.samples))
+    dead = np.where(np.abs(gyro.samples) < 0.004, 1e-9 * noise, gyro.samples)
+    channels = {**item.samples.channels, GYRO_RATE: replace(gyro, samples=dead)}
+    return replace(item, samples=replace(item.samples, channels=channels))
+
+
+def test_a_ramp_that_tells_nothing_of_the_stiffness_leaves_the_mean_to_the_others() -> None:
+    done = execute(trials("breakaway", bench(load_only), TWO))
+    result = analyse("breakaway", (with_a_dead_gyro(done[0]), *done[1:]))
+    known = finding(result, "bristle_stiffness", statistic="mean")
+    assert known.value == pytest.approx(18000.0, rel=0.02)
+    (note,) = (note for note in result.notes if "too noisy for a stiffness" in note)
+    assert note.startswith(done[0].trial.label)
+    first, second, *_ = table(result, "presliding").rows
+    assert first["breakaway_torque"] == pytest.approx(second["breakaway_torque"], rel=0.01)
+    assert first["bristle_stiffness"] is None

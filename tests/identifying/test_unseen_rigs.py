@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from campaign.cli.identify import identify_run
-from campaign.errors import UsageError
+from campaign.errors import NoResultError
 from campaign.estimate import Estimate, Origin
 from campaign.identifying.sliding import places
 from tests.identifying.unseen import (
@@ -218,7 +218,7 @@ def test_what_no_method_can_use_is_told_line_by_line(tmp_path: Path) -> None:
     columns = {"relative_rate": ("rad/s", rate), "drive_torque": ("N m", 2.0 * np.sign(rate))}
     results = imported(tmp_path, columns, RATE)
     run = next(path for path in results.glob("*.nxs") if not path.stem.endswith("-results"))
-    with pytest.raises(UsageError) as refused:
+    with pytest.raises(NoResultError) as refused:
         identify_run(run.stem, results)
     first, *others = str(refused.value).splitlines()
     assert first.endswith("nothing can be identified from it")

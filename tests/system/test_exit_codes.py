@@ -14,7 +14,7 @@ from campaign.backends.sim import SimBackend
 from campaign.cli.ask import NotStartedError
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
-from campaign.errors import ArchiveError, ExitCode, UsageError
+from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.safety import AbortedError
 from campaign.recording import Ending, Outcome, SafeState
 from tests.system.user import SEA, write
@@ -33,6 +33,7 @@ def run(
     monkeypatch: pytest.MonkeyPatch,
     code: ExitCode,
     report_error: BaseException | None = None,
+    report_code: ExitCode = ExitCode.DONE,
 ) -> ExitCode:
     """The exit code of a run that by itself ends with `code`."""
     for method, answer in WAYS[code].items():  # else it does what it does
@@ -41,7 +42,7 @@ def run(
     def report_run(*arguments: object, **more: object) -> tuple[Path, ExitCode]:
         if report_error is not None:
             raise report_error
-        return folder / "report.html", ExitCode.DONE
+        return folder / "report.html", report_code
 
     monkeypatch.setattr("campaign.cli.report.report_run", report_run)
     request = Request(str(write(folder, SEA)))
@@ -76,6 +77,28 @@ def test_a_report_that_fails_does_not_hide_how_the_run_ended(
     assert shown.out.endswith(".nxs\n")
     assert ("no report" in shown.err) == (error is not None)
     assert str(error or "") in shown.err
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        (ExitCode.DONE, ExitCode.NO_RESULT),
+        (ExitCode.TRIALS_FAILED, ExitCode.NO_RESULT),
+        (ExitCode.LIMIT_OR_FAULT, ExitCode.LIMIT_OR_FAULT),
+        (ExitCode.NOT_SAFE, ExitCode.NOT_SAFE),
+    ],
+)
+def test_a_test_without_a_result_comes_before_trials_that_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: ExitCode, expected: ExitCode
+):
+    assert run(tmp_path, monkeypatch, code, report_code=ExitCode.NO_RESULT) is expected
+
+
+@pytest.mark.parametrize(
+    "worse", [ExitCode.NOT_SAFE, ExitCode.INTERRUPTED, ExitCode.ARCHIVE, ExitCode.USAGE]
+)
+def test_what_hides_that_a_test_has_no_result(worse: ExitCode):
+    assert worst_exit_code([ExitCode.NO_RESULT, ExitCode.TRIALS_FAILED, worse]) is worse
 
 
 def test_a_bug_in_the_report_of_a_good_run_is_shown_as_one(

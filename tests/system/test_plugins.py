@@ -174,7 +174,7 @@ def test_a_report_says_which_test_it_cannot_analyse_and_analyses_the_others(
     lab.does("run", "three.toml")
     lab.install("borrower", {"borrowed.py": "1 / 0\n"}, points, "1.1")
     lab.grease("1.2", "import no_such_film")
-    done = lab.does("report", lab.archive.name)
+    done = lab.does("report", lab.archive.name, code=6)
     told = " ".join(done.stderr.split())
     assert "the experiment 'borrowed' of the package borrower 1.1" in told
     assert "ZeroDivisionError" in told

@@ -50,6 +50,7 @@ def merged(results: Mapping[Value, Result]) -> Result:
         (told, *first.notes, *notes),
         concluded({own: result.conclusions for own, result in results.items()}),
         first.telling,
+        tuple(doubt for result in results.values() for doubt in result.doubts),
     )
 
 

@@ -33,13 +33,13 @@ def of_its_axis(result: Result) -> Result:
     """The same result, told of the axis that is meant (`axis_kind.speaking_of`)."""
     if not is_linear():
         return result
-    return Result(
+    return replace(
+        result,
         tables=tuple(map(_table, result.tables)),
         figures=tuple(map(_figure, result.figures)),
         findings=tuple(map(_finding, result.findings)),
         notes=tuple(map(words_here, result.notes)),
         conclusions=tuple(map(_conclusion, result.conclusions)),
-        telling=result.telling,
     )
 
 

@@ -7,14 +7,16 @@ costs its own numbers and a note, not those of the other trials.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from campaign.channels import missing
+from campaign.entry_points import one_line
 from campaign.estimate import Estimate
+from campaign.reason import Cause, Reason
 from campaign.recording import Ending, Outcome, Recording
+from campaign.result import Doubt
 from campaign.signals import Zero
 from campaign.trial import Role, Trial
 
@@ -38,15 +40,11 @@ class Finished(Protocol):
 
 FEWEST = 3
 """Samples below which nothing can be said of any signal."""
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """What is wrong with a recording, and whether it may be analysed all the same."""
-
-    label: str
-    what: str
-    fatal: bool
+NOT_RECORDED = Cause("channel not recorded", "no {channels} was recorded")
+TOO_SHORT = Cause("too short", "{samples} samples were recorded")
+NO_NUMBERS = Cause("no numbers", "{channel} has no numbers")
+NEVER_CHANGED = Cause("never changed", "{channels} never changed")
+NOT_MEASURED = Cause("not measured", "{error}")
 
 
 def doubt(data: Finished) -> Doubt | None:
@@ -61,36 +59,51 @@ def doubt(data: Finished) -> Doubt | None:
         return None
     lacking = missing(trial.requires, data.channel_names())
     if lacking:
-        return Doubt(trial.label, f"no {' and no '.join(lacking)} was recorded", True)
+        return doubted(trial, NOT_RECORDED(channels=" and no ".join(lacking)))
     return _doubt(data.recording(), trial)
 
 
 def _doubt(recording: Recording, trial: Trial) -> Doubt | None:
     if len(recording.time) < FEWEST:
-        return Doubt(trial.label, f"{len(recording.time)} samples were recorded", True)
+        return doubted(trial, TOO_SHORT(samples=len(recording.time)))
     samples = {name: recording[name] for name in trial.requires}
     for name, values in samples.items():
         if np.all(np.isnan(values)):
-            return Doubt(trial.label, f"{name} has no numbers", False)
+            return doubted(trial, NO_NUMBERS(channel=name), fatal=False)
     task = trial.task
     if all(isinstance(s, Zero) for s in (task.command, task.disturbance, task.base_acceleration)):
         return None  # nothing was to move
     still = [name for name, values in samples.items() if np.all(values == values[0])]
     if not still:
         return None
-    return Doubt(trial.label, f"{', '.join(still)} never changed", len(still) == len(samples))
-
-
-def notes_on(doubts: Iterable[Doubt]) -> tuple[str, ...]:
-    """A sentence for each thing that was wrong, with the trials that it was wrong with."""
-    labels: dict[tuple[str, bool], list[str]] = {}
-    for each in doubts:
-        labels.setdefault((each.what, each.fatal), []).append(each.label)
-    return tuple(
-        f"{_listed(shown)}: {what}{'; not analysed' if fatal else ''}."
-        for (what, fatal), shown in labels.items()
+    return doubted(
+        trial, NEVER_CHANGED(channels=", ".join(still)), fatal=len(still) == len(samples)
     )
 
 
-def _listed(labels: list[str]) -> str:
-    return labels[0] if len(labels) == 1 else f"{labels[0]} and {len(labels) - 1} more trials"
+def not_measured(trial: Trial, error: BaseException) -> Doubt:
+    """That the analysis of one trial failed; a ValueError has a message for the user."""
+    told = str(error) if isinstance(error, ValueError) else ""
+    return doubted(trial, NOT_MEASURED(error=told.partition("\n")[0][:300] or one_line(error)))
+
+
+def doubted(trial: Trial, reason: Reason, *, fatal: bool = True) -> Doubt:
+    """A doubt of the recording of a trial."""
+    return Doubt(trial.number, trial.label, reason, fatal)
+
+
+def notes_on(doubts: Iterable[Doubt], trials: int) -> tuple[str, ...]:
+    """A sentence for each thing that was wrong, with those of all `trials` it was wrong with."""
+    groups: dict[tuple[Reason, bool], list[Doubt]] = {}
+    for each in doubts:
+        groups.setdefault((each.reason, each.fatal), []).append(each)
+    return tuple(
+        f"{_listed(group)}: {reason}"
+        f"{f'; not analysed ({len(group)} of {trials} trials)' if fatal else ''}."
+        for (reason, fatal), group in groups.items()
+    )
+
+
+def _listed(group: Sequence[Doubt]) -> str:
+    told = f"{group[0].label} (trial {group[0].number})"
+    return told if len(group) == 1 else f"{told} and {len(group) - 1} more trials"

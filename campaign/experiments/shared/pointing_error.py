@@ -7,7 +7,7 @@ samples are read for figures.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -98,16 +98,9 @@ Measure = Callable[[TrialData], Sequence[Estimate]]
 
 
 def of_each(group: Iterable[TrialData], measure: Measure, name: str) -> list[Estimate]:
-    """One metric of each trial that has it, in order; none of a trial without samples."""
-    by_trial = (_told(data, measure) for data in group)
+    """One metric of each trial that has it, in order. Raises what `measure` raises."""
+    by_trial = (metrics(data, measure) for data in group)
     return [by_name[name] for by_name in by_trial if name in by_name]
-
-
-def _told(data: TrialData, measure: Measure) -> Mapping[str, Estimate]:
-    try:
-        return metrics(data, measure)
-    except ValueError:
-        return {}
 
 
 def values(estimates: Sequence[Estimate]) -> Array:

@@ -13,13 +13,15 @@ from campaign.identification.gate import admitted
 from campaign.identification.intervals import (
     LEVEL,
     MODEL_MISFIT,
+    SPANS_DECADES,
+    WIDEST,
     shifted_by,
     student,
     with_error,
 )
 from campaign.identification.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.identification.presliding_dynamics.fitted import Fitted
-from campaign.identification.presliding_dynamics.parameters import FARTHEST, LOGARITHMIC
+from campaign.identification.presliding_dynamics.parameters import LOGARITHMIC
 from campaign.identification.presliding_dynamics.plant import Array, Plant
 from campaign.identification.presliding_dynamics.record import Assumed, Record
 from campaign.identification.presliding_dynamics.shape import SURELY, Misfit, misfit_of
@@ -56,9 +58,6 @@ NO_MINIMUM = Cause("no minimum", "the search did not end in a minimum")
 BREAKS_AWAY = Cause(
     "breakaway in a record",
     "the load breaks away in {records}: leave that out, or ask for less torque",
-)
-SPANS_DECADES = Cause(
-    "interval over decades", "its interval spans more than a factor of a thousand"
 )
 FLAT_PROFILE = Cause(
     "flat profile", "its profile never rises: the records say nothing of it on one side"
@@ -137,9 +136,9 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
     name = fit.parameters.names[index]
     value, scale = fit.parameters.in_units(fit.vector, name)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
-    if name in LOGARITHMIC and deviation > FARTHEST:
-        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
     quantile = student(freedom)
+    if name in LOGARITHMIC and quantile * deviation > WIDEST:
+        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
     ends = [float(fit.vector[index]) + way * quantile * deviation for way in (-1.0, 1.0)]
     size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
     if name in PROFILED and CURVED * size < deviation < size:

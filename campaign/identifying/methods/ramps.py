@@ -13,17 +13,18 @@ from functools import partial
 
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
 from campaign.experiments.breakaway import EXPERIMENT as RAMP
 from campaign.experiments.breakaway import curve_of
 from campaign.experiments.interface import measured, metrics
+from campaign.experiments.preparing.unusable import not_measured, notes_on
 from campaign.experiments.results.breakaway_means import mean
 from campaign.identification.intervals import of_repeats
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.options import Options
-from campaign.physics.complete import IncompleteBenchError
 from campaign.reason import Cause
-from campaign.result import Amount, Cell, Column, Conclusion, Finding, Result, Table
+from campaign.result import Amount, Cell, Column, Conclusion, Doubt, Finding, Result, Table
 
 BREAKAWAY = "breakaway_torque"
 STRONGEST = "strongest_stiffness"
@@ -58,13 +59,15 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
 def _identify(material: Material, options: RampsOptions) -> Identified:
     found: dict[str, list[Estimate]] = {name: [] for name in OF_A_RAMP}
     shares: list[float] = []
-    notes: list[str] = []
+    doubts: list[Doubt] = []
     rows: list[dict[str, Cell]] = []
     for trial in material.trials:
         try:
             own = metrics(trial, partial(measured, RAMP))
-        except (ValueError, IncompleteBenchError) as error:
-            notes.append(f"{trial.trial.label}: {error}.")
+        except ArchiveError:
+            raise
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - of one ramp, whatever it is
+            doubts.append(not_measured(trial.trial, error))
             continue
         for name, metric in OF_A_RAMP.items():
             found[name] += [own[metric]] if metric in own else []
@@ -72,6 +75,7 @@ def _identify(material: Material, options: RampsOptions) -> Identified:
         shares += [] if share is None else [share]
         shown = {name: own.get(metric) for name, metric in OF_A_RAMP.items()}
         rows.append({"trial": trial.trial.number, **shown, WEAKER: share})
+    notes = list(notes_on(doubts, len(material.trials)))
     if not found[BREAKAWAY]:
         raise ValueError("; ".join(note.rstrip(".") for note in notes) or "no ramp shows breakaway")
     told = tuple(_parameters(found, shares, notes))

@@ -147,7 +147,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
     figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
     shown = tuple(_table_of_incident(table, folder) for table in happened.tables)
     problems = (
-        *(f"{s.test.name}: {p}" for s in sections for p in s.problems if p not in s.left_out),
+        *(f"{s.test.name}: {p}" for s in sections for p in _problems(s)),
         *scoreboard.problems,
         *happened.problems,
     )
@@ -165,6 +165,12 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
         scored_tables(scoreboard, document.published, places),
         symbols_for(test.sides for test in document.tests),
     )
+
+
+def _problems(section: Section) -> Iterator[str]:
+    """What could not be shown of a test, and the trials that its analysis does without."""
+    yield from (each for each in section.problems if each not in section.left_out)
+    yield from section.test.account
 
 
 def _makers(document: Document, folder: Folder, command: str, made: _Made) -> Mapping[str, _Maker]:
