@@ -80,6 +80,10 @@ class Estimate:
     systematic: tuple[Systematic, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.reason, Reason):  # of a plug-in that is not type-checked
+            raise TypeError(
+                f"{self.name}: a reason is a `Reason`: declare a `campaign.reason.Cause`"
+            )
         open_value = self.origin is Origin.NOT_DETERMINED and math.isnan(self.value)
         numbers = (self.low, self.high, self.level, self.standard_error, self.freedom)
         finite = all(number is None or math.isfinite(number) for number in numbers)

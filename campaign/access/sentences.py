@@ -12,7 +12,7 @@ from campaign.result import Amount, Conclusion, Factor
 from campaign.text import interval, minus, number, pretty_unit
 from campaign.units import convert
 
-FLAGGED = (Origin.ASSUMED, Origin.AT_BOUND)
+FLAGGED = (Origin.ASSUMED, Origin.AT_BOUND, Origin.CONTRADICTED)
 """Origins that are said behind a number, as a reader would take it for measured."""
 MOST_DIGITS = 17
 """A float has no more."""

@@ -3,16 +3,14 @@
 Some numbers follow from others of the same test: one change of an error is a change of each of its
 ratios, too, and would be declared as often as there are ratios.
 
-Besides, two intervals are known not to hold what a comparison of benches asks of them. That of a
-single trial has no scatter between trials in it. And that of a parameter whose fellow was held at a
-value which the same data exclude is the interval of a wrong model, whose residuals are no noise: on
-the `platform` bench, whose Stribeck exponent is about 0.9, viscous friction fitted with the
-exponent held at 2 scatters between runs by 1.5 times its standard error.
+Besides, two intervals do not hold what a comparison of benches asks of them. That of a single
+trial has no scatter between trials in it. And that of a model which the data contradict is the
+interval of the closest curve of its kind, whose residuals are no noise: on the `platform` bench,
+whose Stribeck exponent is about 0.9, viscous friction fitted with the exponent held at 2 scatters
+between runs by 1.5 times its standard error.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 from campaign.access.analysis import AnalysedTest
 from campaign.comparing.pairing import same_value
@@ -20,7 +18,6 @@ from campaign.estimate import Origin
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Outcome
 from campaign.result import Finding
-from campaign.text import interval
 from campaign.trial import Role
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
@@ -32,9 +29,7 @@ FOLLOWS = Cause(
 REPEAT = "how trials scatter is not in the interval; `repeat = 3` would show it"
 ONE_TRIAL_EACH = Cause("one trial each", f"one trial each: {REPEAT}")
 ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT}")
-WRONG_MODEL = Cause(
-    "contradicted model", "{held}; its interval is that of a model that the data contradict"
-)
+WRONG_MODEL = Cause("contradicted model", "{side} is of a model that the data contradict: {why}")
 
 
 def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> Reason:
@@ -49,9 +44,9 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
     alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]
     if alone:
         return ONE_TRIAL_EACH() if len(alone) == 2 else ONE_OF_ONE_TRIAL(side=alone[0])
-    for name, test, finding in own:
-        for held in contradicted(test, finding):
-            return WRONG_MODEL(held=f"{name}: {held}")
+    for name, _, finding in own:
+        if finding.known.origin is Origin.CONTRADICTED:
+            return WRONG_MODEL(side=name, why=finding.known.reason)
     return NONE
 
 
@@ -67,32 +62,3 @@ def trials_behind(test: AnalysedTest, finding: Finding) -> int:
         )
         for archived in test.trials
     )
-
-
-def contradicted(test: AnalysedTest, finding: Finding) -> Iterator[str]:
-    """What was held, under the finding's own conditions, at a value that the test excludes.
-
-    That is a number of origin `given` of which the same test, at conditions that differ in one
-    word, measured an interval that does not hold it.
-    """
-    for held in test.result.findings:
-        if held.known.origin is not Origin.GIVEN or held.conditions != finding.conditions:
-            continue
-        for free in test.result.findings:
-            if free.quantity == held.quantity and _in_one(free, held) and _excludes(free, held):
-                told = free.known
-                found = interval(told.value, *told.combined)
-                yield f"{held.quantity.replace('_', ' ')} held at {held.value:g}, found {found}"
-
-
-def _in_one(one: Finding, other: Finding) -> bool:
-    """Whether the conditions have the same names and differ in one value."""
-    a, b = one.conditions, other.conditions
-    return a.keys() == b.keys() and sum(not same_value(a[name], b[name]) for name in a) == 1
-
-
-def _excludes(free: Finding, held: Finding) -> bool:
-    if free.known.origin not in (Origin.MEASURED, Origin.NOT_DETERMINED):
-        return False
-    low, high = free.known.combined
-    return (low is not None and held.value < low) or (high is not None and held.value > high)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import errors_of
+from campaign.identification.gate import MATTERS, admitted_together
 from campaign.identification.intervals import SINGLE_VALUE, with_error
 
 Array = NDArray[np.float64]
@@ -33,11 +34,12 @@ class FrictionLine:
     """Friction of one direction over its speed, both positive; SI.
 
     Attributes:
-        coulomb: extrapolated to standstill (N m).
-        viscous: slope (N m s/rad).
+        coulomb: extrapolated to standstill (N m), as fitted.
+        viscous: slope (N m s/rad), as fitted.
         covariance: of the two, shape (2, 2).
         stretches: how many it is of.
         freedom: of their scatter: less, where neighbours are alike.
+        largest, fastest: torque (N m) and speed (rad/s) of the stretches.
     """
 
     coulomb: Estimate
@@ -45,6 +47,17 @@ class FrictionLine:
     covariance: Array
     stretches: int
     freedom: float
+    largest: float
+    fastest: float
+
+    @property
+    def reported(self) -> dict[str, Estimate]:
+        """Both numbers by name, as they may be reported."""
+        matters = MATTERS * self.largest
+        return admitted_together(
+            {each.name: each for each in (self.coulomb, self.viscous)},
+            {self.coulomb.name: matters, self.viscous.name: matters / self.fastest},
+        )
 
     def band(self, speed: Array) -> tuple[Array, Array]:
         """Low and high of the line's 95 % band at speeds, each shape (n,)."""
@@ -80,7 +93,8 @@ def friction_line(speed: Array, torque: Array) -> FrictionLine:
             ("coulomb_torque", "viscous_friction"), ("N m", "N m s/rad"), found, errors, strict=True
         )
     )
-    return FrictionLine(coulomb, viscous, covariance, len(speed), freedom)
+    largest, fastest = float(np.abs(torque).max()), float(speed.max())
+    return FrictionLine(coulomb, viscous, covariance, len(speed), freedom, largest, fastest)
 
 
 def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:

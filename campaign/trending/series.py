@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.doubts import DERIVED, FOLLOWS, WRONG_MODEL, contradicted
+from campaign.comparing.doubts import DERIVED, FOLLOWS, WRONG_MODEL
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.words import condition_words, display_unit, name_here
 from campaign.estimate import Estimate, Origin
@@ -59,7 +59,7 @@ class _Collected:
     finding: Finding
     points: list[Point] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    wrong: list[str] = field(default_factory=list)
+    wrong: list[Reason] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,8 @@ def series_of(members: Sequence[Member]) -> list[Series]:
                 why = f"{TWIN} {twin.name}" if twin else ""
                 test, number = pair.other.name, other.known
                 add_point(mine.points, mine.left_out, member, test, number, one.unit, why)
-                mine.wrong += list(contradicted(pair.other, other))[:1]
+                if number.origin is Origin.CONTRADICTED:
+                    mine.wrong.append(number.reason)
     return [_series(each) for each in found.values()]
 
 
@@ -196,7 +197,7 @@ def _series(found: _Collected) -> Series:
     name = name_here(test, finding.quantity)
     reason = FOLLOWS() if finding.quantity in DERIVED else NONE
     if not reason and 2 * len(found.wrong) > len(found.points):
-        reason = WRONG_MODEL(held=found.wrong[0])
+        reason = WRONG_MODEL(side="most of it", why=found.wrong[0])
     return made(
         found.points,
         found.left_out,

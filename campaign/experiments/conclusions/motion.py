@@ -50,9 +50,9 @@ def _of_one(motion: Motion, several: bool) -> Iterator[Conclusion]:
     for direction, line in motion.lines.items():
         yield conclusion(
             f"{who}in the {direction} direction Coulomb friction is ",
-            Amount(line.coulomb, "N m"),
+            Amount(line.reported["coulomb_torque"], "N m"),
             " and viscous friction ",
-            Amount(line.viscous, "N m s/rad"),
+            Amount(line.reported["viscous_friction"], "N m s/rad"),
             f", from {count(line.stretches, 'steady stretch', 'steady stretches')}",
         )
     if motion.levels:

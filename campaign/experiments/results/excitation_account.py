@@ -19,6 +19,7 @@ from campaign.identification.excitation_design.fourier import STILL
 from campaign.identification.frequency.best_linear import BestLinear, best_linear
 from campaign.identification.frequency.measured import MeasuredResponse
 from campaign.identification.frequency.welch import Record, welch_response
+from campaign.identification.gate import admitted_together
 from campaign.identification.inverse.coefficients import coefficients
 from campaign.identification.inverse.motion import (
     REGRESSION_RATE,
@@ -254,9 +255,11 @@ def dynamics_of(group: Sequence[TrialData]) -> Dynamics:
     motions = [motion_of(data) for data in group]
     fit, found = coefficients(motions, terms, filtering)
     piece = all_rows(motions[0], terms, filtering)
+    scaled = {name: _with_constants(each, first) for name, each in found.items()}
+    matters = dict(zip(options.terms, map(float, fit.matters), strict=True))
     return Dynamics(
         fit,
-        {name: _with_constants(each, first) for name, each in found.items()},
+        admitted_together(scaled, matters),
         piece.time,
         piece.force,
         piece.columns @ fit.values,

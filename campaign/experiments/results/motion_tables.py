@@ -56,8 +56,8 @@ def line_table(motions: Sequence[Motion]) -> Table:
             "recording": motion.data.trial.number,
             **motion.place,
             "direction": direction,
-            "coulomb": line.coulomb,
-            "viscous": line.viscous,
+            "coulomb": line.reported["coulomb_torque"],
+            "viscous": line.reported["viscous_friction"],
             "stretches": line.stretches,
         }
         for motion in motions
@@ -118,8 +118,7 @@ def line_findings(motion: Motion) -> Iterator[Finding]:
     """Coulomb and viscous friction of each direction, under the recording's conditions."""
     for direction, line in motion.lines.items():
         told = {**motion.place, "direction": direction, "recording": motion.data.trial.number}
-        yield Finding.of(line.coulomb, told)
-        yield Finding.of(line.viscous, told)
+        yield from (Finding.of(each, told) for each in line.reported.values())
     told = {**motion.place, "recording": motion.data.trial.number}
     for direction, level in motion.levels.items():
         yield Finding.of(level, {**told, "direction": direction})
