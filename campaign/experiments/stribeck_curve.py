@@ -202,11 +202,13 @@ def _analyse(data: TestData) -> Result:
         "A reading is the friction over the travel of its window; a ripple over position that is "
         f"longer than that stays in it. {OF_ONE}",
     )
+    drawn = any(torque.has_interval for _, points in found for torque in points.torques)
+    bars = ", with their 95 % intervals" if drawn else ""
     figure = Figure(
         key="stribeck-curve",
         title="Stribeck curve",
         caption=f"{' '.join(_what_shows(place, points) for place, points in found)} The points are "
-        "measured in steady sliding, with their 95 % intervals, each direction in its own sign "
+        f"measured in steady sliding{bars}, each direction in its own sign "
         "and panel; the lines are the model's own curve and its two parts.",
         alt="Friction torque over speed on a logarithmic axis: points measured in each direction "
         "beside the curve of the model and its two parts, one panel per direction.",

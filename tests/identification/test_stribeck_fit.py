@@ -7,9 +7,13 @@ import pytest
 from scipy.optimize import curve_fit
 from scipy.stats import t as t_distribution
 
+from campaign.estimate import Origin
 from campaign.identification.stribeck import PARAMETERS, Problem, fit_stribeck
 from campaign.identification.velocity_map import (
+    CONTRADICTED,
     NO_EFFECT,
+    DirectionFit,
+    Model,
     direction_estimates,
     doubts,
     fit_direction,
@@ -179,3 +183,32 @@ def test_too_few_points_are_refused(count: int) -> None:
         fit_stribeck(SPEED[:count], equation_4_6(SPEED)[:count])
     with pytest.raises(ValueError, match=f"{count} points"):
         fit_direction(SPEED[:count], equation_4_6(SPEED)[:count], np.zeros(count))
+
+
+def bent(exponent: float, seed: int) -> DirectionFit:
+    speed = np.geomspace(0.002, 1.0, 20)
+    scatter = 1.0 + 0.002 * np.random.default_rng(seed).standard_normal(20)
+    torque = equation_4_6(speed, stribeck_exponent=exponent) * scatter
+    return fit_direction(speed, torque, np.zeros(20))
+
+
+def test_parameters_of_a_model_that_the_points_contradict_say_so() -> None:
+    found = bent(1.0, seed=3)
+    models: tuple[Model, ...] = ("2", "none")
+    for model in models:
+        told = direction_estimates(found, model)
+        for one in told.values():
+            if one.origin is not Origin.GIVEN and one.has_interval:
+                assert one.origin in (Origin.CONTRADICTED, Origin.NOT_DETERMINED), one
+        assert told["coulomb_torque"].reason in CONTRADICTED[model]
+        assert told["coulomb_torque"].has_interval, "a reader sees what the curve of its kind has"
+    free = direction_estimates(found, "free").values()
+    assert all(one.origin is Origin.MEASURED for one in free)
+    both = nominal_estimates(found, found, "2")
+    assert both["viscous_friction"].origin is Origin.CONTRADICTED
+
+
+def test_a_model_that_is_true_is_contradicted_once_in_twenty() -> None:
+    count = sum(bool(bent(2.0, seed).contradiction("2")) for seed in range(200))
+    low, high = 2, 22  # binomial, 200 of 0.05, 99.9 %
+    assert low <= count <= high

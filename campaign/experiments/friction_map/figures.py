@@ -97,7 +97,8 @@ def _law(curve: Curve, direction: str) -> Curve:
 def _falls(fit: DirectionFit) -> bool:
     """Whether friction falls as sliding becomes faster, beyond what scatter leaves open."""
     values = fit.fits["free"].values
-    return fit.shows_stribeck_effect and values["static_torque"] > values["coulomb_torque"]
+    bends = fit.shows_stribeck_effect or bool(fit.contradiction("none"))
+    return bends and values["static_torque"] > values["coulomb_torque"]
 
 
 def _least(fit: DirectionFit) -> tuple[float, float] | None:
