@@ -129,6 +129,21 @@ def points_of(
     return [each for each in points if each.own.rate.value != 0.0], held
 
 
+def slower(
+    trials: Sequence[ArchivedTrial], bench: Bench, shortest: float, found: Sequence[Point]
+) -> int:
+    """How many steady stretches count as standstill, slower than all that were found there.
+
+    found: the points of all trials, with no `slowest` stated.
+    """
+    count = 0
+    for trial in trials:
+        own = [each.speed for each in found if each.trial == trial.trial.number]
+        every = (each.point(None) for each in _stretches(trial, bench, shortest, 0.0, None))
+        count += sum(0.0 < each.speed < 0.5 * min(own, default=0.0) for each in every)
+    return count
+
+
 def _found(
     trials: Sequence[ArchivedTrial],
     bench: Bench,

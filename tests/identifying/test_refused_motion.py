@@ -15,6 +15,7 @@ from campaign.identification.inverse.motion import Filtering
 from campaign.identifying.inverse.motions import moved
 from campaign.identifying.method import Identified, Material
 from campaign.identifying.methods.inverse_dynamics import METHOD
+from campaign.identifying.sliding import points_of, slower
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording
 
@@ -34,7 +35,7 @@ def driven(angle: np.ndarray, torque: np.ndarray) -> Any:
 def recorded(*made: Channel) -> Any:
     """A trial that has nothing but these."""
     channels = {each.name: each for each in made}
-    recording = Recording(TIME, channels)
+    recording = Recording(TIME[: len(made[0].samples)], channels)
     task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
     return SimpleNamespace(
         trial=SimpleNamespace(number=1, task=task, recording={"channels": []}),
@@ -101,3 +102,20 @@ def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
     for name in ("inertia", "coulomb_positive", "coulomb_negative"):
         assert told[name].reason in gate.UNPHYSICAL
         assert dict(told[name].reason.values)["cause"] == gate.OPPOSITE_SIGNS.code
+
+
+def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
+    """One recording of strokes at several speeds: the slowest are below 3 % of the fastest."""
+    rate = np.concatenate(
+        [way * np.full(2000, v) for v in (1.0, 0.5, 0.02, 0.01) for way in (1, -1)]
+    )
+    torque = 3.0 * np.sign(rate) + 0.02 * NOISE[0][: len(rate)]
+    trial = recorded(
+        Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", rate + 1e-4 * NOISE[1][: len(rate)]),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
+    )
+    trial.trial.options, trial.trial.windows = {}, ()
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt", "inertia": "1 kg m^2"}})
+    found, _ = points_of((trial,), bench, 0.5)
+    assert sorted(point.speed for point in found) == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=0.01)
+    assert slower((trial,), bench, 0.5, found) == 4

@@ -34,6 +34,7 @@ from campaign.identifying.sliding import (
     loaded,
     loads_alike,
     points_of,
+    slower,
 )
 from campaign.identifying.sliding_map import (
     COEFFICIENT,
@@ -61,6 +62,8 @@ from campaign.result import (
 from campaign.units import AngularRate, Time
 
 FINE = 100
+SHOWN = 8
+"""Numbers of trials that a note lists."""
 KEYS = {
     "coulomb_torque": "coulomb_torque",
     "static_torque": "static_torque",
@@ -102,7 +105,7 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
     found, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
     points = [point for point in found if not point.own.unsteady]
     left = [point for point in found if point.own.unsteady]
-    notes = list(_left_out(left, len(found)))
+    notes = [*_left_out(left, len(found)), *_passed_over(material, options, found)]
     if not points:
         raise ValueError(" ".join(["nowhere does the axis slide steadily", *notes]).rstrip("."))
     notes += [] if held is None else [_over_a_turn(held)]
@@ -135,6 +138,29 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
         ),
         settings=_settings(maps[0].found, parameters) if maps[0].quantity is FRICTION else {},
     )
+
+
+def _passed_over(
+    material: Material, options: FrictionMapOptions, found: Sequence[Point]
+) -> Iterator[str]:
+    """Trials without a point, and stretches that count as standstill for being slow."""
+    used = {point.trial for point in found}
+    without = [each.trial.number for each in material.trials if each.trial.number not in used]
+    if without and found:
+        numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
+        yield (
+            f"{len(without)} of {len(material.trials)} trials ({numbers}) have no steady stretch, "
+            "and are not in the map."
+        )
+    slow = 0
+    if options.slowest is None:
+        slow = slower(material.trials, material.bench, options.shortest, found)
+    if slow:
+        yield (
+            f"{slow} steady stretches below 3 % of the fastest rate of their trial count as "
+            "standstill, and are not in the map: `--set friction_map.slowest=RATE` says from which "
+            "rate on the axis slides."
+        )
 
 
 def _over_a_turn(held: OverATurn) -> str:
