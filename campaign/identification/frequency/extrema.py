@@ -32,8 +32,8 @@ TOGETHER = 3
 METHOD = "extremum of the measured gain, between the nearest lines whose gain surely differs"
 NO_SCATTER = Cause(
     "scatter of the lines not known",
-    "without odd lines left out, and two periods or more, nothing shows how far the lines of so few "
-    "realisations scatter",
+    "without odd lines left out, and two periods or more, nothing shows how far the lines of so "
+    "few realisations scatter",
 )
 NO_EXTREMUM = Cause(
     "no extremum stands out",
