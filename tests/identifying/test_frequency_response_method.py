@@ -15,6 +15,7 @@ from campaign.estimate import Origin
 from campaign.identification.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
+from campaign.identifying.frequency.axis_numbers import UNKNOWN
 from campaign.identifying.frequency.found import TOO_FEW
 from campaign.identifying.frequency.repeating import unused
 from campaign.identifying.frequency.signals import base_frequency
@@ -274,6 +275,17 @@ def test_one_realisation_tells_the_level_of_distortion_and_the_mode(tmp_path: Pa
         assert estimate.high - estimate.low >= 1.0
     assert parameters["stiffness"].estimate.reason in TOO_FEW
     assert any("A mode stands out" in str(each.parts[0]) for each in found.result.conclusions)
+
+
+def test_much_friction_leaves_no_mode_of_one_realisation(tmp_path: Path) -> None:
+    """It damps modes away and has extrema of its own."""
+    command = multisines(1, 2.5)
+    made = trials(tmp_path, command, "torque", 8.0)
+    found = identified(tmp_path, made, rubbing(command, 8.0))
+    assert not any(each.estimate.has_interval for each in found.parameters)
+    assert told(found)["resonance"].estimate.reason == UNKNOWN
+    rows = next(table for table in found.result.tables if table.key == "modes").rows
+    assert not any(row["frequency"].has_interval for row in rows)
 
 
 def test_of_a_single_period_no_mode_is_told(tmp_path: Path) -> None:
