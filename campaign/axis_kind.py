@@ -105,6 +105,8 @@ _UNITS = {
     "N m/A": "N/A",
     "N m s^2/rad^2": "N s^2/m^2",
     "N m/K": "N/K",
+    "N m/K^2": "N/K^2",
+    "N m s/(rad K^2)": "N s/(m K^2)",
     "N m s/(rad K)": "N s/(m K)",
     "A s/rad": "A s/m",
     "A/rad": "A/m",

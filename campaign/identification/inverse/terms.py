@@ -89,6 +89,12 @@ ALL = (
     Term("viscous_over_temperature", "ΔT v", "N m s/(rad K)",
          "How viscous friction changes with heat, from that at 20 °C on.",
          lambda m: _warmer(m) * m.rate),
+    Term("coulomb_over_temperature_squared", "ΔT² sign v", "N m/K^2",
+         "How that change bends, as of a viscosity that falls exponentially.",
+         lambda m: _warmer(m) ** 2 * np.sign(m.rate)),
+    Term("viscous_over_temperature_squared", "ΔT² v", "N m s/(rad K^2)",
+         "How that change bends, as of a viscosity that falls exponentially.",
+         lambda m: _warmer(m) ** 2 * m.rate),
 )  # fmt: skip
 """Terms by their names; those of a position's period are made by `periodic`."""
 TERMS: Mapping[str, Term] = {term.name: term for term in ALL}

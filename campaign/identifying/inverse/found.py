@@ -12,7 +12,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.identification.inverse.choosing import Structure, choose, structure
 from campaign.identification.inverse.coefficients import estimates, shifts
 from campaign.identification.inverse.delay import find_delay
-from campaign.identification.inverse.motion import Filtering, Motion
+from campaign.identification.inverse.motion import Array, Filtering, Motion
 from campaign.identification.inverse.position_period import find_period
 from campaign.identification.inverse.regression import Regression
 from campaign.identification.inverse.rows import all_rows, rows
@@ -35,6 +35,8 @@ from campaign.identifying.inverse.instrumented import (
 from campaign.identifying.inverse.motions import Moved, never_moved
 from campaign.reason import Cause
 
+SQUARED = "_squared"
+"""Behind the name of a term over temperature: the term by which that may bend."""
 ROUNDS = 4
 """Most times that terms are chosen at a delay, and the delay is found anew with them."""
 BENDS = Cause(
@@ -312,7 +314,22 @@ def _estimates(
         parts["delay"] = shifts(
             fit, motions, terms, filtering, best.delay + _doubt(best, late, motions[0])
         )
+    bends = [TERMS[f"{term.name}{SQUARED}"] for term in terms if f"{term.name}{SQUARED}" in TERMS]
+    if bends:
+        parts["curve over temperature"] = _moved_by(bends, best, motions, filtering)
     return estimates(fit, terms, parts)
+
+
+def _moved_by(
+    bends: Sequence[Term], best: Tried, motions: Sequence[Motion], filtering: Filtering
+) -> Array | None:
+    """How far coefficients go with further terms, shape (k,); None where these are not told."""
+    own = best.structure
+    try:
+        other = structure(motions, (*own.terms, *bends), filtering, best.delay)
+    except ValueError:
+        return None
+    return np.asarray(np.abs(other.fit.values[: len(own.terms)] - own.fit.values))
 
 
 def _without_shares(
