@@ -211,7 +211,7 @@ def _samples(data: TrialData) -> tuple[Array, Array, Array]:
 def _seen(data: TrialData, finest: float) -> Array:
     """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
     recording, way = data.recording(), WAYS[direction_of(data.trial)]
-    if data.trial.task.mode != "recorded":
+    if not data.trial.recording:
         return way * recording[GYRO_RATE]
     return way * _resolved(recording, finest).values
 

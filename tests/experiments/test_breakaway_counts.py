@@ -57,6 +57,7 @@ def imported(done: Done, recording: Recording, **options: object) -> Done:
             "task": request.task.model_copy(update={"sample_rate": rate}),
             "windows": request.windows,
             "note": request.note,
+            "recording": {"file": "ramp.csv"},
         }
     )
     return Done(trial, done.ending, recording.window(*request.part))

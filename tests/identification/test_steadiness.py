@@ -87,14 +87,15 @@ def test_a_known_ripple_of_the_rate_is_no_variation() -> None:
 
 
 def test_counts_of_a_steady_motion_are_no_stick_slip() -> None:
-    """One count per millisecond is 0.1 rad/s, five times the mean: zeros and spikes."""
-    angle = counted(SPEED * TIME, 1e-4)
-    rate = np.diff(angle, prepend=-1e-4) / STEP
-    assert np.std(rate) > SPEED
+    """One count per millisecond is 0.4 rad/s, twenty times the mean: zeros and spikes."""
+    angle = counted(SPEED * TIME, 4e-4)
+    rate = np.diff(angle, prepend=-4e-4) / STEP
+    assert np.std(rate) > 2.0 * SPEED
     assert not unsteady(TIME, rate, angle, own_sensor=False)
     # A low-pass hides what a count is; the angle still says it.
-    smooth = np.convolve(rate, np.exp(-np.arange(20) / 3.0) / 3.5, mode="same")
+    smooth = np.convolve(rate, np.exp(-np.arange(60) / 5.0) / 5.5, mode="same")
     assert not unsteady(TIME, smooth, angle, own_sensor=False)
+    assert unsteady(TIME, smooth, angle) in STICK_SLIP
 
 
 def test_stick_slip_shows_through_counts() -> None:

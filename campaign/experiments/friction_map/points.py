@@ -63,7 +63,7 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
             bench.axis.inertia,
             ripple.periods if ripple else None,
             # A recording that was imported may have made its rate of an encoder's counts.
-            own_sensor=data.trial.task.mode != "recorded",
+            own_sensor=not data.trial.recording,
         )
         found += _metrics(name, sliding, ripple)
     return tuple(found)
