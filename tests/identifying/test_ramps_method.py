@@ -6,6 +6,9 @@ from typing import Any, cast
 
 import pytest
 
+from campaign.experiments import breakaway
+from campaign.experiments.interface import TrialData
+from campaign.identification.presliding import Presliding
 from campaign.identifying.method import Material
 from campaign.identifying.methods.ramps import METHOD, RampsOptions
 from campaign.physics.bench import Bench
@@ -42,6 +45,21 @@ def test_one_interface_alone_has_no_weaker_ones() -> None:
     names = {e.estimate.name for e in METHOD.identify(made, RampsOptions()).parameters}
     assert "breakaway_torque" in names
     assert "weaker_share" not in names
+
+
+def test_a_ramp_whose_numbers_overflow_costs_that_ramp(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = breakaway.curve_of
+
+    def curve_of(data: TrialData, torque: float) -> Presliding:
+        if data.trial.number == 2:
+            raise OverflowError("math range error")
+        return whole(data, torque)
+
+    monkeypatch.setattr(breakaway, "curve_of", curve_of)
+    made = material(bench(lambda tree: tree["friction"].pop("motor")))
+    result = METHOD.identify(made, RampsOptions()).result
+    assert [row["trial"] for row in result.tables[0].rows] == [1, 3]
+    assert [note for note in result.notes if "(trial 2): OverflowError" in note]
 
 
 def test_trials_of_another_kind_do_not_do() -> None:

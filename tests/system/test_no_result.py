@@ -20,6 +20,9 @@ from campaign.errors import DEBUG, PRECEDENCE, CampaignError, ExitCode, NoResult
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.identifying import methods
+from campaign.identifying.method import Identified, Material, Method
+from campaign.options import Options
 from campaign.result import Finding, Result
 from tests.execution.test_measuring import numbered, run
 from tests.experiments.laboratory import trials
@@ -143,6 +146,17 @@ def test_a_run_in_which_nothing_is_identified(
     with damaged(reader, monkeypatch), pytest.raises(CampaignError) as refused:
         identify_run(str(reader.path), tmp_path, models=models)
     assert refused.value.exit_code is ExitCode.ARCHIVE
+
+
+def test_a_method_whose_numbers_overflow_costs_that_method(tmp_path: Path) -> None:
+    def overflow(material: Material, options: Options) -> Identified:
+        raise OverflowError("math range error")
+
+    method = Method("overflowing", "", Options, lambda trials: (trials, ""), overflow)
+    reader = archived(tmp_path, top_rate(failing(RuntimeError("no"), Counter(), ())))
+    with methods().including(method), pytest.raises(NoResultError) as refused:
+        identify_run(str(reader.path), tmp_path, models=(method.name,))
+    assert "overflowing: it failed: OverflowError: math range error" in str(refused.value)
 
 
 def test_the_documented_order_is_the_one_that_holds() -> None:

@@ -106,4 +106,5 @@ def notes_on(doubts: Iterable[Doubt], trials: int) -> tuple[str, ...]:
 
 def _listed(group: Sequence[Doubt]) -> str:
     told = f"{group[0].label} (trial {group[0].number})"
-    return told if len(group) == 1 else f"{told} and {len(group) - 1} more trials"
+    more = len(group) - 1
+    return f"{told} and {more} more trial{'s' if more > 1 else ''}" if more else told

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE
+from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
@@ -94,7 +95,7 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
     if options.terms:
         unknown = [name for name in options.terms if name not in TERMS]
         if unknown:
-            raise ValueError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
+            raise UsageError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
         terms = [TERMS[name] for name in options.terms]
     rate = material.trials[0].trial.task.sample_rate
     plain = Filtering.for_rate(rate)

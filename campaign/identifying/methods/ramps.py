@@ -64,6 +64,7 @@ def _identify(material: Material, options: RampsOptions) -> Identified:
     for trial in material.trials:
         try:
             own = metrics(trial, partial(measured, RAMP))
+            share = _weaker_share(trial, own)
         except ArchiveError:
             raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - of one ramp, whatever it is
@@ -71,7 +72,6 @@ def _identify(material: Material, options: RampsOptions) -> Identified:
             continue
         for name, metric in OF_A_RAMP.items():
             found[name] += [own[metric]] if metric in own else []
-        share = _weaker_share(trial, own)
         shares += [] if share is None else [share]
         shown = {name: own.get(metric) for name, metric in OF_A_RAMP.items()}
         rows.append({"trial": trial.trial.number, **shown, WEAKER: share})
