@@ -7,8 +7,8 @@ is the business of the field that holds it (rad/s, N m ...), so the fields here 
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Annotated, Literal
+from functools import cached_property, partial
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,12 +60,21 @@ class Polyline(Options):
 
     def sample(self, time: Array) -> Array:
         """Values at `time` (s), shape (n,)."""
-        return np.interp(time, *self._points)
+        return self._interpolated(time)
 
     @cached_property
-    def _points(self) -> tuple[Array, Array]:
-        """Times and values: a simulation samples a long series thousands of times."""
-        return np.asarray(self.times), np.asarray(self.values)
+    def _interpolated(self) -> partial[Array]:
+        """Made once: a simulation samples a long series thousands of times.
+
+        A function, since polylines are compared by their fields, and arrays have no one answer.
+        """
+        return partial(np.interp, xp=np.asarray(self.times), fp=np.asarray(self.values))
+
+    def __copy__(self) -> Self:
+        """Without what was made of the fields, which `model_copy` may change."""
+        copied = super().__copy__()
+        copied.__dict__.pop("_interpolated", None)
+        return copied
 
 
 class MultiSine(Options):
