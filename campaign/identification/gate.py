@@ -18,13 +18,13 @@ USELESS = 0.5
 """Half-width over the larger of value and what matters beyond which nothing is determined."""
 MATTERS = 0.05
 """Share of the largest force that was recorded below which a force does not matter on a rig."""
-NOT_NEGATIVE = (
-    "breakaway", "bristle", "coulomb", "damping", "friction_coefficient", "friction_negative",
-    "friction_positive", "inertia", "static", "stiffness", "stribeck", "viscous",
-)  # fmt: skip
-"""How names begin of what no rig has below zero."""
-SIGNED = ("coulomb_over", "viscous_over")
-"""How names begin of what may be negative all the same: by how much something changes."""
+NOT_NEGATIVE = {
+    "breakaway", "bristle", "coefficient", "coulomb", "damping", "inertia", "static", "stiffness",
+    "stribeck", "viscous",
+}  # fmt: skip
+"""Words in names of what no rig has below zero; `over` is in those of ratios and changes."""
+FRICTION = ("friction_positive", "friction_negative")
+"""Names of friction at one speed."""
 
 TOO_WIDE = Cause("interval too wide", "its interval is wider than ±{percent:.0f} % of it")
 UNPHYSICAL = Cause("unphysical", "it is negative, which no rig has: {cause}")
@@ -99,7 +99,8 @@ def refused(estimate: Estimate, reason: Reason) -> Estimate:
 
 def cannot_be_negative(name: str) -> bool:
     """Whether no rig has a parameter of this name below zero."""
-    return name.startswith(NOT_NEGATIVE) and not name.startswith(SIGNED)
+    words = set(name.split("_"))
+    return name in FRICTION or (bool(words & NOT_NEGATIVE) and "over" not in words)
 
 
 def _surely_negative(one: Estimate) -> bool:
@@ -115,7 +116,6 @@ def _counterpart(name: str) -> str:
 
 
 def _likely(negative: set[str]) -> Reason:
-    heavy = any(name.startswith(("inertia", "mass")) for name in negative)
-    if not heavy:
+    if not any("inertia" in name for name in negative):
         return COMPENSATED()
     return OPPOSITE_SIGNS() if len(negative) > 1 else SCALE_OR_DELAY()

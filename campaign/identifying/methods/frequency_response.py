@@ -19,6 +19,7 @@ from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.one_inertia import RIGID
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
+from campaign.identification.gate import admitted_together
 from campaign.identification.intervals import MODEL_MISFIT
 from campaign.identifying.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identifying.frequency.distortion_tables import distortion_tables
@@ -204,13 +205,11 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
             yield Parameter(estimate, meaning, unit, key, MORE_PHASES if few else advice)
         return
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
+    passed = admitted_together({each[0]: getattr(told.axis, each[0]) for each in MEANINGS}, {})
     for name, meaning, unit, advice in MEANINGS:
-        estimate = getattr(told.axis, name)
-        usable_ = estimate.origin is Origin.MEASURED and estimate.has_interval
-        usable_ = usable_ and estimate.value > 0
         # A damping that friction adds to may be left open alone: then the others are told.
-        key = keys.get(name, "") if usable_ and not told.bent else ""
-        yield Parameter(estimate, meaning, unit, key, AMPLITUDES if told.bent else advice)
+        key = "" if told.bent else keys.get(name, "")
+        yield Parameter(passed[name], meaning, unit, key, AMPLITUDES if told.bent else advice)
 
 
 def _local(told: Masses, best: Found) -> dict[str, Estimate]:
