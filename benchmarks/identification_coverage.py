@@ -15,14 +15,16 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 from scipy.stats import binomtest
 
 from benchmarks.document import DOCS, table
 from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimate import Origin
 from campaign.identifying.method import Identified, Material
 from campaign.identifying.methods import inverse_dynamics, whole_model
 from campaign.physics.bench import Bench
@@ -55,6 +57,7 @@ class Told:
         width: half of it over the truth.
         error: of the value, in half-widths.
         to_bench: whether it would go to a bench file.
+        passed: whether the gate passes it, as a number or as a bound.
     """
 
     rig: int
@@ -63,6 +66,7 @@ class Told:
     width: float
     error: float
     to_bench: bool
+    passed: bool
 
 
 def recorded(rig: BlindRig) -> Any:
@@ -116,15 +120,35 @@ def told(method: Callable[[BlindRig], Identified], rig: BlindRig, number: int) -
         if name not in NAMES and name not in NOWHERE:
             continue
         low, high = one.combined
-        if low is None or high is None:
-            made.append(Told(number, name, None, math.nan, math.nan, bool(each.bench)))
+        truth, goes = rig.truth.get(name), bool(each.bench)
+        passed = one.origin is not Origin.NOT_DETERMINED
+        if one.kind == "at most" and high is not None and truth is not None:
+            made.append(Told(number, name, truth <= high, math.nan, math.nan, goes, passed))
             continue
-        truth = rig.truth.get(name)
+        if low is None or high is None:
+            made.append(Told(number, name, None, math.nan, math.nan, goes, passed))
+            continue
         held = truth is not None and low <= truth <= high
         size = abs(truth) if truth else math.nan
         error = (one.value - (truth or 0.0)) / one.half_width
-        made.append(Told(number, name, held, one.half_width / size, error, bool(each.bench)))
+        made.append(Told(number, name, held, one.half_width / size, error, goes, passed))
     return made
+
+
+def weak(rig: BlindRig, number: int) -> BlindRig:
+    """Four seconds of it, with noise of the force as large as the force: little is determined."""
+    count = round(4.0 * RATE)
+    noise = np.random.default_rng(number).standard_normal(count)
+    force = rig.force[:count]
+    cut = {
+        name: None if getattr(rig, name) is None else getattr(rig, name)[:count]
+        for name in ("time", "angle", "rate", "wanted")
+    }
+    return replace(rig, force=force + float(np.std(force)) * noise, **cut)
+
+
+def _weak(job: tuple[int, BlindRig]) -> list[Told]:
+    return told(by_inverse_dynamics, weak(job[1], job[0]), job[0])
 
 
 def _inverse(job: tuple[int, BlindRig]) -> list[Told]:
@@ -197,11 +221,14 @@ def main() -> None:
     jobs = list(enumerate(rigs))
     with ProcessPoolExecutor(options.workers) as pool:
         inverse = [one for each in pool.map(_inverse, jobs) for one in each]
+        bad = [one for each in pool.map(_weak, jobs) for one in each]
         whole = [one for each in pool.map(_whole, jobs[: options.whole]) for one in each]
     sent = [each for each in inverse if each.to_bench and each.name not in ("inertia", "delay")]
     made = [
         *rows("`inverse_dynamics`", inverse),
         *rows("the same, of what goes to a bench file", sent),
+        *rows("`inverse_dynamics`, weak recordings, before the gate", bad),
+        *rows("the same, behind it", [each for each in bad if each.passed]),
         *rows("`whole_model`", whole),
     ]
     headings = ["method", "number", "hold", "95 % interval of that", "without", "half-width"]

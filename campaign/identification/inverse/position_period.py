@@ -47,15 +47,26 @@ def _gain(
     steps: Array,
     moving: NDArray[np.bool_],
 ) -> float:
-    """Rise of the log-likelihood, but for a factor, by waves of this period; 0 for too few rows."""
+    """Rise of the log-likelihood, but for a factor, by waves of this period; 0 for too few rows.
+
+    Beyond a spring and friction: a long wave looks like these.
+    """
     own = moving & (steps * FEWEST_ROWS <= period)
-    left = residuals[own]
-    square = float(left @ left)
-    if float(steps[own].sum()) < FEWEST_PERIODS * period or square == 0.0:
+    if float(steps[own].sum()) < FEWEST_PERIODS * period:
         return 0.0
-    angle = 2.0 * np.pi * position[own] / period
-    wave = np.column_stack([np.sin(angle), np.cos(angle)])
-    both = np.column_stack([wave, np.sign(rate[own])[:, None] * wave])
-    right = both.T @ left
-    explained = float(right @ np.linalg.lstsq(both.T @ both, right, rcond=None)[0])
-    return -len(left) * float(np.log(max(1.0 - explained / square, 1e-12)))
+    angle, way = 2.0 * np.pi * position[own] / period, np.sign(rate[own])
+    line = np.column_stack([np.ones(len(angle)), position[own], way])
+    waves = np.column_stack(
+        [np.sin(angle), np.cos(angle), way * np.sin(angle), way * np.cos(angle)]
+    )
+    before, after = (
+        _unexplained(each, residuals[own]) for each in (line, np.column_stack([line, waves]))
+    )
+    return len(angle) * float(np.log(before / max(after, 1e-12 * before))) if before > 0 else 0.0
+
+
+def _unexplained(columns: Array, values: Array) -> float:
+    """Sum of squares (of `values`, shape (n,)) that columns of shape (n, k) leave."""
+    right = columns.T @ values
+    found = np.linalg.lstsq(columns.T @ columns, right, rcond=None)[0]
+    return max(float(values @ values - right @ found), 0.0)

@@ -29,6 +29,7 @@ from campaign.experiments.results.presliding_dynamics import (
     with_torques_known,
 )
 from campaign.experiments.shared.elsewhere import with_scale
+from campaign.identification.gate import admitted
 from campaign.identification.intervals import shifted_by
 from campaign.identification.presliding_dynamics.found import (
     PreslidingDynamics,
@@ -156,7 +157,7 @@ def _bristle_damping(
         return {own.name: own}
     key = _interface(bench)
     known = bench.known_uncertainty(f"friction.{key}.viscous_friction") if key else None
-    return {own.name: shifted_by(own, "viscous friction", known)}
+    return {own.name: admitted(shifted_by(own, "viscous friction", known))}
 
 
 def _interface(bench: Bench) -> str:
@@ -187,7 +188,7 @@ def _parameters(told: dict[str, Estimate], bench: Bench, bristles: bool) -> Iter
         if name not in told or math.isnan(told[name].value):
             continue
         one = told[name]
-        key = keys.get(name, "") if one.has_interval and one.value > 0 else ""
+        key = keys.get(name, "") if one.has_interval else ""
         advice = next((text for part, text in ADVICE.items() if name.startswith(part)), "")
         yield Parameter(one, meaning, bench=key, advice=advice)
 
