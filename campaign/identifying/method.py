@@ -109,7 +109,7 @@ class Identified:
             key: value, SI unit (rotary; "" for none) and what they rest on; nobody measured them.
         again: options that fit the same model to other data, by name.
         unseen: how the model does on the validation; None without any.
-        left_out: of the recordings, and why.
+        left_out: of the recordings, one reason for each kind.
     """
 
     parameters: tuple[Parameter, ...]
@@ -118,12 +118,12 @@ class Identified:
     settings: Mapping[str, tuple[Any, str, str]] = field(default_factory=dict)
     again: Mapping[str, Any] = field(default_factory=dict)
     unseen: Unseen | None = None
-    left_out: Reason = NONE
+    left_out: tuple[Reason, ...] = ()
 
     @property
     def warnings(self) -> tuple[Reason, ...]:
         """What a reader has to know before any number."""
-        told = (self.left_out, self.unseen.warning if self.unseen else NONE)
+        told = (*self.left_out, self.unseen.warning if self.unseen else NONE)
         return tuple(each for each in told if each)
 
 

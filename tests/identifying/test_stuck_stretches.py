@@ -44,15 +44,20 @@ def stretch(speed: float, *, slips: bool) -> Point:
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
     monkeypatch.setattr(friction_map, "points_of", lambda *_: (points, None))
     material = Material(bench(), cast(Any, (OneTrial(),)))
-    return friction_map.METHOD.identify(material, friction_map.FrictionMapOptions())
+    return friction_map.METHOD.identify(
+        material, friction_map.FrictionMapOptions(slowest="1 mrad/s")
+    )
 
 
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     steady = [stretch(speed, slips=False) for speed in (0.2, 0.5, 0.8, 1.2)]
     stuck = [stretch(speed, slips=True) for speed in (0.1, 0.15)]
     assert all(point.own.unsteady in STICK_SLIP for point in stuck)
-    found = identified(monkeypatch, [*stuck, *steady]).result
-    assert "2 of 6 stretches are left out, for stick-slip." in found.notes
+    identification = identified(monkeypatch, [*stuck, *steady])
+    (left,) = identification.left_out
+    assert left in friction_map.UNSTEADY
+    assert dict(left.values) == {"count": 2, "total": 6, "why": STICK_SLIP.code}
+    found = identification.result
     (told,) = (f for f in found.findings if f.quantity == "coulomb_torque_positive")
     assert told.estimate.value == pytest.approx(5.0, abs=0.01)
     rows = found.tables[0].rows

@@ -46,6 +46,7 @@ from campaign.identifying.sliding_map import (
     with_doubts,
 )
 from campaign.options import Options
+from campaign.reason import Cause, Reason
 from campaign.result import (
     Amount,
     Axis,
@@ -63,7 +64,17 @@ from campaign.units import AngularRate, Time
 
 FINE = 100
 SHOWN = 8
-"""Numbers of trials that a note lists."""
+"""Numbers of trials that a reason lists."""
+NO_STRETCH = Cause(
+    "no steady stretch",
+    "{count} of {total} trials ({numbers}) have no steady stretch, and are not in the map",
+)
+UNSTEADY = Cause("unsteady stretches", "{count} of {total} stretches are left out, for {why}")
+TOO_SLOW = Cause(
+    "slow stretches",
+    "{count} steady stretches below 3 % of the fastest rate of their trial count as standstill, "
+    "and are not in the map (`--set friction_map.slowest=RATE`: slower than that is standstill)",
+)
 KEYS = {
     "coulomb_torque": "coulomb_torque",
     "static_torque": "static_torque",
@@ -105,10 +116,10 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
     found, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
     points = [point for point in found if not point.own.unsteady]
     left = [point for point in found if point.own.unsteady]
-    notes = [*_left_out(left, len(found)), *_passed_over(material, options, found)]
+    lost = tuple(_left_out(material, options, found))
     if not points:
-        raise ValueError(" ".join(["nowhere does the axis slide steadily", *notes]).rstrip("."))
-    notes += [] if held is None else [_over_a_turn(held)]
+        raise ValueError("; ".join(["nowhere does the axis slide steadily", *map(str, lost)]))
+    notes = [] if held is None else [_over_a_turn(held)]
     quantities = [FRICTION] if loads_alike(points) else []
     quantities += [COEFFICIENT] if loaded(points) else []
     if not quantities:
@@ -137,30 +148,26 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
             conclusions=tuple(_conclusions(parameters)),
         ),
         settings=_settings(maps[0].found, parameters) if maps[0].quantity is FRICTION else {},
+        left_out=lost,
     )
 
 
-def _passed_over(
+def _left_out(
     material: Material, options: FrictionMapOptions, found: Sequence[Point]
-) -> Iterator[str]:
-    """Trials without a point, and stretches that count as standstill for being slow."""
+) -> Iterator[Reason]:
+    """Trials and stretches that are not in the map, by reason."""
     used = {point.trial for point in found}
     without = [each.trial.number for each in material.trials if each.trial.number not in used]
-    if without and found:
+    if without:
         numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
-        yield (
-            f"{len(without)} of {len(material.trials)} trials ({numbers}) have no steady stretch, "
-            "and are not in the map."
-        )
-    slow = 0
+        yield NO_STRETCH(count=len(without), total=len(material.trials), numbers=numbers)
+    unsteady = Counter(point.own.unsteady.code for point in found if point.own.unsteady)
+    for code, count in unsteady.items():
+        yield UNSTEADY(count=count, total=len(found), why=code)
     if options.slowest is None:
-        slow = slower(material.trials, material.bench, options.shortest, found)
-    if slow:
-        yield (
-            f"{slow} steady stretches below 3 % of the fastest rate of their trial count as "
-            "standstill, and are not in the map: `--set friction_map.slowest=RATE` says from which "
-            "rate on the axis slides."
-        )
+        count = slower(material.trials, material.bench, options.shortest, found)
+        if count:
+            yield TOO_SLOW(count=count)
 
 
 def _over_a_turn(held: OverATurn) -> str:
@@ -241,12 +248,6 @@ def _settings(
             if name in KEYS and prefix + name not in keys:
                 told[prefix + name] = (max(value, 0.0), MEANINGS[name][0], "of the fitted curve")
     return told
-
-
-def _left_out(left: Sequence[Point], count: int) -> Iterator[str]:
-    """How many stretches are no points, by reason."""
-    for code, number in Counter(point.own.unsteady.code for point in left).items():
-        yield f"{number} of {count} stretches are left out, for {code}."
 
 
 def _points_table(points: Sequence[Point], left: Sequence[Point]) -> Table:

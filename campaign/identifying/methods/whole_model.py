@@ -123,7 +123,7 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
         settings=_settings(best),
         again={"model": best.model.name},
         unseen=Unseen(best.validation.value) if best.validation is not None else None,
-        left_out=_left_out(whole, pieces),
+        left_out=tuple(filter(None, [_left_out(whole, pieces)])),
     )
 
 
