@@ -9,9 +9,10 @@ from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identifying.identification import Change, Section
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, pretty_unit
+from campaign.text import interval, number, pretty_unit
 from campaign.units import convert
 
+BOUNDS = {"at least": "≥", "at most": "≤"}
 CHANGED = 0.05
 """Share of what is declared changed that may be false."""
 
@@ -95,11 +96,13 @@ def told(estimate: Estimate, display: str = "") -> str:
         return "not determined"
     low, high = estimate.combined
 
-    def shown(number: float | None) -> Any:
-        if number is None or not display:
-            return number
-        return float(convert(number, estimate.unit, display))
+    def shown(size: float | None) -> Any:
+        if size is None or not display:
+            return size
+        return float(convert(size, estimate.unit, display))
 
+    if estimate.kind in BOUNDS:
+        return f"{BOUNDS[estimate.kind]} {number(shown(high if low is None else low), 3)}"
     text = interval(shown(estimate.value), shown(low), shown(high))
     if low is None and high is None:
         return f"{text} (no interval: {estimate.reason})" if estimate.reason else text
