@@ -23,6 +23,9 @@ from campaign.units import convert
 
 ROWS = 300
 """Most rows on the page; the CSV file has them all."""
+DAGGER = "†"
+MARKS = {Origin.MEASURED: "", Origin.CONTRADICTED: f" {DAGGER}"}
+"""Behind a number, by its origin; of others the origin itself."""
 REASONS = 6
 """Most reasons for a missing interval that stand below a table."""
 UNIT = "unit"
@@ -106,6 +109,7 @@ def remarks(table: Table) -> Iterator[str]:
     for head, reasons in (
         ("Without an interval", _without_interval),
         ("Not determined", _not_determined),
+        (f"{DAGGER} Of a model that the data contradict", _contradicted),
     ):
         pieces = _by_reason(table, reasons)
         if len(pieces) > REASONS:
@@ -204,6 +208,12 @@ def _not_determined(cell: Estimate | float | int, column: Column) -> Sequence[st
         return ()
     reason = cell.reason or column.reason
     return (str(reason),) if reason else ()
+
+
+def _contradicted(cell: Estimate | float | int, column: Column) -> Sequence[str]:
+    if isinstance(cell, Estimate) and cell.origin is Origin.CONTRADICTED:
+        return (str(cell.reason),)
+    return ()
 
 
 def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
@@ -346,7 +356,7 @@ def _with_interval(cell: Estimate, column: Column) -> str:
     sign = {"at least": "≥ ", "at most": "≤ "}.get(cell.kind, "")
     if sign:
         value, low, high = (low if high is None else high), None, None
-    mark = "" if cell.origin is Origin.MEASURED else f" ({cell.origin})"
+    mark = MARKS.get(cell.origin, f" ({cell.origin})")
     told = number(value, SHORT) if _is_narrow(cell) else interval(value, low, high)
     return f"{sign}{told}{mark}"
 
