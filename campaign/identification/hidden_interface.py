@@ -26,12 +26,13 @@ from campaign.identification.presliding_curve import (
 
 Array = NDArray[np.float64]
 
-SHARES = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
-"""of all torque that a hidden interface is taken to carry. Below the first nothing is ever
-resolved: half of it lies before the first bin that is fitted."""
-EARLIER = (3.0, 5.0, 8.0, 15.0, 30.0, 100.0, 300.0)
-"""How many times earlier (in angle) it slips. Two that are nearer bend one curve; the last one is
-as good as rigid."""
+SHARES = (0.1, 0.15, 0.2, 0.3, 0.4)
+"""of all torque that a hidden interface is taken to carry. One of less is never resolved: half of
+the first lies before the first bin that is fitted. Of two that carry the same none is the strong
+one."""
+EARLIER = (4.0, 6.0, 10.0, 20.0, 50.0, 300.0)
+"""How many times earlier (in angle) it slips. Two that are nearer bend as one does, and no ramp
+tells them apart; the last is as good as rigid."""
 
 
 class Shift(NamedTuple):

@@ -25,7 +25,7 @@ def single(noise: float, *interfaces: Interface) -> BristleFit:
     return found
 
 
-@pytest.mark.parametrize(("share", "earlier"), [(0.1, 15.0), (0.2, 8.0), (0.15, 300.0)])
+@pytest.mark.parametrize(("share", "earlier"), [(0.1, 20.0), (0.2, 10.0), (0.15, 300.0)])
 def test_without_noise_the_pair_that_is_there_is_the_only_one_left(
     share: float, earlier: float
 ) -> None:
@@ -48,9 +48,9 @@ def test_a_single_interface_hides_less_the_less_noise_there_is() -> None:
 
 def test_what_may_be_hidden_widens_an_interval_until_it_is_a_bound() -> None:
     time, rate, torque = bending(Interface(13_000.0, ALL))
-    random, found = np.random.default_rng(5), {}
-    for noise in (1e-5, 3.5e-4, 2e-3):
-        noisy = rate + noise * random.normal(size=len(rate))
+    found = {}
+    for noise in (1e-5, 5e-4, 2e-3):
+        noisy = rate + noise * np.random.default_rng(2).normal(size=len(rate))
         found[noise] = fit_presliding(time, noisy, torque, REST, ALL)
     clear, near, below = (each.stiffness_at_rest for each in found.values())
     sources = [{part.source for part in each.systematic} for each in (clear, near, below)]
