@@ -9,7 +9,7 @@ from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identification.stabilization_error import NO_SCATTER
 from campaign.result import Amount, Conclusion, Factor
-from campaign.text import interval, minus, number, pretty_unit
+from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
 from campaign.units import convert
 
 FLAGGED = (Origin.ASSUMED, Origin.AT_BOUND, Origin.CONTRADICTED)
@@ -18,9 +18,6 @@ MOST_DIGITS = 17
 """A float has no more."""
 MOST_DECIMALS = 6
 """of a factor, to keep an end of its interval from looking like 1."""
-NARROW, SHORT = 1e-4, 5
-"""Half-width, as a share of its number, below which a sentence leaves an interval out, and the
-digits that the number then has: nobody reads on past those, and the tables have them all."""
 WRITTEN = 8
 """Most digits that somebody is taken to have written of a setting; one with more was computed."""
 LARGE = 1e6

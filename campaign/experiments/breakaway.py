@@ -253,7 +253,7 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
         load = (each for each in bench.friction.values() if each.side == "load")
         viscous = sum(models[each.model].viscous(each) for each in load)
     inertia = options.inertia or inertia_of(bench, "a damping ratio")
-    stiffness = curve.stiffness.value
+    stiffness = curve.interfaces[0].stiffness  # not the end of a bound
     damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
     curve = curve.with_damping(damping)
     yield _by_torque_constant(curve.stiffness, bench)
@@ -332,8 +332,8 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
         found.append(own)
         if "bristle_stiffness" not in own:
             notes.append(
-                f"{item.trial.label}: its presliding is too short or too noisy for a stiffness; a "
-                "slower ramp shows more of it."
+                f"{item.trial.label}: its presliding is too short for a stiffness (a slower ramp "
+                "has more samples of it), or too noisy (a faster one moves more above the noise)."
             )
     return Ramps(tuple(trials), tuple(places), tuple(found))
 

@@ -77,19 +77,20 @@ def misfit(residuals: Array, parameters: int) -> float:
     return variance / between if between > 0 else np.inf
 
 
+def whitened(values: Array, coefficient: float) -> Array:
+    """What is new in each of the values of an AR(1) process, shape (n,) or (n, k)."""
+    first = np.sqrt(1.0 - coefficient**2) * values[:1]
+    return np.concatenate([first, values[1:] - coefficient * values[:-1]])
+
+
 def _whitened_fit(
     design: Array, residuals: Array, coefficient: float
 ) -> tuple[float, Array, float]:
     """Restricted log likelihood of an AR(1) coefficient, triangle of the whitened design (k, k),
     and variance of the innovations.
     """
-    first = np.sqrt(1.0 - coefficient**2)
-
-    def whitened(values: Array) -> Array:
-        return np.concatenate([first * values[:1], values[1:] - coefficient * values[:-1]])
-
-    orthogonal, triangle = np.linalg.qr(whitened(design))
-    left = whitened(residuals)
+    orthogonal, triangle = np.linalg.qr(whitened(design, coefficient))
+    left = whitened(residuals, coefficient)
     left = left - orthogonal @ (orthogonal.T @ left)
     freedom = len(residuals) - design.shape[1]
     tiny = float(np.finfo(float).tiny)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Kind, Origin
 from campaign.identification.autocorrelated import MISFIT
 from campaign.identification.bristle_fit import (
     Array,
@@ -26,6 +26,7 @@ from campaign.identification.bristle_fit import (
     two_interfaces,
 )
 from campaign.identification.gate import admitted
+from campaign.identification.hidden_interface import Shift, hidden_shift
 from campaign.identification.intervals import exponential, shifted_by, student, with_error
 from campaign.identification.presliding_curve import Interface
 from campaign.identification.torque_ramp import Ramp, ramp_of
@@ -51,6 +52,12 @@ model's own error, cut out of one curve."""
 METHOD = "curve of bristles fitted to the gyro rate, its bias and the asymptote free"
 WINDOW = "window"
 """Source of the systematic part of where the fitted window ends."""
+HIDDEN = "hidden interface"
+"""Source of the systematic part of an interface that the rate's noise hides."""
+NOT_RESOLVED = Cause(
+    "interface not resolved",
+    "the noise of the rate may hide a stiffer interface that slips first",
+)
 OFF_THE_CURVE = Cause(
     "off the curve of bristles",
     "the rate leaves the curve of bristles by more than its noise explains",
@@ -62,8 +69,10 @@ class Presliding:
     """What one ramp says of the bristles.
 
     Attributes:
-        stiffness: of the interface that carries the largest torque (N m/rad).
-        stiffness_at_rest: slope before anything slips, the sum over all interfaces (N m/rad).
+        stiffness: of the interface that carries the largest torque (N m/rad); an upper bound where
+            noise may hide a stiffer one that slips first.
+        stiffness_at_rest: slope before anything slips, the sum over all interfaces (N m/rad); then
+            a lower bound.
         interfaces: that the curve shows, the one that carries the largest torque first.
         bias: of the gyro (rad/s).
         window: torques between which the curve was fitted (N m).
@@ -118,9 +127,12 @@ def fit_presliding(
     best = two if two is not None and _believed(two, one) else one
     own = _stiffness(best)
     by_window = {share: own, **_by_window(ramp, smallest, breakaway, best, share)}
+    hidden = hidden_shift(one) if best is one else Shift(0.0, 0.0)
+    shifted = _shifted(own, WINDOW, _window_shift(share, by_window))
+    at_rest = _shifted(_at_rest(best), "more interfaces than two", _split_shift(best))
     return Presliding(
-        stiffness=_shifted(own, WINDOW, _window_shift(share, by_window)),
-        stiffness_at_rest=_shifted(_at_rest(best), "more interfaces than two", _split_shift(best)),
+        stiffness=_beside(shifted, hidden.stiffness, "at most"),
+        stiffness_at_rest=_beside(at_rest, hidden.at_rest, "at least"),
         interfaces=best.interfaces,
         bias=best.bias,
         window=(smallest, float(whole.torque[-1])),
@@ -224,6 +236,26 @@ def _split_shift(fit: BristleFit) -> float:
     seen = strong.stiffness + weak.stiffness
     true = strong.stiffness + sum(part.stiffness for part in parts)
     return float(_row_of_sum(fit) @ step - np.log(true / seen))
+
+
+def _beside(estimate: Estimate, hidden: float, kind: Kind) -> Estimate:
+    """With the share by which a hidden interface may shift it; a bound where that is too much."""
+    if not hidden:
+        return estimate
+    shifted = _shifted(estimate, HIDDEN, hidden)
+    end = estimate.low if kind == "at least" else estimate.high
+    if end is None or admitted(shifted).origin is Origin.MEASURED:
+        return shifted
+    return replace(
+        estimate,
+        value=end,
+        low=None,
+        high=None,
+        level=None,
+        kind=kind,
+        origin=Origin.MEASURED,
+        reason=NOT_RESOLVED(),
+    )
 
 
 def _chord(ramp: Ramp, bias: float, smallest: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.channels import GYRO_RATE
-from campaign.estimate import Estimate, Systematic
+from campaign.estimate import Estimate, Kind, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import default_positions
 from campaign.experiments.results.breakaway_figures import DOTS, _what_shows
@@ -277,6 +277,46 @@ def test_a_systematic_part_does_not_shrink_with_the_number_of_ramps() -> None:
     assert found.systematic == parts
 
 
+@pytest.mark.parametrize(("kind", "side"), [("at least", -1.0), ("at most", 1.0)])
+def test_a_mean_with_a_bound_among_its_ramps_is_a_bound_of_their_ends(
+    kind: Kind, side: float
+) -> None:
+    """Numbers count with the end of their interval: with their values it would bound nothing."""
+    half = 1.972 * 3.0
+    bound = replace(
+        ramp(100.0 + side * half, 3.0), low=None, high=None, kind=kind, reason=MADE_UP()
+    )
+    for ramps in ([bound, ramp(100.0, 3.0)], [ramp(100.0, 3.0), bound]):
+        found = mean("bristle_stiffness", ramps)
+        assert (found.kind, found.has_interval) == (kind, False)
+        assert found.value == pytest.approx(100.0 + side * half, rel=1e-3)
+
+
+def noisy(tree: dict[str, Any]) -> None:
+    """The small drive with a gyro seven times as noisy."""
+    small(tree)
+    tree["sensors"]["gyro"]["noise"] = "0.15 deg/s"
+
+
+def test_what_noise_may_hide_is_told_with_a_remedy_that_helps() -> None:
+    def shown(rate: float) -> tuple[list[Estimate], list[str]]:
+        options = {**SMALL, "rest": "3 s", "torque_rate": f"{rate} N m/s"}
+        result = analyse("breakaway", execute(trials("breakaway", platform(noisy), options)))
+        notes = [note for note in result.notes if "may hide a stiffer interface" in note]
+        found = [each.known for each in result.findings if each.quantity == "stiffness_at_rest"]
+        return found, notes
+
+    rate, (found, notes) = 0.02, shown(0.02)
+    assert {each.kind for each in found} == {"at least"}
+    assert all(each.value < 60.0 for each in found)
+    for _ in range(2):  # as the note says, and says again
+        rate = float(notes[0].split("torque_rate of ")[1].split()[0])
+        found, notes = shown(rate)
+    assert rate == 16.0 * 0.02
+    assert {each.kind for each in found} == {"number"}
+    assert all(holds(each, 60.0) for each in found)
+
+
 def test_what_a_recording_of_an_older_plan_says() -> None:
     """It names no windows and no direction; its numbers are the same."""
     (item,) = execute(trials("breakaway", platform(), {**TWO, "positions": ["0 deg"]}))
@@ -449,7 +489,7 @@ def test_a_ramp_that_tells_nothing_of_the_stiffness_leaves_the_mean_to_the_other
     result = analyse("breakaway", (with_a_dead_gyro(done[0]), *done[1:]))
     known = finding(result, "bristle_stiffness", statistic="mean")
     assert known.value == pytest.approx(18000.0, rel=0.02)
-    (note,) = (note for note in result.notes if "too noisy for a stiffness" in note)
+    (note,) = (note for note in result.notes if "or too noisy" in note)
     assert note.startswith(done[0].trial.label)
     first, second, *_ = table(result, "presliding").rows
     assert first["breakaway_torque"] == pytest.approx(second["breakaway_torque"], rel=0.01)

@@ -189,6 +189,12 @@ def test_a_number_in_words(part: Amount, said: str) -> None:
     assert words(part) == said
 
 
+def test_an_interval_is_left_out_only_where_it_is_narrower_than_the_digits() -> None:
+    value, half = 0.0040000173, 1.07e-7  # 2.7e-5 of it: its digits end where it does
+    assert words(amount(value, value - half, value + half)) == "(4.00002 ± 0.00011) × 10⁻³ N·m"
+    assert words(amount(value, value - 0.1 * half, value + 0.1 * half)) == "0.0040000 N·m"
+
+
 def test_a_sentence_is_its_parts() -> None:
     said = sentence(Conclusion(("Friction at rest is ", amount(25.3, 25.2, 25.4), ".")))
     assert said == "Friction at rest is 25.30 ± 0.10 N·m."

@@ -111,6 +111,27 @@ def test_what_is_off_alike_is_told_without_any_interval(
     assert answer.truth.startswith("stiffness at rest: all 4 lie below what is true, by 7 to 10 %")
 
 
+def test_bounds_that_all_lie_on_their_side_are_not_told_as_a_bias(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    true = _true(made_up, tmp_path)
+    found = tuple(
+        Finding.of(
+            Estimate.without_interval(
+                "stiffness_at_rest",
+                share * true,
+                "N m/rad",
+                Reason("test", "hidden"),
+                kind="at least",
+            ),
+            {"measurement": n},
+        )
+        for n, share in enumerate((0.90, 0.92, 0.93, 0.91))
+    )
+    document = _document(made_up, tmp_path, found)
+    assert "what is true" not in document.truths["breakaway"].note
+
+
 def _fits(true: float, exponents: Sequence[str]) -> tuple[Finding, ...]:
     """Of two directions, fitted with each of these exponents; 20 % off, and sure of it."""
     return tuple(

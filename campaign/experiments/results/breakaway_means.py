@@ -86,7 +86,11 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     systematic = shared_parts(found)
     told = next((each for each in found if each.origin is Origin.ASSUMED or _bound(each)), None)
     if told is not None:
-        return replace(told, value=value, standard_error=None, freedom=None, systematic=systematic)
+        value = float(np.mean([_end(each, told) for each in found]))
+        return replace(
+            told, value=value, low=None, high=None, level=None, standard_error=None, freedom=None,
+            systematic=systematic,
+        )  # fmt: skip
     own = [each.standard_error or 0.0 for each in found]
     inner = math.sqrt(float(np.mean(np.square(own))) / count)
     inner_freedom = float(sum(each.freedom or 0.0 for each in found))
@@ -106,23 +110,30 @@ def _bound(estimate: Estimate) -> bool:
     return estimate.kind in ("at least", "at most")
 
 
+def _end(estimate: Estimate, told: Estimate) -> float:
+    """What a number counts for in a mean with bounds like `told`: its end on that side."""
+    ends = {"at least": estimate.low, "at most": estimate.high}
+    end = ends.get(told.kind)
+    return estimate.value if end is None else end
+
+
 def _width(estimate: Estimate) -> float:
     return 0.0 if not estimate.has_interval else estimate.half_width
 
 
 def _between(one: Estimate, other: Estimate) -> Estimate:
     """Mean of the means of two directions, whose ramps are independent of each other."""
-    value = 0.5 * (one.value + other.value)
     systematic = shared_parts((one, other))
     told = next((each for each in (one, other) if not each.has_interval), None)
     if told is not None:
+        value = 0.5 * (_end(one, told) + _end(other, told))
         more = {"origin": told.origin, "kind": told.kind, "method": told.method}
         return Estimate.without_interval(
             one.name, value, one.unit, told.reason, systematic=systematic, **more
         )
     errors = [each.standard_error or 0.0 for each in (one, other)]
     freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
-    method = "mean of both directions, Welch"
+    value, method = 0.5 * (one.value + other.value), "mean of both directions, Welch"
     error = 0.5 * math.hypot(*errors)
     found = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
     return admitted(found)

@@ -9,7 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.experiments.results.breakaway_means import MEASURED, Ramps
-from campaign.identification.presliding import WINDOW
+from campaign.identification.presliding import NOT_RESOLVED, WINDOW
 from campaign.units import angle_here, rate_here
 
 FEW_COUNTS = 10.0
@@ -34,6 +34,7 @@ def remarks(ramps: Ramps) -> Iterator[str]:
     yield from _encoder(ramps)
     yield from _rest(ramps)
     yield from _rate(ramps)
+    yield from _hidden(ramps)
     yield from _unfinished(ramps)
 
 
@@ -78,7 +79,7 @@ def _rate(ramps: Ramps) -> Iterator[str]:
         name
         for name in MEASURED
         if any(each.reason and each.standard_error is not None for each in ramps.values(name))
-        and not any(each.kind == "at least" for each in ramps.values(name))
+        and not any(each.kind in ("at least", "at most") for each in ramps.values(name))
     ]
     trial = ramps.trials[0].trial
     stiffness = ramps.values("bristle_stiffness")
@@ -90,6 +91,20 @@ def _rate(ramps: Ramps) -> Iterator[str]:
             "The ramp is too fast for the curve of bristles, or its sensors too coarse: choose a "
             f"torque_rate of {0.25 * rate:.2g} N·m/s, or sweep it to see what it does."
         )
+
+
+def _hidden(ramps: Ramps) -> Iterator[str]:
+    found = [own for own in ramps.found if "stiffness_at_rest" in own]
+    bounds = sum(own["stiffness_at_rest"].reason in NOT_RESOLVED for own in found)
+    above = sum(own["bristle_stiffness"].reason in NOT_RESOLVED for own in found)
+    if not (bounds or above):
+        return
+    rate = float(str(ramps.trials[0].trial.options["torque_rate"]))
+    yield (
+        f"The gyro's noise may hide a stiffer interface that slips first: of {len(found)} ramps, "
+        f"stiffness at rest is a lower bound in {bounds} and σ0 an upper bound in {above}. A "
+        f"torque_rate of {4.0 * rate:.2g} N·m/s shows twice as much above the noise."
+    )
 
 
 def _unfinished(ramps: Ramps) -> Iterator[str]:

@@ -18,7 +18,7 @@ from campaign.published.values import heading_of
 from campaign.reason import NONE
 from campaign.report.content.lines import cell_name
 from campaign.result import Cell, Column, Table, Value, bare
-from campaign.text import interval, minus, number, pretty_unit
+from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
 from campaign.units import convert
 
 ROWS = 300
@@ -32,9 +32,6 @@ UNIT = "unit"
 """Name of a column that says the unit of its row."""
 PUBLISHED = "published"
 """Name of a column that the report puts beside those of an analysis: the last of the file."""
-NARROW, SHORT = 1e-5, 5
-"""Half-width, as a share of its number, below which the page leaves an interval out, and the digits
-that the number then has: a simulation without noise has nine, which mean nothing to a reader."""
 ROUNDING = 1e-12
 """Share of a column's largest number below which one is a rounding error, shown as 0."""
 

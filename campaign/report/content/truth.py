@@ -189,9 +189,11 @@ def _largest_part(cells: Iterable[Cell]) -> str:
 
 
 def _deviation(row: Row) -> float | None:
-    """Found less true, in percent of true."""
+    """Found less true, in percent of true; None of a bound, which lies on one side by intent."""
     found, true = row["found"], row["true"]
     if not isinstance(found, Estimate) or not isinstance(true, float) or not true:
+        return None
+    if found.kind in ("at least", "at most"):
         return None
     return None if math.isnan(found.value) else 100.0 * (found.value - true) / abs(true)
 
