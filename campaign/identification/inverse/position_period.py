@@ -15,6 +15,11 @@ FEWEST_ROWS = 10.0
 """Rows in a period, at least, at the rate of a row that counts: a faster one does not show it."""
 SLOW = 0.1
 """Share of the moving rows, the slowest, that set the shortest period."""
+CERTAIN = 2.0
+"""Periods in the travel from which on any wave counts: friction that differs at both ends of the
+travel, where the axis turns round, looks like less than that ..."""
+WIDE = 0.5
+"""... so that a longer wave counts where it explains this share of what it was looked for in."""
 FEWEST_PERIODS = 3.0
 """of rows that count, at least."""
 
@@ -62,6 +67,8 @@ def _gain(
     before, after = (
         _unexplained(each, residuals[own]) for each in (line, np.column_stack([line, waves]))
     )
+    if period > float(np.ptp(position)) / CERTAIN and after > WIDE * before:
+        return 0.0
     return len(angle) * float(np.log(before / max(after, 1e-12 * before))) if before > 0 else 0.0
 
 
