@@ -19,7 +19,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.reason import Cause
 from campaign.recording import Channel, Ending, Outcome, Recording
-from campaign.result import Finding
+from campaign.result import NOT_FOUND, Finding
 from tests.archives import archived, plan_of, simulated_run
 
 PAGE = (Path(__file__).parents[1] / "docs" / "reading-archives.md").read_text(encoding="utf-8")
@@ -222,7 +222,7 @@ def test_findings_are_one_table_with_intervals_reasons_and_conditions():
         "the analysis gives no interval",
         "the analysis did not find it",
     ]
-    assert list(table["reason_code"]) == ["", "single trial", "no interval given", "not found"]
+    assert list(table["reason_code"]) == ["", "single trial", "no interval given", NOT_FOUND.code]
     assert list(table["reason_values"]) == [{}, {"count": 1}, {}, {}]
     assert np.isnan(table["low"].iloc[1:].to_numpy()).all()
     assert table["origin"].iloc[3] == "not determined"

@@ -72,16 +72,22 @@ def row_of(estimate: Estimate) -> dict[str, object]:
     said = {name: getattr(estimate, name, None) for name in COLUMNS}
     return said | {
         "quantity": estimate.name,
-        "reason": str(estimate.reason),
         "origin": estimate.origin.value,
         "low": low,
         "high": high,
         "scatter_low": estimate.low,
         "scatter_high": estimate.high,
         "systematic": {part.source: part.standard_uncertainty for part in estimate.systematic},
-        "reason_code": estimate.reason.code,
-        "reason_values": dict(estimate.reason.values),
+        **reason_of(estimate),
     }
+
+
+def reason_of(estimate: Estimate) -> dict[str, object]:
+    """Its reason by the names of `COLUMNS`: the text, the code, and the values."""
+    reason = estimate.reason
+    return {
+        "reason": reason.text, "reason_code": reason.code, "reason_values": dict(reason.values)
+    }  # fmt: skip
 
 
 def _condition(name: str) -> str:

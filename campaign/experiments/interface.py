@@ -20,6 +20,7 @@ from campaign.experiments.preparing.swept_tables import table_names
 from campaign.experiments.preparing.unusable import doubt, doubted, not_measured, notes_on
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.complete import IncompleteBenchError
 from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
@@ -215,7 +216,7 @@ def _analysed(experiment: Experiment, data: TestData) -> Result:
     """What an analysis finds; a trial that cannot be measured costs no more than itself."""
     try:
         return experiment.analyse(data)
-    except (ArchiveError, UsageError):
+    except (ArchiveError, UsageError, IncompleteBenchError):
         raise
     except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
         good, doubts = _measurable(experiment, data)

@@ -104,7 +104,7 @@ def test_the_parameters_of_a_rig_are_seen_without_scrolling_sideways(show, width
     left = table.evaluate("e => e.getBoundingClientRect().left")
     assert max(ends) <= left + wide + 0.5
     headings = table.locator("thead th").all_inner_texts()
-    assert len(headings) == 8
+    assert len(headings) == 9
     if width < 800:  # a block for each row, in which each cell says what it is
         shown = (
             table.locator("tbody tr")

@@ -39,7 +39,7 @@ from campaign.result import Finding, Result
 from campaign.trial import Role, Trial
 from tests.archive import forging
 from tests.archives import archived
-from tests.experiments.laboratory import execute, trials
+from tests.experiments.laboratory import MADE_UP, execute, trials
 from tests.physics.benches import bench
 
 Measures = Callable[[TrialData], Sequence[Estimate]]
@@ -135,7 +135,7 @@ def top_rate(measure: Measures) -> Experiment:
 def scaled(factor: float) -> Measures:
     def measure(data: TrialData) -> tuple[Estimate, ...]:
         top = factor * float(np.max(data.recording()[LOAD_RATE]))
-        return (Estimate("top", top, "rad/s", reason="one pull"),)
+        return (Estimate("top", top, "rad/s", reason=MADE_UP()),)
 
     return measure
 
@@ -262,7 +262,7 @@ def test_a_recording_is_archived_before_it_is_measured(tmp_path: Path) -> None:
 
 def test_what_was_not_found_is_left_out(tmp_path: Path) -> None:
     def measure(data: TrialData) -> Sequence[Estimate]:
-        lost = Estimate.without_interval("lost", math.nan, "s", "it never came to that")
+        lost = Estimate.without_interval("lost", math.nan, "s", MADE_UP())
         return [lost, *scaled(1.0)(data)]
 
     reader = run_of(tmp_path, measure)
@@ -327,18 +327,18 @@ def test_show_lists_metrics_with_their_intervals(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     found = Estimate("settling_time", 0.25, "s", 0.21, 0.29, 0.95, "made up")
-    alone = Estimate("rise_time", 2.0, "s", reason="a single step")
+    alone = Estimate("rise_time", 2.0, "s", reason=MADE_UP())
     run_of(tmp_path, lambda data: (found, alone))
     show_archive(None, tmp_path, as_json=False, metrics=True)
     words = capsys.readouterr().out
     assert "0.250 ± 0.040" in words
-    assert "a single step" in words
+    assert MADE_UP.text in words
     show_archive(None, tmp_path, as_json=False)
     assert "settling_time" not in capsys.readouterr().out
     show_archive(None, tmp_path, as_json=True)
     (trial,) = json.loads(capsys.readouterr().out)["trials"]
     assert trial["metrics"][0]["high"] == 0.29
-    assert trial["metrics"][1]["reason"] == "a single step"
+    assert trial["metrics"][1]["reason"] == MADE_UP.text
     assert trial["measured_by"] == f"campaign {campaign.__version__}"
 
 

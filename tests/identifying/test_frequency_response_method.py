@@ -283,7 +283,7 @@ def test_much_friction_leaves_no_mode_of_one_realisation(tmp_path: Path) -> None
     made = trials(tmp_path, command, "torque", 8.0)
     found = identified(tmp_path, made, rubbing(command, 8.0))
     assert not any(each.estimate.has_interval for each in found.parameters)
-    assert told(found)["resonance"].estimate.reason == UNKNOWN
+    assert told(found)["resonance"].estimate.reason in UNKNOWN
     rows = next(table for table in found.result.tables if table.key == "modes").rows
     assert not any(row["frequency"].has_interval for row in rows)
 

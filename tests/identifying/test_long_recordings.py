@@ -29,7 +29,6 @@ from campaign.identifying.whole.found import find
 from campaign.identifying.whole.models import Sizes, models
 from campaign.identifying.whole.parts import telling_parts
 from campaign.identifying.whole.residuals import Residuals, steps_between
-from campaign.signals import Polyline
 from tests.identification.rigs import random_rigs
 
 
@@ -64,14 +63,6 @@ def test_a_column_is_filtered_once_for_each_motion() -> None:
     assert twice.columns == pytest.approx(2.0 * first.columns)
     assert len(again.columns) == len(first.columns)
     assert len(rows(motion, [term], filtering.half_band).columns) == len(first.columns) // 2
-
-
-def test_a_polyline_that_was_sampled_is_the_same_and_is_read_once() -> None:
-    one, other = (Polyline(times=(0.0, 1.0), values=(0.0, 2.0)) for _ in range(2))
-    assert one.sample(np.array([0.5, 3.0])).tolist() == [1.0, 2.0]
-    assert one == other
-    assert one.model_dump() == other.model_dump()
-    assert one._points[0] is one._points[0]
 
 
 @pytest.mark.parametrize(

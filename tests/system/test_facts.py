@@ -140,7 +140,7 @@ def test_what_was_recorded_is_archived_analysed_and_shown(folder: Path, archive:
     assert [trial.ending.outcome for trial in run.trials] == ["completed", "completed"]
     assert run.trials[0].trial.bench["motor"] is None
     campaign(folder, "verify", str(archive))
-    campaign(folder, "report", str(archive), "--output", "page", "--trials", "all")
+    campaign(folder, "report", str(archive), "--output", "page", "--trials", "all", code=6)
     page = (folder / "page" / "report.html").read_text(encoding="utf-8")
     assert "No breakaway torque" in page
     assert "axis.inertia (what the torque accelerates)" in page
