@@ -355,7 +355,7 @@ class Result:
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing but sentences."""
-        return not (self.tables or self.figures or self.findings)
+        return not (self.figures or self.findings or any(each.rows for each in self.tables))
 
     @property
     def left_out(self) -> tuple[Doubt, ...]:

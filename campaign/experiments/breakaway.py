@@ -241,9 +241,14 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
         curve = curve_of(data, found.torque.value)
     except ValueError:
         return torque, acceleration
-    if curve.stiffness.origin is Origin.NOT_DETERMINED and not curve.stiffness.has_interval:
-        return torque, acceleration  # of any size: it would decide the mean of all ramps
+    if _is_of_any_size(curve.stiffness):
+        return torque, acceleration
     return torque, acceleration, *_of_curve(curve, options, bench)
+
+
+def _is_of_any_size(one: Estimate) -> bool:
+    """Whether a ramp leaves a number open over decades: it would decide the mean of all ramps."""
+    return one.origin is Origin.NOT_DETERMINED and not one.has_interval
 
 
 def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Iterator[Estimate]:
@@ -257,7 +262,8 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
     damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
     curve = curve.with_damping(damping)
     yield _by_torque_constant(curve.stiffness, bench)
-    yield _by_torque_constant(curve.stiffness_at_rest, bench)
+    if not _is_of_any_size(curve.stiffness_at_rest):
+        yield _by_torque_constant(curve.stiffness_at_rest, bench)
     yield Estimate.without_interval(
         "bristle_damping",
         damping,

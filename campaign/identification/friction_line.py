@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import errors_of
-from campaign.identification.gate import MATTERS, admitted_together
+from campaign.identification.gate import admitted_together, mattering
 from campaign.identification.intervals import SINGLE_VALUE, with_error
 
 Array = NDArray[np.float64]
@@ -53,10 +53,9 @@ class FrictionLine:
     @property
     def reported(self) -> dict[str, Estimate]:
         """Both numbers by name, as they may be reported."""
-        matters = MATTERS * self.largest
+        found = {each.name: each for each in (self.coulomb, self.viscous)}
         return admitted_together(
-            {each.name: each for each in (self.coulomb, self.viscous)},
-            {self.coulomb.name: matters, self.viscous.name: matters / self.fastest},
+            found, {name: mattering(name, self.largest, self.fastest) for name in found}
         )
 
     def band(self, speed: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ it has no key, and no place in a bench file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from campaign.estimate import Estimate, Origin
@@ -45,8 +45,8 @@ SCALE_OR_DELAY = Cause(
 )
 CONSTANT_FORCE = Cause(
     "constant force",
-    "only in one direction, so a constant force is larger than friction (take off the sensor's "
-    "zero, or the weight)",
+    "only in one direction, so a constant force is larger than friction (subtract the zero of the "
+    "sensor, or the weight)",
 )
 ONE_SIDED = Cause("counterpart unphysical", "friction of the other direction is negative: {cause}")
 NEGATIVE = Cause("negative", "check sign, scale and zero of force and motion")
@@ -63,7 +63,7 @@ def admitted(estimate: Estimate, matters: float = 0.0, cause: Reason | None = No
     if estimate.origin is not Origin.MEASURED or estimate.kind != "number":
         return estimate
     positive, (low, high) = cannot_be_negative(estimate.name), estimate.combined
-    if positive and (estimate.value if high is None else high) < 0.0:
+    if _is_negative(estimate):
         return refused(estimate, UNPHYSICAL(cause=cause or NEGATIVE()))
     if estimate.half_width > USELESS * max(abs(estimate.value), matters):
         return refused(estimate, TOO_WIDE(percent=100.0 * USELESS))
@@ -80,16 +80,24 @@ def admitted_together(
     found: Mapping[str, Estimate], matters: Mapping[str, float]
 ) -> dict[str, Estimate]:
     """Parameters of one model, by name: which of them are negative tells the likely cause."""
-    negative = {name for name, one in found.items() if _surely_negative(one)}
+    negative = {name for name, one in found.items() if _is_negative(one)}
     passed = {}
     for name, one in found.items():
         other = _counterpart(name) in negative
         alone = name.startswith("coulomb") and (name in negative) != other
-        cause = CONSTANT_FORCE() if alone else _likely(negative)
+        cause = CONSTANT_FORCE() if alone else _likely(negative, found)
         passed[name] = admitted(one, matters.get(name, 0.0), cause)
         if alone and name not in negative and one.origin is Origin.MEASURED:
             passed[name] = refused(one, ONE_SIDED(cause=cause))
     return passed
+
+
+def mattering(name: str, force: float, rate: float) -> float:
+    """Size of a friction parameter below which it does not matter (N m, or N m s/rad).
+
+    force, rate: the largest that were recorded (N m, rad/s).
+    """
+    return MATTERS * force / (rate if name.startswith("viscous") else 1.0)
 
 
 def refused(estimate: Estimate, reason: Reason) -> Estimate:
@@ -103,9 +111,10 @@ def cannot_be_negative(name: str) -> bool:
     return name in FRICTION or (bool(words & NOT_NEGATIVE) and "over" not in words)
 
 
-def _surely_negative(one: Estimate) -> bool:
+def _is_negative(one: Estimate) -> bool:
+    """Whether all of its interval lies where no rig has it; or its value, where it has none."""
     high = one.combined[1]
-    return cannot_be_negative(one.name) and high is not None and high < 0.0
+    return cannot_be_negative(one.name) and (one.value if high is None else high) < 0.0
 
 
 def _counterpart(name: str) -> str:
@@ -115,7 +124,8 @@ def _counterpart(name: str) -> str:
     return f"{stem}_{swapped[way]}" if way in swapped else name
 
 
-def _likely(negative: set[str]) -> Reason:
-    if not any("inertia" in name for name in negative):
-        return COMPENSATED()
-    return OPPOSITE_SIGNS() if len(negative) > 1 else SCALE_OR_DELAY()
+def _likely(negative: set[str], found: Iterable[str]) -> Reason:
+    if any("inertia" in name for name in negative):
+        return OPPOSITE_SIGNS() if len(negative) > 1 else SCALE_OR_DELAY()
+    dry = any("coulomb" in name for name in negative)
+    return COMPENSATED() if dry and any("inertia" in name for name in found) else NEGATIVE()

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.extrapolated import extrapolated
-from campaign.identification.gate import MATTERS, USELESS, admitted, refused
+from campaign.identification.gate import USELESS, admitted, mattering, refused
 from campaign.identification.intervals import student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
@@ -219,30 +219,28 @@ def differs(found: StribeckFit, freedom: float) -> bool:
 
 def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
     """The parameters of one direction with their intervals, by name, as they may be reported."""
-    return {name: _passed(one, model, fit) for name, one in _fitted(fit, model).items()}
+    return {name: passed(one, model, fit) for name, one in fitted_estimates(fit, model).items()}
 
 
-def _fitted(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
+def fitted_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
+    """The parameters of one direction as fitted: what they are `passed` for still counts."""
     names = PARAMETERS if model != "none" else ("viscous_friction", "coulomb_torque")
     return {name: _estimate(fit, model, fit.fits[model], name) for name in names}
 
 
-def _passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
+def passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
     """A parameter of one direction, or of the mean of both, as it may be reported."""
-    if told.origin is not Origin.MEASURED:
-        return told
+    shape = told.name in ("stribeck_velocity", "stribeck_exponent")
     freedom = min(fit.freedom for fit in fits)
-    if told.name in ("stribeck_velocity", "stribeck_exponent"):
-        if not all(differs(fit.fits[model], freedom) for fit in fits):
-            return refused(told, NO_EFFECT())
-        matters = 0.0
-    else:
-        fastest = {"viscous_friction": max(float(fit.speed.max()) for fit in fits)}
-        force = MATTERS * max(float(fit.torque.max()) for fit in fits)
-        matters = force / fastest.get(told.name, 1.0)
-    one = admitted(told, matters)
+    effect = all(differs(fit.fits[model], freedom) for fit in fits)
+    if shape and not effect and told.origin is Origin.MEASURED:
+        return refused(told, NO_EFFECT())
+    force, rate = (max(float(each.max()) for each in side) for side in (
+        [fit.torque for fit in fits], [fit.speed for fit in fits]
+    ))  # fmt: skip
+    one = admitted(told, 0.0 if shape else mattering(told.name, force, rate))
     against = next(filter(None, (fit.contradiction(model) for fit in fits)), NONE)
-    if against and one.origin is Origin.MEASURED:
+    if against and one.origin in (Origin.MEASURED, Origin.AT_BOUND):
         return replace(one, origin=Origin.CONTRADICTED, reason=against)
     return one
 
@@ -307,14 +305,21 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
 def nominal_estimates(
     positive: DirectionFit, negative: DirectionFit, model: Model
 ) -> dict[str, Estimate]:
-    """Mean of both directions, by name; their errors are those of the same trials.
+    """Mean of both directions, by name, as it may be reported: see `fitted_nominal`."""
+    found = fitted_nominal(positive, negative, model)
+    return {name: passed(each, model, positive, negative) for name, each in found.items()}
+
+
+def fitted_nominal(
+    positive: DirectionFit, negative: DirectionFit, model: Model
+) -> dict[str, Estimate]:
+    """Mean of both directions, by name, as fitted; their errors are those of the same trials.
 
     Points of one speed are of one trial, out and back. How far their errors go together is told by
     the residuals; it was 0.73 to 0.99 where friction scatters from trial to trial.
     """
-    one, other = _fitted(positive, model), _fitted(negative, model)
-    found = {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
-    return {name: _passed(each, model, positive, negative) for name, each in found.items()}
+    one, other = fitted_estimates(positive, model), fitted_estimates(negative, model)
+    return {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
 
 
 def _mean(

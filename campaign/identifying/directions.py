@@ -28,10 +28,14 @@ def with_offset(found: Mapping[str, Estimate], name: str) -> dict[str, Estimate]
         the two differ by less than the wider of their intervals, nothing is added.
     """
     both = [found.get(f"{name}_{way}") for way in ("positive", "negative")]
-    told = [each for each in both if each is not None and each.origin is Origin.MEASURED]
+    told = [each for each in both if each is not None and _is_number(each)]
     widest = max((each.half_width for each in told), default=0.0)
     if len(told) < 2 or not abs(told[0].value - told[1].value) > widest:
         return dict(found)
     reason = OFFSET_OR_ASYMMETRY(half=0.5 * abs(told[0].value - told[1].value))
     names = [key for key, each in found.items() if each in told and not each.reason]
     return {**found, **{key: replace(found[key], reason=reason) for key in names}}
+
+
+def _is_number(one: Estimate) -> bool:
+    return one.origin is Origin.MEASURED and one.kind == "number" and one.has_interval

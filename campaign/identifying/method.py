@@ -46,8 +46,9 @@ class Material:
 
 
 def is_value(estimate: Estimate) -> bool:
-    """Whether a bench file may state it: a measured number, and no bound."""
-    return estimate.origin is Origin.MEASURED and estimate.kind == "number"
+    """Whether a bench file may state it: a measured number with its interval, and no bound."""
+    measured = estimate.origin is Origin.MEASURED and estimate.has_interval
+    return measured and estimate.kind == "number"
 
 
 @dataclass(frozen=True)

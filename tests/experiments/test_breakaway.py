@@ -14,7 +14,7 @@ from campaign.estimate import Estimate, Kind, Systematic
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import default_positions
 from campaign.experiments.results.breakaway_figures import DOTS, _what_shows
-from campaign.experiments.results.breakaway_means import mean
+from campaign.experiments.results.breakaway_means import _between, mean
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.result import Result
@@ -290,6 +290,18 @@ def test_a_mean_with_a_bound_among_its_ramps_is_a_bound_of_their_ends(
         found = mean("bristle_stiffness", ramps)
         assert (found.kind, found.has_interval) == (kind, False)
         assert found.value == pytest.approx(100.0 + side * half, rel=1e-3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_ramp_without_an_interval_leaves_a_mean_with_a_bound_open(order: int) -> None:
+    bound = replace(ramp(130.0, 3.0), low=None, high=None, kind="at most", reason=MADE_UP())
+    lost = Estimate.without_interval("bristle_stiffness", 50.0, "N m/rad", MADE_UP())
+    for found in (
+        mean("bristle_stiffness", [bound, lost][::order]),
+        _between(*[bound, lost][::order]),
+    ):
+        assert (found.kind, found.has_interval) == ("number", False)
+        assert found.reason in MADE_UP
 
 
 def noisy(tree: dict[str, Any]) -> None:

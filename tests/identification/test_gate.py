@@ -99,3 +99,17 @@ def test_friction_that_is_negative_in_one_direction_only_is_a_constant_force() -
         assert one.origin is Origin.NOT_DETERMINED
         assert one.reason in cause
         assert dict(one.reason.values)["cause"] == gate.CONSTANT_FORCE.code
+
+
+def test_without_an_inertia_in_the_model_nothing_is_said_of_a_compensated_force() -> None:
+    falling = {
+        "coulomb_torque_positive": number("coulomb_torque_positive", 2.0, 0.1),
+        "viscous_friction_positive": number("viscous_friction_positive", -0.5, 0.1),
+    }
+    one = admitted_together(falling, {})["viscous_friction_positive"]
+    assert dict(one.reason.values)["cause"] == gate.NEGATIVE.code
+
+
+def test_a_negative_number_without_an_interval_is_unphysical() -> None:
+    one = Estimate("coulomb", -22.0, "N m")
+    assert admitted(one).reason in gate.UNPHYSICAL

@@ -349,7 +349,7 @@ def test_a_period_over_position_is_found() -> None:
     travel = np.ptp(motion.position)
     period = travel / 7.3
     wave = 0.4 * periodic(period)[0].column(motion)
-    found = find_period(motion.position, motion.rate, wave)
+    found = find_period(motion.position, motion.rate, wave, 1.0 / motion.sample_rate)
     assert found == pytest.approx(period, rel=0.02)
 
 
@@ -363,19 +363,23 @@ def strokes(rates: tuple[float, ...], travel: float, step: float) -> tuple[np.nd
     return position, speed
 
 
-def test_slow_strokes_show_a_period_that_most_rows_pass_too_fast() -> None:
+@pytest.mark.parametrize("start", [0.0, 10.0])
+def test_slow_strokes_show_a_period_that_most_rows_pass_too_fast(start: float) -> None:
+    """Also far from zero, and with rows of standstill, which are zero, between strokes."""
     period = 2.0 * np.pi / 12.0  # cogging of a motor: 12 a turn
     position, rate = strokes((0.4, *(30.0,) * 400), 2.0 * np.pi, 0.01)
     assert np.median(np.abs(np.diff(position))) * 10.0 > 2.0 * period
     wave = 0.3 * np.sin(2.0 * np.pi * position / period + 0.4)
     noise = np.random.default_rng(3).normal(0.0, 0.1, len(wave))
-    assert find_period(position, rate, wave + noise) == pytest.approx(period, rel=0.01)
+    rows = np.stack([position + start, rate, wave + noise])
+    rows[:, ::50] = 0.0
+    assert find_period(*rows, 0.01) == pytest.approx(period, rel=0.01)
 
 
 def test_one_period_and_a_half_of_travel_are_enough() -> None:
     position, rate = strokes((0.02, 0.05), 0.41, 0.01)
     wave = 6.0 * np.sign(rate) * np.cos(2.0 * np.pi * position / 0.25)
-    assert find_period(position, rate, wave) == pytest.approx(0.25, rel=0.05)
+    assert find_period(position, rate, wave, 0.01) == pytest.approx(0.25, rel=0.05)
 
 
 # Instruments, prediction, simulation --------------------------------------------------------------

@@ -212,3 +212,15 @@ def test_a_model_that_is_true_is_contradicted_once_in_twenty() -> None:
     count = sum(bool(bent(2.0, seed).contradiction("2")) for seed in range(200))
     low, high = 2, 22  # binomial, 200 of 0.05, 99.9 %
     assert low <= count <= high
+
+
+def test_a_parameter_at_its_bound_says_that_its_model_is_contradicted() -> None:
+    """Of a curve with little viscous friction and a long tail the exponent 2 finds none at all."""
+    speed = np.geomspace(0.002, 1.0, 24)
+    scatter = 1.0 + 1e-4 * np.random.default_rng(2).standard_normal(24)
+    torque = equation_4_6(speed, stribeck_exponent=0.5, viscous_friction=0.03) * scatter
+    fit = fit_direction(speed, torque, np.zeros(24))
+    assert "viscous_friction" in fit.fits["2"].bounds
+    told = direction_estimates(fit, "2")["viscous_friction"]
+    assert told.origin is Origin.CONTRADICTED
+    assert told.reason in CONTRADICTED["2"]

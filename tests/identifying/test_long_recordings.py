@@ -114,6 +114,9 @@ def test_of_a_long_motion_the_parts_that_slide_slowly_are_among_those_fitted(
         assert np.array_equal(each.wanted.time, each.motion.time)
     short = sliding(20.0, (3.0, 5.0))
     assert telling_parts([short], filtering) == [short]
+    behind = telling_parts([long], replace(filtering, skip=700))
+    assert min(float(each.motion.time[0]) for each in behind) >= 7.0
+    assert all(len(each.motion.time) > 450 for each in behind), "nothing more is skipped of a part"
 
 
 def test_every_model_and_every_fit_of_it_is_told_as_it_begins() -> None:

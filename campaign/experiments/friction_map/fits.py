@@ -17,9 +17,10 @@ from campaign.identification.stribeck import PARAMETERS, fit_stribeck
 from campaign.identification.velocity_map import (
     DirectionFit,
     Model,
-    direction_estimates,
     fit_direction,
-    nominal_estimates,
+    fitted_estimates,
+    fitted_nominal,
+    passed,
     shifts,
 )
 from campaign.physics.bench import Bench
@@ -64,10 +65,15 @@ class MapFits:
             parameter: 0.5 * sum(effects[name].get(parameter, 0.0) for name in DIRECTIONS)
             for parameter in PARAMETERS
         }
-        found = {name: direction_estimates(self.fits[name], model) for name in DIRECTIONS}
-        found["nominal"] = nominal_estimates(self.fits["positive"], self.fits["negative"], model)
+        found = {name: fitted_estimates(self.fits[name], model) for name in DIRECTIONS}
+        both = self.fits["positive"], self.fits["negative"]
+        found["nominal"] = fitted_nominal(*both, model)
+        of = {name: (self.fits[name],) for name in DIRECTIONS} | {"nominal": both}
         return {
-            name: {each.name: self._shifted(each, effects[name]) for each in estimates.values()}
+            name: {
+                each.name: passed(self._shifted(each, effects[name]), model, *of[name])
+                for each in estimates.values()
+            }
             for name, estimates in found.items()
         }
 
@@ -76,7 +82,7 @@ class MapFits:
 
     def _shifted(self, told: Estimate, effects: Mapping[str, float]) -> Estimate:
         told = where_it_scatters(told, abs(told.value), DIGITS)
-        if not told.has_interval and told.kind != "at most":
+        if not told.has_interval:
             return told
         if told.name in TORQUES:
             told = with_systematic(told, self.bench, TORQUE_CONSTANT, told.value)

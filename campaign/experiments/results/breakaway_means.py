@@ -86,6 +86,10 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     systematic = shared_parts(found)
     told = next((each for each in found if each.origin is Origin.ASSUMED or _bound(each)), None)
     if told is not None:
+        lacking = next((each for each in found if math.isnan(_end(each, told))), None)
+        if lacking is not None:
+            more = {"systematic": systematic, "origin": lacking.origin}
+            return Estimate.without_interval(quantity, value, unit, lacking.reason, **more)
         value = float(np.mean([_end(each, told) for each in found]))
         return replace(
             told, value=value, low=None, high=None, level=None, standard_error=None, freedom=None,
@@ -111,10 +115,11 @@ def _bound(estimate: Estimate) -> bool:
 
 
 def _end(estimate: Estimate, told: Estimate) -> float:
-    """What a number counts for in a mean with bounds like `told`: its end on that side."""
-    ends = {"at least": estimate.low, "at most": estimate.high}
-    end = ends.get(told.kind)
-    return estimate.value if end is None else end
+    """What a number counts for in a mean with bounds like `told`: its end on that side, or NaN."""
+    if not _bound(told) or estimate.kind == told.kind:
+        return estimate.value
+    end = estimate.low if told.kind == "at least" else estimate.high
+    return math.nan if end is None else end
 
 
 def _width(estimate: Estimate) -> float:
@@ -124,7 +129,8 @@ def _width(estimate: Estimate) -> float:
 def _between(one: Estimate, other: Estimate) -> Estimate:
     """Mean of the means of two directions, whose ramps are independent of each other."""
     systematic = shared_parts((one, other))
-    told = next((each for each in (one, other) if not each.has_interval), None)
+    told = next((each for each in (one, other) if not each.has_interval and not _bound(each)), None)
+    told = told or next((each for each in (one, other) if _bound(each)), None)
     if told is not None:
         value = 0.5 * (_end(one, told) + _end(other, told))
         more = {"origin": told.origin, "kind": told.kind, "method": told.method}

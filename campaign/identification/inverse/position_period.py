@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.identification.inverse.motion import Array
 
@@ -24,39 +23,41 @@ FEWEST_PERIODS = 3.0
 """of rows that count, at least."""
 
 
-def find_period(position: Array, rate: Array, residuals: Array) -> float | None:
+def find_period(position: Array, rate: Array, residuals: Array, interval: float) -> float | None:
     """The period (rad, or m) at which residuals, of shape (n,), repeat most; None for no travel.
 
     Force over position and friction over position (with the sign of the rate) count alike. Of each
     period those rows count that are slow enough to show it, whatever the others do. Whether it is
     worth a term is for blocks that were left out to say.
+
+    Args:
+        rate: zero in rows that were left out, whose position says nothing.
+        interval: of the rows (s).
     """
-    travel = float(np.ptp(position))
-    steps = np.abs(np.gradient(position)) if len(position) > 1 else np.zeros(len(position))
-    moving = (rate != 0.0) & (steps > 1e-3 * float(steps.max(initial=0.0)))
-    if travel == 0.0 or not np.any(moving):
+    steps = np.abs(rate) * interval
+    moving = steps > 1e-3 * float(steps.max(initial=0.0))
+    if not np.any(moving):
+        return None
+    travel = float(np.ptp(position[moving]))
+    if travel == 0.0:
         return None
     most = min(MOST, travel / (FEWEST_ROWS * float(np.quantile(steps[moving], SLOW))))
     counts = np.arange(FEWEST, most, 1.0 / FINE)
-    gains = [_gain(travel / count, position, rate, residuals, steps, moving) for count in counts]
+    rows = position[moving], rate[moving], residuals[moving], steps[moving]
+    gains = [_gain(travel / count, travel, *rows) for count in counts]
     if not any(gains):
         return None
     return float(travel / counts[int(np.argmax(gains))])
 
 
 def _gain(
-    period: float,
-    position: Array,
-    rate: Array,
-    residuals: Array,
-    steps: Array,
-    moving: NDArray[np.bool_],
+    period: float, travel: float, position: Array, rate: Array, residuals: Array, steps: Array
 ) -> float:
     """Rise of the log-likelihood, but for a factor, by waves of this period; 0 for too few rows.
 
     Beyond a spring and friction: a long wave looks like these.
     """
-    own = moving & (steps * FEWEST_ROWS <= period)
+    own = steps * FEWEST_ROWS <= period
     if float(steps[own].sum()) < FEWEST_PERIODS * period:
         return 0.0
     angle, way = 2.0 * np.pi * position[own] / period, np.sign(rate[own])
@@ -67,7 +68,7 @@ def _gain(
     before, after = (
         _unexplained(each, residuals[own]) for each in (line, np.column_stack([line, waves]))
     )
-    if period > float(np.ptp(position)) / CERTAIN and after > WIDE * before:
+    if period > travel / CERTAIN and after > WIDE * before:
         return 0.0
     return len(angle) * float(np.log(before / max(after, 1e-12 * before))) if before > 0 else 0.0
 

@@ -246,7 +246,8 @@ def _period(
     own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
     place = [rows(motion, own, filtering).columns for motion in motions]
     whole = np.concatenate(place)
-    return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals))
+    interval = filtering.decimation / motions[0].sample_rate
+    return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals), interval)
 
 
 def repeats(which: Structure) -> bool:

@@ -19,7 +19,7 @@ from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.identification.frequency.one_inertia import RIGID
 from campaign.identification.frequency.two_mass_model import Side
 from campaign.identification.frequency.welch import Estimator
-from campaign.identification.gate import admitted_together
+from campaign.identification.gate import admitted, admitted_together
 from campaign.identification.intervals import MODEL_MISFIT
 from campaign.identifying.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identifying.frequency.distortion_tables import distortion_tables
@@ -200,7 +200,7 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
         local = _local_of_axis(told, best)
         for name, meaning, unit, advice in MEANINGS:
             nothing = Estimate.without_interval(name, math.nan, unit, reason)
-            estimate = local.get(name, nothing)
+            estimate = admitted(local.get(name, nothing))
             key = APPENDAGE.get(name, "") if hangs_on_load and estimate.has_interval else ""
             yield Parameter(estimate, meaning, unit, key, MORE_PHASES if few else advice)
         return
@@ -299,8 +299,8 @@ def _early(found: Sequence[Found]) -> Iterator[str]:
 
 def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
     drive = told.drive if told.bent else told.axis
-    local = _local(told, best)
-    stands_out = [name for name, each in local.items() if each.has_interval]
+    local = {name: admitted(each) for name, each in _local_of_axis(told, best).items()}
+    stands_out = [name for name, each in local.items() if each.origin is Origin.MEASURED]
     if (drive is None or drive.misfit) and "resonance" in stands_out:
         mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
         if "antiresonance" in stands_out:

@@ -20,7 +20,7 @@ from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.gate import MATTERS, admitted_together
+from campaign.identification.gate import admitted_together, mattering
 from campaign.identification.over_a_turn import OverATurn
 from campaign.identification.steady_stretches import SHORTEST_TIME
 from campaign.identification.stribeck import stribeck
@@ -202,11 +202,13 @@ def _parameters(
     largest = max(abs(quantity.read(point).value) for point in points)
     fastest = max(point.speed for point in points)
     matters = {
-        named: MATTERS * largest / (fastest if name == "viscous_friction" else 1.0)
+        named: mattering(name, largest, fastest)
         for named, (name, _) in names.items()
         if not name.startswith("stribeck")
     }
-    told = with_offset(admitted_together(found, matters), quantity.called("coulomb_torque"))
+    told = admitted_together(found, matters)
+    for name in ("coulomb_torque", "static_torque"):
+        told = with_offset(told, quantity.called(name))
     dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
     both = all(one is not None and is_value(one) for one in dry)
     for named, (name, direction) in names.items():

@@ -307,16 +307,19 @@ def _settings(
     coulomb = by_name.get("coulomb", by_name.get("coulomb_positive"))
     if coulomb is None or not coulomb.bench:
         return {}
-    dry = coulomb.estimate.value
-    return {
+    told: dict[str, tuple[object, str, str]] = {
         f"{FRICTION}.model": ("stribeck", "", "the plain friction of steady sliding"),
-        f"{FRICTION}.static_torque": (dry, "N m", "no static friction was looked for"),
         f"{FRICTION}.stribeck_velocity": (1e-3, "rad/s", "without static friction it is nothing"),
-    } | {
-        BENCH[name]: (0.0, "N m s/rad", "too small to be told")
-        for name, each in by_name.items()
-        if name.startswith("viscous") and not is_value(each.estimate)
     }
+    for name, each in by_name.items():
+        one = each.estimate
+        if name in BENCH and name.startswith("coulomb"):
+            static = BENCH[name].replace("coulomb", "static")
+            told[static] = (one.value, "N m", "no static friction was looked for")
+        elif name in BENCH and name.startswith("viscous") and not each.bench:
+            fitted = 0.0 if one.kind == "at most" else max(one.value, 0.0)
+            told[BENCH[name]] = (fitted, "N m s/rad", "as fitted, and not determined")
+    return told
 
 
 METHOD = Method(

@@ -6,7 +6,6 @@ linear terms are fitted with them. What has no information goes to no bench file
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from pydantic import Field
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.gate import admitted
 from campaign.identification.inverse.motion import Filtering
 from campaign.identification.inverse.terms import Term
 from campaign.identifying.inverse.found import InverseDynamics
@@ -26,7 +26,7 @@ from campaign.identifying.whole.found import Fit, find, product
 from campaign.identifying.whole.parts import telling_parts
 from campaign.identifying.whole.shown import figures, models_table, values_table
 from campaign.options import Options
-from campaign.reason import NONE, Cause, Reason
+from campaign.reason import Cause, Reason
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.units import Frequency, Time
 
@@ -97,7 +97,10 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
         unseen = moved(trials, filtering)
     moves = with_slowest(filtering, whole, None)
     pieces = telling_parts(whole, moves)
-    filtering = replace(filtering, slowest=STILL * moves.slowest)
+    if pieces is not whole:  # parts lie behind what is skipped
+        unseen = tuple(each.part(slice(moves.skip, None)) for each in unseen)
+        moves = replace(moves, skip=0)
+    filtering = replace(moves, slowest=STILL * moves.slowest)
     regression = find_inverse(pieces, unseen, moves, linear=material.bench.is_linear)
     extra = _linear_terms(regression)
     held = regression.instruments
@@ -120,22 +123,22 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
             conclusions=tuple(_conclusions(best)),
         ),
         correlations=best.fit.correlation,
-        settings=_settings(best),
+        settings=_settings(best, parameters),
         again={"model": best.model.name},
         unseen=Unseen(best.validation.value) if best.validation is not None else None,
-        left_out=tuple(filter(None, [_left_out(whole, pieces)])),
+        left_out=_left_out(whole, pieces),
     )
 
 
-def _left_out(whole: Sequence[Moved], parts: Sequence[Moved]) -> Reason:
+def _left_out(whole: Sequence[Moved], parts: Sequence[Moved]) -> tuple[Reason, ...]:
     """Of long recordings."""
-    if len(parts) == len(whole) and all(map(operator.is_, parts, whole)):
-        return NONE
+    if parts is whole:
+        return ()
     used, recorded = (
         sum(len(each.motion.time) / each.motion.sample_rate for each in side)
         for side in (parts, whole)
     )
-    return PARTS(used=used, recorded=recorded, parts=len(parts))
+    return (PARTS(used=used, recorded=recorded, parts=len(parts)),)
 
 
 def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
@@ -156,7 +159,7 @@ def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
             bench = f"{FRICTION}.{keys[name].key}"
         advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
         display = "ms" if name == "delay" else ""
-        one = _scaled(estimate, material)
+        one = admitted(_scaled(estimate, material))
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
     for each in best.model.numbers:
         if not each.over:
@@ -169,7 +172,8 @@ def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
         made = product(f"static_torque{way}", ratio, told[base], share)
         meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
         advice = ADVICE[RATIO]
-        yield Parameter(_scaled(made, material), meaning, "", f"{FRICTION}.{each.key}", advice)
+        made = admitted(_scaled(made, material))
+        yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", advice)
 
 
 def _scaled(one: Estimate, material: Material) -> Estimate:
@@ -182,19 +186,20 @@ def _scaled(one: Estimate, material: Material) -> Estimate:
     return with_scale(one, data, force_of(data))
 
 
-def _settings(best: Fit) -> dict[str, tuple[object, str, str]]:
+def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[object, str, str]]:
     """The model's name, and numbers that the motion leaves open: a bench needs them, too."""
+    stated = {each.bench for each in parameters}
     told: dict[str, tuple[object, str, str]] = {
         f"{FRICTION}.model": (best.model.model, "", "fitted")
     }
     values = best.values
     flat = {each.unknown.name: each for each in best.model.numbers if not each.over}
     for name, estimate in best.fit.estimates.items():
-        if name in flat and estimate.origin is not Origin.MEASURED:
+        if name in flat and f"{FRICTION}.{flat[name].key}" not in stated:
             each = flat[name]
             told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, str(estimate.reason))
     for each in best.model.numbers:
-        if each.over and best.fit.estimates[each.unknown.name].origin is not Origin.MEASURED:
+        if each.over and f"{FRICTION}.{each.key}" not in stated:
             base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
             value = values[each.unknown.name] * values[base]
             told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")

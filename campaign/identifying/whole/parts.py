@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +31,8 @@ def telling_parts(pieces: Sequence[Moved], filtering: Filtering) -> Sequence[Mov
     every = steps_between(filtering)
     if sum(len(each.motion.time) for each in pieces) <= MOST_STEPS * every:
         return pieces
-    parts = [part for each in pieces for part in _cut(each)]
+    parts = [part for each in pieces for part in _cut(each, filtering.skip)]
+    filtering = replace(filtering, skip=0)
     terms = _terms(max(float(np.abs(each.motion.rate).max()) for each in pieces))
     columns = [rows(part.motion, terms, filtering).columns for part in parts]
     squares = np.array([each.T @ each for each in columns])
@@ -49,9 +51,10 @@ def telling_parts(pieces: Sequence[Moved], filtering: Filtering) -> Sequence[Mov
     return [parts[i] for i in sorted(chosen)]
 
 
-def _cut(piece: Moved) -> list[Moved]:
-    count = max(1, round(len(piece.motion.time) / (PART * piece.motion.sample_rate)))
-    edges = np.linspace(0, len(piece.motion.time), count + 1).astype(int)
+def _cut(piece: Moved, skip: int) -> list[Moved]:
+    left = len(piece.motion.time) - skip
+    count = max(1, round(left / (PART * piece.motion.sample_rate)))
+    edges = skip + np.linspace(0, left, count + 1).astype(int)
     return [piece.part(slice(int(a), int(b))) for a, b in pairwise(edges)]
 
 

@@ -1,0 +1,66 @@
+"""Friction by direction, and the constant force that may be in it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from campaign.estimate import Estimate, Origin
+from campaign.identifying.directions import OFFSET_OR_ASYMMETRY, with_offset
+from campaign.identifying.method import Material, Parameter
+from campaign.identifying.methods.inverse_dynamics import BENCH, _settings
+from campaign.physics.bench import Bench
+
+
+def number(name: str, value: float, half: float, **more: Any) -> Estimate:
+    return Estimate(name, value, "N m", value - half, value + half, 0.95, **more)
+
+
+def test_half_of_the_difference_stands_beside_both_directions() -> None:
+    """A sensor's zero of 0.4 N m on friction of 3.36 N m both ways."""
+    found = {
+        "coulomb_positive": number("coulomb_positive", 3.76, 0.37),
+        "coulomb_negative": number("coulomb_negative", 2.95, 0.30),
+    }
+    for one in with_offset(found, "coulomb").values():
+        assert one.reason in OFFSET_OR_ASYMMETRY
+        assert dict(one.reason.values)["half"] == pytest.approx(0.405)
+        assert one.origin is Origin.MEASURED
+
+
+@pytest.mark.parametrize(
+    "negative",
+    [
+        number("coulomb_negative", 3.6, 0.30),
+        number("coulomb_negative", 0.2, 0.01, origin=Origin.NOT_DETERMINED),
+        Estimate("coulomb_negative", 0.2, "N m", level=0.95, kind="at most"),
+    ],
+)
+@pytest.mark.parametrize("first", ["coulomb_positive", "coulomb_negative"])
+def test_nothing_is_said_where_they_do_not_differ_or_one_is_no_number(
+    negative: Estimate, first: str
+) -> None:
+    both = {"coulomb_positive": number("coulomb_positive", 3.76, 0.37), negative.name: negative}
+    found = {name: both[name] for name in sorted(both, reverse=first == "coulomb_positive")}
+    assert with_offset(found, "coulomb") == found
+
+
+def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> None:
+    """Static friction of each direction is its Coulomb friction; a refused number is as fitted."""
+    refused = number("viscous_negative", 80.0, 60.0, origin=Origin.NOT_DETERMINED)
+    bound = Estimate("viscous_positive", 4.0, "N m s/rad", level=0.95, kind="at most")
+    found = [
+        number("coulomb_positive", 2.95, 0.3),
+        number("coulomb_negative", 3.76, 0.3),
+        bound,
+        refused,
+    ]
+    parameters = [Parameter(one, "", bench=BENCH[one.name]) for one in found]
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
+    told = _settings(parameters, Material(bench, cast("Any", (SimpleNamespace(),))))
+    assert told["friction.load.static_torque"][0] == 2.95
+    assert told["friction.load.negative.static_torque"][0] == 3.76
+    assert told["friction.load.viscous_friction"][0] == 0.0
+    assert told["friction.load.negative.viscous_friction"][0] == 80.0
