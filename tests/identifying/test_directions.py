@@ -10,7 +10,7 @@ import pytest
 from campaign.estimate import Estimate, Origin
 from campaign.identifying.directions import OFFSET_OR_ASYMMETRY, with_offset
 from campaign.identifying.method import Material, Parameter
-from campaign.identifying.methods.inverse_dynamics import BENCH, _settings
+from campaign.identifying.methods.inverse_dynamics import BENCH, NO_BASE, _settings, _with_base
 from campaign.physics.bench import Bench
 
 
@@ -64,3 +64,15 @@ def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> 
     assert told["friction.load.negative.static_torque"][0] == 3.76
     assert told["friction.load.viscous_friction"][0] == 0.0
     assert told["friction.load.negative.viscous_friction"][0] == 80.0
+
+
+def test_what_else_is_in_a_force_is_not_told_where_neither_inertia_nor_friction_is() -> None:
+    open_ = {"origin": Origin.NOT_DETERMINED}
+    found = {
+        "inertia": number("inertia", 1.0, 3.0, **open_),
+        "coulomb": number("coulomb", 1.0, 3.0, **open_),
+        "cogging_sine": number("cogging_sine", 33.0, 12.0),
+    }
+    assert _with_base(found)["cogging_sine"].reason in NO_BASE
+    base = found | {"coulomb": number("coulomb", 1.0, 0.1)}
+    assert _with_base(base) == base

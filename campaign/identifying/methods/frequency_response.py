@@ -113,7 +113,7 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
     how = Reading(options.excited, options.estimator, options.resolution, options.period)
     measured, remarks = sources(material.trials, material.bench, how)
     if not measured:
-        raise ValueError(" ".join(remarks) or "no trial gives a response")
+        raise ValueError(" ".join(dict.fromkeys(remarks)) or "no trial gives a response")
     band = Band(options.lowest, options.highest, options.order)
     found = [found_in(each, band) for each in measured]
     best = best_source(found)

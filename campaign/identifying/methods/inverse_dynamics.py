@@ -17,7 +17,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.gate import admitted_together
+from campaign.identification.gate import admitted_together, refused
 from campaign.identification.inverse.motion import Filtering
 from campaign.identification.inverse.terms import TERMS
 from campaign.identifying.directions import with_offset
@@ -57,6 +57,9 @@ BENCH = {
 }
 """Where coefficients go that a bench has a place for: a plain friction model of steady sliding."""
 PLAIN = frozenset(BENCH) | {"offset"}
+NO_BASE = Cause(
+    "no base", "neither inertia nor dry friction is determined, so that nothing beside them is"
+)
 SEARCHED = Cause(
     "searched", "it is the best of a search, an eighth of a period apart over the travel"
 )
@@ -147,7 +150,7 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
         for name, other in ((one, two), (two, one))
     }
     scaled = {name: _scaled(one, material) for name, one in found.estimates.items()}
-    told = with_offset(admitted_together(scaled, found.matters), "coulomb")
+    told = with_offset(_with_base(admitted_together(scaled, found.matters)), "coulomb")
     dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
     slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
     for term in found.best.structure.terms:
@@ -173,6 +176,19 @@ def _parameters(found: InverseDynamics, material: Material) -> Iterator[Paramete
             display="ms",
             advice="record faster, or with sharper reversals",
         )
+
+
+def _with_base(told: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Further terms are told beside inertia or dry friction, and not alone: the rest of nothing."""
+    base = {name for name in told if name == "inertia" or name.startswith("coulomb")}
+    if any(told[name].origin is not Origin.NOT_DETERMINED for name in base):
+        return told
+    further = {name: one for name, one in told.items() if name not in base}
+    return told | {
+        name: refused(one, NO_BASE())
+        for name, one in further.items()
+        if one.origin is Origin.MEASURED
+    }
 
 
 def one_way(found: InverseDynamics) -> str:

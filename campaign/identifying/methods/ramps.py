@@ -39,7 +39,7 @@ MEANINGS = {
 }
 ADVICE = {
     BREAKAWAY: "more ramps",
-    STRONGEST: "more, and slower, ramps",
+    STRONGEST: "more ramps, and faster ones where noise hides the beginning",
     WEAKER: "more, and slower, ramps",
 }
 
