@@ -15,9 +15,7 @@ from campaign.reason import Cause
 
 OFFSET_OR_ASYMMETRY = Cause(
     "offset or asymmetry",
-    "{half:.3g} of it, half of the difference between the directions, may be a constant force "
-    "such as a sensor's zero or a weight, which this motion does not tell from asymmetric friction "
-    "(the mean of both directions holds none of it)",
+    "{half:.3g} of it, half of the difference between the directions, may be a constant force",
 )
 
 
