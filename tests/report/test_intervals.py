@@ -227,6 +227,19 @@ def test_the_file_has_the_ends_behind_its_old_columns() -> None:
     assert second == "1000.0,2000.0,,"
 
 
+def test_numbers_of_a_contradicted_model_are_flagged_on_the_page_and_in_the_file() -> None:
+    wrong = estimate(
+        1.0, 0.1, origin=Origin.CONTRADICTED, reason=Reason("test", "the exponent is not 2")
+    )
+    held = table({"a": [wrong, ALONE], "b": [1.0, 2.0]})
+    assert show(held).rows[0][0].text.endswith("†")
+    assert any("†" in text and "the exponent is not 2" in text for text in remarks(held))
+    head, first, second = table_csv(held).splitlines()
+    assert head == "a_mN_m,b_mN_m,a_mN_m_low,a_mN_m_high,a_mN_m_origin"
+    assert first.endswith(",model contradicted")
+    assert second.endswith(",measured")
+
+
 # Figures
 
 

@@ -72,7 +72,8 @@ def table_csv(table: Table) -> str:
     """All rows, unrounded, in display units that the header names (`error_mrad`).
 
     Behind them the ends of each interval, systematic parts included: `error_mrad_low`, `_high`;
-    last what is published beside them.
+    then what is published beside them; last `NAME_origin` of columns with numbers of a model that
+    the data contradict.
     """
     ends = [
         c for c in table.columns if any(isinstance(r.get(c.name), Estimate) for r in table.rows)
@@ -83,15 +84,22 @@ def table_csv(table: Table) -> str:
     headers = [_csv_name(column) for column in first]
     headers += [f"{_csv_name(column)}_{end}" for column in ends for end in ("low", "high")]
     headers += [_csv_name(column) for column in last]
+    flagged = [c for c in ends if any(_contradicted(cell, c) for cell in _numbers(table, c))]
+    headers += [f"{_csv_name(column)}_origin" for column in flagged]
     rows = (
         [
             *(_exact(_displayed(bare(row.get(c.name)), c)) for c in first),
             *(_exact(_displayed(end, c)) for c in ends for end in _ends(row.get(c.name))),
             *(_exact(_displayed(bare(row.get(c.name)), c)) for c in last),
+            *(_origin(row.get(c.name)) for c in flagged),
         ]
         for row in table.rows
     )
     return _csv(headers, rows)
+
+
+def _origin(cell: Cell) -> str:
+    return cell.origin.value if isinstance(cell, Estimate) else ""
 
 
 def _ends(cell: Cell) -> tuple[float | None, float | None]:
