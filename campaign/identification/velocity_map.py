@@ -223,7 +223,7 @@ def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
 
 
 def fitted_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
-    """The parameters of one direction as fitted: what they are `passed` for still counts."""
+    """The parameters of one direction as fitted; `passed` says how they may be reported."""
     names = PARAMETERS if model != "none" else ("viscous_friction", "coulomb_torque")
     return {name: _estimate(fit, model, fit.fits[model], name) for name in names}
 
@@ -235,9 +235,8 @@ def passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
     effect = all(differs(fit.fits[model], freedom) for fit in fits)
     if shape and not effect and told.origin is Origin.MEASURED:
         return refused(told, NO_EFFECT())
-    force, rate = (max(float(each.max()) for each in side) for side in (
-        [fit.torque for fit in fits], [fit.speed for fit in fits]
-    ))  # fmt: skip
+    force = max(float(fit.torque.max()) for fit in fits)
+    rate = max(float(fit.speed.max()) for fit in fits)
     one = admitted(told, 0.0 if shape else mattering(told.name, force, rate))
     against = next(filter(None, (fit.contradiction(model) for fit in fits)), NONE)
     if against and one.origin in (Origin.MEASURED, Origin.AT_BOUND):

@@ -21,6 +21,7 @@ from campaign.identifying.method import (
     Method,
     Parameter,
     nobody_listens,
+    say_at,
 )
 from campaign.physics.bench import Bench
 from campaign.plugins import Kinds
@@ -129,17 +130,13 @@ def identify(
     sections = []
     names = list(models or methods)
     for number, name in enumerate(names, 1):
-        say_of = partial(_say_of, f"method {number} of {len(names)}", say)
+        say_of = partial(say_at, say, f"method {number} of {len(names)}")
         section = _section(methods[name], given[name], bench, chosen, validation, say_of)
         if compared is not None and section.identified is not None:
             section = _compared(section, section.identified, bench, compared, say_of)
         sections.append(section)
     sections.sort(key=lambda each: each.identified is None)
     return Identification(chosen, validation, compared, bench, tuple(_adjusted(sections)))
-
-
-def _say_of(step: str, say: Callable[[str], None], text: str) -> None:
-    say(f"{step}, {text}")
 
 
 def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:

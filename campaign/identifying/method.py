@@ -27,6 +27,11 @@ def nobody_listens(text: str) -> None:
     """Where nobody waits."""
 
 
+def say_at(say: Callable[[str], None], step: str, text: str) -> None:
+    """Tell what is being done at a step of several, e.g. `method 2 of 5`."""
+    say(f"{step}, {text}")
+
+
 @dataclass(frozen=True)
 class Material:
     """What is identified from.

@@ -29,6 +29,7 @@ from campaign.identification.whole_model import (
 )
 from campaign.identifying.inverse.found import together
 from campaign.identifying.inverse.motions import Moved, never_moved
+from campaign.identifying.method import say_at
 from campaign.identifying.whole.models import Model, Sizes, models
 from campaign.identifying.whole.residuals import Residuals, steps_between
 from campaign.reason import Cause, Reason
@@ -42,14 +43,18 @@ BAND = 0.4
 RESOLVED = 3.0
 """Time constants of the low-pass that something must take to be seen as more than a jump."""
 NORMAL_95 = 1.96
-DELAY_UNKNOWN = Cause("delay unknown", "a delay of {shown} more or less leaves it open")
+DELAY_UNKNOWN = Cause(
+    "delay unknown", "a delay of {milliseconds:.2g} ms more or less leaves it open"
+)
 HALF_BAND = Cause("half band differs", "half the band finds {shown}")
 LOOP_IN_DELAY = Cause("loop in the delay", "it takes what a loop makes of noise as well")
 COULOMB_AT_BOUND = Cause(
     "Coulomb friction at bound", "it says how a Coulomb friction changes that went to its bound"
 )
 NO_STIFFNESS = Cause("no stiffness", "without a stiffness it means nothing")
-UNRESOLVED = Cause("faster than rows", "{what} takes {shown}, and rows show {least_shown}")
+UNRESOLVED = Cause(
+    "faster than rows", "{what} takes {milliseconds:.2g} ms, and rows show {resolved:.2g} ms"
+)
 FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
 WIDE = 5.0
 """How many times more or less than plain inverse dynamics the inertia may be."""
@@ -113,7 +118,7 @@ def find(
     fits: list[Fit] = []
     tried = models(sizes)
     for number, model in enumerate(tried, 1):
-        done = partial(_say_fit, say, f"model {number} of {len(tried)} ({model.name})")
+        done = partial(say_at, say, f"model {number} of {len(tried)} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
         one = _fitted(model, terms, motions, filtering, inertia, starts, done, known)
@@ -122,10 +127,6 @@ def find(
         fits.append(one)
     best = min(range(len(fits)), key=lambda i: fits[i].held_out)
     return Whole(tuple(fits), best, filtering, tuple(pieces))
-
-
-def _say_fit(say: Callable[[str], None], which: str, text: str) -> None:
-    say(f"{which}, {text}")
 
 
 def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
@@ -215,7 +216,7 @@ def _with_delay(fit: ModelFit, doubt: float) -> ModelFit:
             continue
         found[name] = shifted_by(one, "delay", abs(moved[name]))
         if found[name].half_width > USELESS * abs(one.value):
-            reason = DELAY_UNKNOWN(shown=f"{1e3 * doubt:.2g} ms", delay=doubt)
+            reason = DELAY_UNKNOWN(milliseconds=1e3 * doubt)
             found[name] = _open(one, reason)
     return replace(fit, estimates=found)
 
@@ -285,13 +286,7 @@ def resolved(
     def refuse(names: Sequence[str], takes: float, what: str) -> None:
         if takes >= shortest:
             return
-        reason = UNRESOLVED(
-            what=what,
-            shown=f"{takes * 1e3:.2g} ms",
-            least_shown=f"{shortest * 1e3:.2g} ms",
-            duration=takes,
-            least=shortest,
-        )
+        reason = UNRESOLVED(what=what, milliseconds=1e3 * takes, resolved=1e3 * shortest)
         for name in names:
             if name in found:
                 found[name] = _open(found[name], reason)
