@@ -31,9 +31,7 @@ MOVES_NOTHING = ("name", "description", "limits")
 NOT_EXECUTED = "none of its trials was executed"
 NOT_READABLE = "none of its trials can be read"
 GONE_ON = "the run was gone on with on a changed bench"
-MEASURE_ANEW = (
-    "; `campaign report --measure-anew` gives one: it does not use archived metrics"
-)
+MEASURE_ANEW = "; `campaign report --measure-anew` gives one: it does not use archived metrics"
 
 
 @dataclass(frozen=True)
