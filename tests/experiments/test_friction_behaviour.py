@@ -82,6 +82,10 @@ def test_the_stribeck_curve_is_reached() -> None:
         expected = np.sign(v) * (FC + (FS - FC) * math.exp(-((v / VS) ** 2))) + S2 * v
         assert row["torque"] == pytest.approx(expected, rel=1e-6)
     assert finding(result, "stribeck_deviation").value < 1e-6
+    (shown,) = result.figures
+    drawn = [curve.low for panel in shown.panels for curve in panel.curves if curve.low is not None]
+    assert not any(np.isfinite(low).any() for low in drawn)
+    assert "interval" not in shown.caption, "nothing scatters, and no bars are drawn"
 
 
 def lag_width(frequency: float, mean: float, amplitude: float) -> float:

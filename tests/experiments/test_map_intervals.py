@@ -10,10 +10,13 @@ from functools import cache, lru_cache
 import numpy as np
 import pytest
 
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.friction_map.figures import falls
 from campaign.experiments.friction_map.fits import MapFits, fit_map
 from campaign.experiments.friction_map.points import map_points, measure
 from campaign.experiments.interface import bench_of
+from campaign.identification.gate import TOO_WIDE
+from campaign.identification.velocity_map import fit_direction
 from campaign.physics.bench import Bench
 from campaign.result import Table
 from tests.experiments.laboratory import Done, analyse, execute, table_of_estimates, trials
@@ -200,6 +203,20 @@ def test_a_systematic_part_follows_the_torque_constant(monkeypatch: pytest.Monke
     assert static.half_width > 0.0196 * static.value
 
 
+def test_the_gate_judges_a_number_with_its_systematic_parts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A torque constant known to 40 % leaves every torque at 78 % at least, and vs as it was."""
+    monkeypatch.setattr(
+        "campaign.experiments.shared.systematic.known_uncertainty",
+        lambda bench, path: {"motor.torque_constant": 0.4}.get(path),
+    )
+    for found in fitted(1, told=True).estimates("free").values():
+        assert found["static_torque"].reason in TOO_WIDE
+        assert found["coulomb_torque"].reason in TOO_WIDE
+        assert found["stribeck_velocity"].origin is Origin.MEASURED
+
+
 def test_several_start_angles_are_averaged_and_make_one_map() -> None:
     """Half a period apart a ripple has the other sign; the map has as many speeds as before."""
     half = 0.5 * 360.0 / 67.0
@@ -235,3 +252,14 @@ def without(item: Done, lost: np.ndarray) -> Done:
         for name, each in item.samples.channels.items()
     }
     return replace(item, samples=replace(item.samples, channels=channels))
+
+
+def test_a_map_that_bends_is_said_to_fall_although_its_static_friction_is_not_known() -> None:
+    """From half the Stribeck velocity on: Ts scatters, and a straight line does not fit."""
+    speed = np.geomspace(0.015, 1.0, 14)
+    curve = 30.2 + 7.4 * np.exp(-speed / 0.03) + 4.14 * speed
+    torque = curve * (1.0 + 0.02 * np.random.default_rng(0).standard_normal(14))
+    fit = fit_direction(speed, torque, np.zeros(14))
+    assert not fit.shows_stribeck_effect
+    assert fit.contradiction("none")
+    assert falls(fit)

@@ -8,8 +8,10 @@ from typing import Any, cast
 import pytest
 
 from campaign.estimate import Estimate, Origin
+from campaign.identification.gate import TOO_WIDE
 from campaign.identifying.directions import OFFSET_OR_ASYMMETRY, with_offset
 from campaign.identifying.method import Material, Parameter
+from campaign.identifying.methods import friction_map, whole_model
 from campaign.identifying.methods.inverse_dynamics import BENCH, NO_BASE, _settings, _with_base
 from campaign.physics.bench import Bench
 
@@ -76,3 +78,54 @@ def test_what_else_is_in_a_force_is_not_told_where_neither_inertia_nor_friction_
     assert _with_base(found)["cogging_sine"].reason in NO_BASE
     base = found | {"coulomb": number("coulomb", 1.0, 0.1)}
     assert _with_base(base) == base
+
+
+def test_a_curve_gets_what_was_fitted_beside_what_was_measured() -> None:
+    """A Stribeck velocity that is not determined goes into the file as it was fitted, assumed."""
+    names = ("coulomb_torque", "static_torque", "stribeck_velocity")
+    values = {"coulomb_torque": 3.0, "static_torque": 4.0, "stribeck_velocity": 1.2}
+    found, parameters = {}, []
+    for way, prefix in (("positive", ""), ("negative", "negative.")):
+        found[way] = {name: number(name, values[name], 0.1) for name in names}
+        open_ = number("stribeck_velocity", 1.2, 0.9, origin=Origin.NOT_DETERMINED)
+        found[way]["stribeck_velocity"] = open_
+        parameters += [
+            Parameter(one, "", bench=f"friction.load.{prefix}{name}")
+            for name, one in found[way].items()
+        ]
+    told = friction_map._settings(found, parameters)
+    for prefix in ("", "negative."):
+        assert told[f"friction.load.{prefix}stribeck_velocity"][0] == 1.2
+        assert f"friction.load.{prefix}static_torque" not in told, "measured, and stands there"
+
+
+def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
+    """Coulomb friction and the ratio to it are each known well enough, and static friction is not."""
+
+    def of(name: str, key: str, over: str = "") -> Any:
+        return SimpleNamespace(
+            unknown=SimpleNamespace(name=name), key=key, over=over, meaning="", unit=""
+        )
+
+    told = {
+        "coulomb": number("coulomb", 1.0, 0.45, standard_error=0.23),
+        "static_over_coulomb": number("static_over_coulomb", 1.2, 0.55, standard_error=0.28),
+    }
+    numbers = (
+        of("coulomb", "coulomb_torque"),
+        of("static_over_coulomb", "static_torque", "coulomb_torque"),
+    )
+    best: Any = SimpleNamespace(
+        fit=SimpleNamespace(estimates=told, correlation={}),
+        model=SimpleNamespace(numbers=numbers),
+        extra=(),
+    )
+    trial = SimpleNamespace(
+        trial=SimpleNamespace(recording={"channels": []}), channel_names=frozenset
+    )
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
+    parameters = list(whole_model._parameters(best, Material(bench, cast("Any", (trial,)))))
+    found = {each.estimate.name: each for each in parameters}
+    assert found["coulomb"].bench == "friction.load.coulomb_torque"
+    assert found["static_torque"].estimate.reason in TOO_WIDE
+    assert found["static_torque"].bench == ""

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPERATURE
 from campaign.estimate import Origin
 from campaign.identification import gate
 from campaign.identification.inverse.motion import Filtering
@@ -119,3 +119,28 @@ def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
     found, _ = points_of((trial,), bench, 0.5)
     assert sorted(point.speed for point in found) == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=0.01)
     assert slower((trial,), bench, 0.5, found) == 4
+
+
+def test_friction_that_falls_exponentially_with_heat_is_held_by_a_line_over_it() -> None:
+    """0.8 N m at 20 degC; what the line misses of its curve is a systematic part."""
+    warm = 20.0 + 15.0 * (1.0 - np.exp(-TIME / 7.0))
+    rate = np.gradient(SWING, TIME)
+    dry = 0.8 * np.exp(-(warm - 20.0) / 30.0) * np.sign(rate)
+    force = 0.1 * np.gradient(rate, TIME) + dry + 0.1 * rate + 0.01 * NOISE[0]
+    trial = recorded(
+        Channel(RELATIVE_ANGLE, "rad", "angle", "deg", SWING),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", force),
+        Channel(TEMPERATURE, "degC", "temperature", "degC", warm),
+    )
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
+    found = METHOD.identify(Material(bench, cast("Any", (trial,)), ()), METHOD.options())
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    assert "coulomb_over_temperature" in told
+    for way in ("positive", "negative"):
+        one = told[f"coulomb_{way}"]
+        sources = {part.source: part.standard_uncertainty or 0.0 for part in one.systematic}
+        assert sources["curve over temperature"] > 0.003
+        low, high = one.combined
+        assert low is not None
+        assert high is not None
+        assert low <= 0.8 <= high

@@ -94,7 +94,7 @@ def _law(curve: Curve, direction: str) -> Curve:
     return replace(curve, conditions={"direction": direction}, law=stribeck, parameters=UNITS)
 
 
-def _falls(fit: DirectionFit) -> bool:
+def falls(fit: DirectionFit) -> bool:
     """Whether friction falls as sliding becomes faster, beyond what scatter leaves open."""
     values = fit.fits["free"].values
     bends = fit.shows_stribeck_effect or bool(fit.contradiction("none"))
@@ -113,7 +113,7 @@ def _least_marks(fits: MapFits) -> dict[str, list[Mark]]:
     """Where the friction of each direction is least, if it falls at all."""
     marks: dict[str, list[Mark]] = {name: [] for name in fits.fits}
     for name, fit in fits.fits.items():
-        least = _least(fit) if _falls(fit) else None
+        least = _least(fit) if falls(fit) else None
         if least is not None:
             speed, torque = least
             label = f"{amount(torque, 'N m')} at {amount(speed, 'rad/s', 'deg/s', 2)}"
@@ -123,7 +123,7 @@ def _least_marks(fits: MapFits) -> dict[str, list[Mark]]:
 
 def _what_shows(fits: MapFits) -> str:
     """What the fits say of friction at low and at high speed: true of this map."""
-    fall = [name for name, fit in fits.fits.items() if _falls(fit)]
+    fall = [name for name, fit in fits.fits.items() if falls(fit)]
     rise = [name for name in fits.fits if _rises(fits, name)]
     effect = "friction falls as sliding becomes faster (Stribeck effect)"
     viscous = "rises with viscous friction"
