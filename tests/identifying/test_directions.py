@@ -100,7 +100,7 @@ def test_a_curve_gets_what_was_fitted_beside_what_was_measured() -> None:
 
 
 def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
-    """Coulomb friction and the ratio to it are each known well enough, and static friction is not."""
+    """Coulomb friction and the ratio to it are each known well enough; their product is not."""
 
     def of(name: str, key: str, over: str = "") -> Any:
         return SimpleNamespace(
