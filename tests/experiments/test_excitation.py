@@ -14,8 +14,9 @@ from campaign.archive import ArchivedTrial
 from campaign.backends.serial import SerialBackend, SerialOptions
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
-from campaign.experiments.results.excitation_account import dynamics_of
+from campaign.experiments.results.excitation_account import dynamics_of, motion_of
 from campaign.experiments.shared.excitation_options import ExcitationOptions
+from campaign.identification.gate import UNPHYSICAL
 from campaign.identifying.methods.frequency_response import METHOD as FREQUENCY_RESPONSE
 from campaign.identifying.methods.inverse_dynamics import METHOD as INVERSE_DYNAMICS
 from campaign.physics.bench import Bench
@@ -198,6 +199,20 @@ def test_a_series_tells_the_inertia_and_friction_of_the_bench() -> None:
     assert rows["condition number, reached"] == pytest.approx(designed, rel=0.2)
     assert [figure.key for figure in result.figures] == ["command", "torque", "plane"]
     assert "tells inertia" in words(result)
+
+
+def test_a_force_of_the_wrong_sign_has_no_inertia_and_no_friction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    turned = motion_of(series()[0])
+    turned = replace(turned, force=-turned.force)
+    monkeypatch.setattr(
+        "campaign.experiments.results.excitation_account.motion_of", lambda _: turned
+    )
+    found = dynamics_of(series()[:1]).estimates
+    assert found["inertia"].value < 0.0
+    for name in ("inertia", "coulomb_positive", "coulomb_negative"):
+        assert found[name].reason in UNPHYSICAL
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -11,7 +11,7 @@ import pytest
 
 from campaign.channels import LOAD_RATE
 from campaign.errors import ArchiveError
-from campaign.estimate import Estimate
+from campaign.estimate import Estimate, Origin
 from campaign.experiments import breakaway, experiments
 from campaign.experiments.interface import (
     Experiment,
@@ -21,8 +21,10 @@ from campaign.experiments.interface import (
     result_of,
 )
 from campaign.experiments.preparing.unusable import NOT_MEASURED
+from campaign.identification.intervals import SPANS_DECADES
 from campaign.identification.presliding import Presliding
-from campaign.result import Finding, Result
+from campaign.identification.presliding_curve import Interface
+from campaign.result import Column, Finding, Result, Table
 from tests.experiments.laboratory import Done, analyse, execute, finding, trials
 from tests.experiments.test_breakaway import TWO, load_only
 from tests.physics.benches import bench
@@ -129,3 +131,25 @@ def test_a_ramp_whose_numbers_overflow_costs_that_ramp(monkeypatch: pytest.Monke
     assert finding(result, "bristle_stiffness", statistic="mean").value == pytest.approx(
         18000.0, rel=0.02
     )
+
+
+def test_a_stiffness_at_rest_over_decades_is_left_to_the_other_ramps() -> None:
+    """Its value is anything: in the mean of all ramps it would decide."""
+    known = Estimate("bristle_stiffness", 100.0, "N m/rad", 90.0, 110.0, 0.95)
+    lost = Estimate.without_interval(
+        "stiffness_at_rest", 7e10, "N m/rad", SPANS_DECADES(), origin=Origin.NOT_DETERMINED
+    )
+    curve = Presliding(
+        known, lost, (Interface(100.0, 20.0),), 0.0, (0.0, 16.0), 90.0, {}, (0.0, 0.0)
+    )
+    on = bench()
+    options = breakaway.BreakawayOptions()
+    found = {each.name for each in breakaway._of_curve(curve, options, on)}
+    assert "bristle_stiffness" in found
+    assert "stiffness_at_rest" not in found
+
+
+def test_a_table_without_rows_is_no_result() -> None:
+    empty = Table("points", "Points", (Column("a", "A"),), ())
+    assert Result((empty,)).is_empty
+    assert not Result((replace(empty, rows=({"a": 1.0},)),)).is_empty

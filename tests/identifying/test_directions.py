@@ -8,10 +8,10 @@ from typing import Any, cast
 import pytest
 
 from campaign.estimate import Estimate, Origin
-from campaign.identification.gate import TOO_WIDE
+from campaign.identification.gate import TOO_WIDE, UNPHYSICAL
 from campaign.identifying.directions import OFFSET_OR_ASYMMETRY, with_offset
 from campaign.identifying.method import Material, Parameter
-from campaign.identifying.methods import friction_map, whole_model
+from campaign.identifying.methods import frequency_response, friction_map, presliding, whole_model
 from campaign.identifying.methods.inverse_dynamics import BENCH, NO_BASE, _settings, _with_base
 from campaign.physics.bench import Bench
 
@@ -129,3 +129,23 @@ def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
     assert found["coulomb"].bench == "friction.load.coulomb_torque"
     assert found["static_torque"].estimate.reason in TOO_WIDE
     assert found["static_torque"].bench == ""
+
+
+def test_a_damping_below_what_the_viscous_friction_takes_of_it_is_unphysical() -> None:
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
+    options = presliding.PreslidingOptions(viscous_friction="20 N m s/rad")
+    found = {"damping_at_rest": number("damping_at_rest", 10.0, 1.0)}
+    told = presliding._bristle_damping(found, bench, options)
+    assert told["bristle_damping"].value == -10.0
+    assert told["bristle_damping"].reason in UNPHYSICAL
+
+
+def test_a_mode_of_a_raw_response_passes_the_gate(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = number("resonance", 90.0, 80.0)
+    monkeypatch.setattr(frequency_response, "_local_of_axis", lambda *_: {"resonance": wide})
+    monkeypatch.setattr(frequency_response, "too_few", lambda _: NO_BASE())
+    masses: Any = SimpleNamespace(drive=None, places={}, reason=NO_BASE(), axis=None, bent="")
+    best: Any = SimpleNamespace(source=None, margins=None)
+    found = {each.estimate.name: each for each in frequency_response._parameters(masses, best)}
+    assert found["resonance"].estimate.reason in TOO_WIDE
+    assert not list(frequency_response._conclusions(best, masses))

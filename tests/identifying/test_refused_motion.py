@@ -14,6 +14,7 @@ from campaign.identification import gate
 from campaign.identification.inverse.motion import Filtering
 from campaign.identifying.inverse.motions import moved
 from campaign.identifying.method import Identified, Material
+from campaign.identifying.methods import friction_map
 from campaign.identifying.methods.inverse_dynamics import METHOD
 from campaign.identifying.sliding import points_of, slower
 from campaign.physics.bench import Bench
@@ -104,17 +105,21 @@ def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
         assert dict(told[name].reason.values)["cause"] == gate.OPPOSITE_SIGNS.code
 
 
-def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
-    """One recording of strokes at several speeds: the slowest are below 3 % of the fastest."""
-    rate = np.concatenate(
-        [way * np.full(2000, v) for v in (1.0, 0.5, 0.02, 0.01) for way in (1, -1)]
-    )
+def strokes(speeds: tuple[float, ...]) -> Any:
+    """A trial of strokes out and back, 2 s each, under 3 N m of dry friction."""
+    rate = np.repeat([way * speed for speed in speeds for way in (1.0, -1.0)], 2000)
     torque = 3.0 * np.sign(rate) + 0.02 * NOISE[0][: len(rate)]
     trial = recorded(
         Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", rate + 1e-4 * NOISE[1][: len(rate)]),
         Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
     )
     trial.trial.options, trial.trial.windows = {}, ()
+    return trial
+
+
+def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
+    """One recording of strokes at several speeds: the slowest are below 3 % of the fastest."""
+    trial = strokes((1.0, 0.5, 0.02, 0.01))
     bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt", "inertia": "1 kg m^2"}})
     found, _ = points_of((trial,), bench, 0.5)
     assert sorted(point.speed for point in found) == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=0.01)
@@ -144,3 +149,17 @@ def test_friction_that_falls_exponentially_with_heat_is_held_by_a_line_over_it()
         assert low is not None
         assert high is not None
         assert low <= 0.8 <= high
+
+
+def test_trials_and_slow_strokes_that_are_not_in_a_map_are_reasons() -> None:
+    trials = (strokes((1.0, 0.5, 0.02, 0.01)), strokes((0.0,)))
+    for number, trial in enumerate(trials, 1):
+        trial.trial.number = number
+    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt", "inertia": "1 kg m^2"}})
+    options = friction_map.FrictionMapOptions(shortest="0.5 s")
+    found = friction_map.METHOD.identify(Material(bench, cast("Any", trials), ()), options)
+    without, slow = found.left_out
+    assert without in friction_map.NO_STRETCH
+    assert dict(without.values) == {"count": 1, "total": 2, "numbers": "2"}
+    assert slow in friction_map.TOO_SLOW
+    assert dict(slow.values) == {"count": 4}

@@ -166,6 +166,10 @@ def amount(value: float, low: float | None = None, high: float | None = None, **
         (amount(24.5, kind="at most", reason=Reason("test", "a bound")), "at most 24.5 N·m"),
         (amount(0.0, None, 0.5, origin=Origin.AT_BOUND), "0 (≤ 0.5) N·m (at its bound)"),
         (
+            amount(2.64, 2.44, 2.84, origin=Origin.CONTRADICTED, reason=Reason("test", "bent")),
+            "2.64 ± 0.20 N·m (model contradicted)",
+        ),
+        (
             amount(1165.0, origin=Origin.ASSUMED, reason=Reason("test", "a rule")),
             "1165 N·m (assumed)",
         ),
