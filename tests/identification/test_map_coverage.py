@@ -13,16 +13,19 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from campaign.identification.both_directions import (
+    correlation,
+    cross_covariance,
+    fitted_nominal,
+)
 from campaign.identification.ripple import harmonic, ripple_of_points, window_noise
 from campaign.identification.steady_sliding import steady_sliding
 from campaign.identification.stribeck import PARAMETERS, fit_stribeck, stribeck
 from campaign.identification.velocity_map import (
     DirectionFit,
-    correlation,
-    cross_covariance,
     direction_estimates,
     fit_direction,
-    nominal_estimates,
+    passed,
 )
 from tests.identification.coverage import holds, rejected
 
@@ -180,7 +183,8 @@ def held_nominal(count: int, seed: int, together: float) -> dict[str, list[bool]
             BETWEEN * (np.sqrt(together) * shared + np.sqrt(1.0 - together) * each) for each in own
         ]
         both = [fitted(random, CASES["trials"], level) for level in levels]
-        for name, told in nominal_estimates(both[0], both[1], "free").items():
+        for name, mean in fitted_nominal(both[0], both[1], "free").items():
+            told = passed(mean, "free", *both)
             held.setdefault(f"{together}: {name}", []).append(holds(told, TRUE[name]))
     return held
 

@@ -8,6 +8,7 @@ from scipy.optimize import curve_fit
 from scipy.stats import t as t_distribution
 
 from campaign.estimate import Origin
+from campaign.identification.both_directions import fitted_nominal
 from campaign.identification.stribeck import PARAMETERS, Problem, fit_stribeck
 from campaign.identification.velocity_map import (
     CONTRADICTED,
@@ -17,7 +18,7 @@ from campaign.identification.velocity_map import (
     direction_estimates,
     doubts,
     fit_direction,
-    nominal_estimates,
+    passed,
 )
 
 SPEED = np.deg2rad(np.geomspace(0.05, 65.0, 80))
@@ -128,7 +129,9 @@ def test_no_speed_far_above_the_stribeck_velocity_is_told(
     assert str(told["coulomb_torque"].reason) == (why if is_extrapolated else "")
     assert not told["static_torque"].reason
     assert (f"{why}; add faster ones" in doubts(found)) == is_extrapolated
-    both = nominal_estimates(found, found, "free")
+    both = {
+        n: passed(e, "free", found, found) for n, e in fitted_nominal(found, found, "free").items()
+    }
     assert both["coulomb_torque"].reason == told["coulomb_torque"].reason
 
 
@@ -204,7 +207,7 @@ def test_parameters_of_a_model_that_the_points_contradict_say_so() -> None:
         assert told["coulomb_torque"].has_interval, "a reader sees what the curve of its kind has"
     free = direction_estimates(found, "free").values()
     assert all(one.origin is Origin.MEASURED for one in free)
-    both = nominal_estimates(found, found, "2")
+    both = {n: passed(e, "2", found, found) for n, e in fitted_nominal(found, found, "2").items()}
     assert both["viscous_friction"].origin is Origin.CONTRADICTED
 
 

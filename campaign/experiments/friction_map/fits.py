@@ -11,6 +11,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.friction_map.points import MapPoint
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.identification.both_directions import fitted_nominal
 from campaign.identification.ripple import Ripple, ripple_of_points, window_noise
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.stribeck import PARAMETERS, fit_stribeck
@@ -19,7 +20,6 @@ from campaign.identification.velocity_map import (
     Model,
     fit_direction,
     fitted_estimates,
-    fitted_nominal,
     passed,
     shifts,
 )

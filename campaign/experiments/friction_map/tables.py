@@ -12,10 +12,11 @@ from campaign.experiments.friction_map.fits import DIGITS, MapFits
 from campaign.experiments.friction_map.points import MapPoint, told_periods
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.both_directions import correlation
 from campaign.identification.intervals import with_error
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
-from campaign.identification.velocity_map import MODELS, DirectionFit, Model, correlation, doubts
+from campaign.identification.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.units import angle_here
