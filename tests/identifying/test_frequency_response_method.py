@@ -15,11 +15,12 @@ from campaign.estimate import Origin
 from campaign.identification.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.identification.frequency.multisine import odd_grid, random_phases
 from campaign.identifying import methods
+from campaign.identifying.frequency.amplitudes import by_amplitude
 from campaign.identifying.frequency.axis_numbers import UNKNOWN
 from campaign.identifying.frequency.found import TOO_FEW
 from campaign.identifying.frequency.repeating import unused
 from campaign.identifying.frequency.signals import base_frequency
-from campaign.identifying.frequency.sources import _lines, by_amplitude
+from campaign.identifying.frequency.sources import _lines
 from campaign.identifying.material import choose
 from campaign.identifying.method import Identified, Material
 from campaign.physics.bench import Bench

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from campaign.identification.frequency.welch import Excited as Excitation
 from campaign.identification.frequency_response import Array, make_response
 from campaign.identification.local_fit import FRICTION
 from campaign.identification.sine_point import SinePoint, sine_point
+from campaign.identifying.frequency.amplitudes import Recorded, by_amplitude, size_of
 from campaign.identifying.frequency.repeating import found_repeating, repeated, unused
 from campaign.identifying.frequency.signals import (
     Excited,
@@ -39,17 +39,12 @@ GAP = 3.0
 """Ratio of neighbours in size from which on the smaller is none of the excited lines."""
 HANN_APART = 2
 """Lines of a Hann window from which on neighbours hardly know of each other."""
-SAME_SIZE = 1.1
-"""Ratio of neighbouring rms below which recordings are realisations of one amplitude. Realisations
-of one command have the same rms whatever their phases, and noise and a torque loop add a few
-percent; amplitudes that are to tell friction's part differ by a quarter or more."""
 EXCITED_SHARE = 0.03
 """of the largest line of a reference, in amplitude, from which on a line counts as excited."""
 
 
 SIZES = ("amplitude", "rms")
 """Names of conditions that state the amplitude of a multisine, which is measured."""
-Recorded = tuple[ArchivedTrial, Signals]
 
 
 @dataclass(frozen=True)
@@ -114,7 +109,7 @@ def sources(
         parts = {label: told}
         if kind == "multisine":
             sized = [
-                (_size(part, float(period)), part) for part in by_amplitude(told, float(period))
+                (size_of(part, float(period)), part) for part in by_amplitude(told, float(period))
             ]
             parts = {f"{label}, {size}": part for size, part in sized}
             if len(sized) > 1:
@@ -126,37 +121,6 @@ def sources(
             except ValueError as error:
                 remarks.append(f"{name}: {error}.")
     return found, remarks
-
-
-def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:
-    """Groups of one rms of what was excited, the largest first; within each by number of trial.
-
-    A new group begins where neighbours in size differ by more than `SAME_SIZE`.
-
-    Args:
-        period: of the excitation (s).
-    """
-    sizes = {signal.number: _rms(signal.leading, signal, period) for _, signal in told}
-    falling = sorted(told, key=lambda each: -sizes[each[1].number])
-    groups = [falling[:1]]
-    for (_, before), each in pairwise(falling):
-        if sizes[before.number] > SAME_SIZE * sizes[each[1].number]:
-            groups.append([])
-        groups[-1].append(each)
-    return [sorted(group, key=lambda each: each[1].number) for group in groups]
-
-
-def _rms(samples: Array, signal: Signals, period: float) -> float:
-    """Of the last period without its mean: before, there may be rest, or a transient."""
-    return float(np.nanstd(samples[-round(period * signal.rate) :]))
-
-
-def _size(told: Sequence[Recorded], period: float) -> str:
-    """The rms of one amplitude, in words; of a recording that of its torque: its unit is known."""
-    trial, first = told[0]
-    mode = trial.trial.task.mode
-    rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
-    return f"rms {rate_here(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"
 
 
 def _key(trial: ArchivedTrial, how: Reading) -> tuple[str, ...]:
