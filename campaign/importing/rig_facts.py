@@ -11,6 +11,6 @@ def rig_facts(bench: Bench) -> RigFacts:
     return RigFacts(
         axis=bench.sides.load,
         motor=bench.sides.motor,
-        ratio=None if bench.gear is None else bench.gear.ratio,
+        ratio=bench.ratio,
         torque_per_current=bench.torque_per_current,
     )

@@ -5,6 +5,7 @@ Symbols are the thesis' (Figure 5.3, Table 5.1, appendix); every number is SI af
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -13,6 +14,8 @@ from pydantic import (
     ModelWrapValidatorHandler,
     SerializerFunctionWrapHandler,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_serializer,
     field_validator,
     model_serializer,
     model_validator,
@@ -170,8 +173,25 @@ class ControllerOptions(Options):
     """From a sample to the current command that answers it."""
     relative_rate_filter: Time = Field(default=0.0, ge=0)
     """Time constant of the first-order low-pass of the relative rate that compensation uses."""
+    rate_feedback: Literal["gyro", "encoder"] = "gyro"
+    """What the rate loop is fed by: the gyro, or the relative rate that is made of the encoder."""
     pointing_high_pass: Frequency = Field(default=0.0, ge=0)
     """Corner of the first-order high-pass that the pointing error is seen through; 0 for none."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A loop that a gyro feeds is archived as before there was another: fingerprints stay."""
+        tree: dict[str, Any] = dump(self)
+        if self.rate_feedback == "gyro":
+            tree.pop("rate_feedback", None)
+        return tree
+
+    @field_validator("rate_feedback")
+    @classmethod
+    def _of_samples(cls, feedback: str, info: ValidationInfo) -> str:
+        if feedback == "encoder" and info.data.get("sample_rate", 0.0) is None:
+            raise ValueError("'encoder' needs controller.sample_rate: its angle is differenced")
+        return feedback
 
     @field_validator("delay")
     @classmethod
@@ -196,6 +216,10 @@ class AppendageOptions(Options):
     """Its damping ratio when the load is held still."""
 
 
+UNLIMITED = "unlimited"
+"""Angle limit of an axis that turns for ever."""
+
+
 class LimitsOptions(Options):
     """What must never be exceeded: checked before anything moves.
 
@@ -203,7 +227,8 @@ class LimitsOptions(Options):
     """
 
     angle: Angle = Field(gt=0)
-    """Largest angle of the load relative to the hull, either way from zero."""
+    """Largest angle of the load relative to the hull, either way from zero; "unlimited" for an axis
+    that turns for ever."""
     rate: AngularRate = Field(gt=0)
     """Largest rate of the load relative to the hull."""
     rate_time: Time = Field(default=0.01, gt=0, le=1.0)
@@ -217,6 +242,16 @@ class LimitsOptions(Options):
     """Largest motor current."""
     duration: Time = Field(gt=0)
     """Longest single trial."""
+
+    @field_validator("angle", mode="wrap")
+    @classmethod
+    def _endless(cls, value: Any, parse: ValidatorFunctionWrapHandler) -> float:
+        return math.inf if value == UNLIMITED else float(parse(value))
+
+    @field_serializer("angle", when_used="json")
+    def _in_words(self, angle: float) -> float | str:
+        """JSON has no infinity."""
+        return UNLIMITED if math.isinf(angle) else angle
 
 
 class Bench(Options):
@@ -235,7 +270,7 @@ class Bench(Options):
     motor: MotorOptions | None = None
     """The servo motor."""
     gear: GearOptions | None = None
-    """The gear."""
+    """The gear; absent: the motor drives the load directly."""
     friction: dict[str, FrictionField] = Field(default={}, max_length=8)
     """The true friction, by interface (`load`, `motor` ...); `friction = {}` where unknown."""
     variation: VariationOptions | None = None
@@ -316,6 +351,8 @@ class Bench(Options):
         if bench.gear is not None and bench.gear.lead is not None and not bench.is_linear:
             message = "a lead turns revolutions into travel, and the axis is rotary (axis.kind)"
             wrong.append((("gear", "lead"), message))
+        if bench.is_linear and bench.limits and math.isinf(bench.limits.angle):
+            wrong.append((("limits", "angle"), "a linear axis has ends: write how far it may go"))
         if wrong and archived and in_former_spelling(tree):
             return bench.with_friction(bench.friction)
         if wrong:
@@ -355,12 +392,18 @@ class Bench(Options):
 
     def at_load(self, friction: FrictionOptions) -> tuple[float, float]:
         """What one N m of an interface counts at the load, and its rate per load relative rate."""
-        # Where no gear is known nothing is of the motor's side, and no ratio is asked for.
-        return friction.at_load(1.0 if self.gear is None else self.gear.ratio)
+        return friction.at_load(self.gear.ratio if self.gear else 1.0)
+
+    @property
+    def ratio(self) -> float | None:
+        """N: motor rate over load rate; 1 without a gear, None where no motor is known either."""
+        if self.gear is not None:
+            return self.gear.ratio
+        return None if self.motor is None else 1.0
 
     @property
     def torque_per_current(self) -> float | None:
-        """N Kt: torque at the load per ampere (N m/A); None where gear or motor are not known."""
-        if self.gear is None or self.motor is None:
+        """N Kt: torque at the load per ampere (N m/A); None where the motor is not known."""
+        if self.motor is None:
             return None
-        return self.gear.ratio * self.motor.torque_constant
+        return (self.ratio or 1.0) * self.motor.torque_constant

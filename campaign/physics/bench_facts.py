@@ -154,8 +154,8 @@ def rate_steps(bench: Bench) -> dict[str, float]:
     low_pass = gains.relative_rate_filter
     passed = -math.expm1(-1.0 / (gains.sample_rate * low_pass)) if low_pass > 0 else 1.0
     counts = {"encoder": sensors.encoder.resolution}
-    if bench.gear is not None:
-        counts["resolver"] = sensors.resolver.resolution / bench.gear.ratio
+    if bench.ratio is not None:
+        counts["resolver"] = sensors.resolver.resolution / bench.ratio
     return {name: passed * gains.sample_rate * count for name, count in counts.items() if count > 0}
 
 

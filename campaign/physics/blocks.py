@@ -97,6 +97,7 @@ class Controller(NamedTuple):
 
     every: int  # steps per sample
     closes_rate_loop: bool
+    fed_by_encoder: bool  # its rate is the filtered difference of the encoder, not the gyro
     output_delay: int  # whole samples ...
     output_offset: int  # ... and steps beyond them
     delay: NDArray[np.int64]  # (4,) samples
@@ -219,6 +220,7 @@ def controller_of(lanes: int, its: Controller) -> Controller:
     return Controller(
         its.every,
         its.closes_rate_loop,
+        its.fed_by_encoder,
         its.output_delay,
         its.output_offset,
         row_of(its.delay),

@@ -32,7 +32,6 @@ PURPOSES = {
     "motor.back_emf_constant": "the voltage that motion takes from the current loop",
     "motor.resistance": "the current that a voltage drives",
     "motor.inductance": "how fast the current follows",
-    "gear.ratio": "motor torque and rate at the load",
     "controller.rate": "the rate loop",
     "controller.current": "the current loop",
     "limits": "what must never be exceeded while it moves",
@@ -149,6 +148,7 @@ def complete(bench: Bench, who: str = "a simulation") -> CompleteBench:
             **dict(bench),
             "axis": _narrowed(CompleteAxis, bench.axis),
             "motor": _narrowed(CompleteMotor, bench.motor),
+            "gear": bench.gear or GearOptions(ratio=1.0),
             "controller": _narrowed(CompleteController, bench.controller),
         },
     )

@@ -106,7 +106,7 @@ def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     return tuple(
         Margin(limit, value, bound, unit)
         for limit, value, bound, unit in found
-        if value is not None
+        if value is not None and math.isfinite(bound)
     )
 
 
@@ -121,7 +121,7 @@ def unpredicted(bench: Bench, task: Task) -> dict[Limit, tuple[str, ...]]:
     if task.mode in ("prescribed", "spring"):
         return {}
     torque = lacking(bench, ("axis.inertia",)) if task.mode == "rate" else ()
-    current = (*torque, *lacking(bench, ("motor.torque_constant", "gear.ratio")))
+    current = (*torque, *lacking(bench, ("motor.torque_constant",)))
     found: dict[Limit, tuple[str, ...]] = {"torque": torque, "current": current}
     return {limit: paths for limit, paths in found.items() if paths}
 

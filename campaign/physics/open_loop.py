@@ -189,7 +189,8 @@ class _Sampled:
         after = np.zeros((self.size, self.size + 1))
         entered = np.zeros(self.size + 1)
         entered[-1] = 1.0
-        torque, moved_block = self.compensation(gyro[-1], current[-1], angle, rates)
+        fed = gyro[-1] if self.bench.controller.rate_feedback == "gyro" else rates[0]
+        torque, moved_block = self.compensation(fed, current[-1], angle, rates)
         output = torque if self.mode == "rate" else entered
         output = output / self.bench.torque_per_current
         if self.mode == "rate":
@@ -205,7 +206,7 @@ class _Sampled:
             after[self.places[name]] = values[:-1]
         kept = self.places["angle"].stop - self.places["angle"].start
         after[self.places["angle"]] = angle[:kept]
-        seen = gyro[-1] if self.mode == "rate" else -torque
+        seen = fed if self.mode == "rate" else -torque
         return OpenLoop(after[:, :-1], after[:, -1].copy(), seen[:-1].copy(), self.period)
 
     def readings(self) -> tuple[Array, Array, Array, list[int]]:

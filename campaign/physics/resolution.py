@@ -50,7 +50,7 @@ def resolution_margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
         Margin("torque", torque, limits.torque, units["N m"], "current sensor"),
         Margin("current", current, limits.current, "A", "current sensor"),
     )
-    return tuple(margin for margin in found if margin.value > 0)
+    return tuple(margin for margin in found if margin.value > 0 and margin.fraction > 0)
 
 
 def rate_of_one_count(bench: Bench, sample_rate: float, control_rate: float) -> float:

@@ -65,7 +65,7 @@ def sample(
     resolver = _reading(controller, memory.readings, RESOLVER, place) / controller.ratio
     current = _reading(controller, memory.readings, CURRENT_SENSOR, place)
     memory.kept[KEPT_CURRENT] = current
-    _rates(controller, memory.kept, number == 0, gyro, encoder, resolver)
+    gyro = _rates(controller, memory.kept, number == 0, gyro, encoder, resolver)
     motor_torque = controller.torque_per_current * current
     torque = _compensate(lanes, controller, compensation, memory, gyro, motor_torque)
     memory.kept[KEPT_TORQUE] = torque
@@ -114,19 +114,24 @@ def _rates(
     gyro: float,
     encoder: float,
     resolver: float,
-) -> None:
-    """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates."""
+) -> Any:
+    """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates.
+
+    Returns the rate that the loop is fed by: the gyro's, or the encoder's where that does it.
+    """
     if first:
         kept[KEPT_ENCODER], kept[KEPT_RESOLVER] = encoder, resolver
-    else:
-        turned = 0.5 * controller.period * (kept[KEPT_GYRO] + gyro)
-        kept[KEPT_POINTING] = kept[KEPT_POINTING] * controller.pointing_pole + turned
     pole = controller.filter_pole
     share = (1.0 - pole) / controller.period
     load_rate = pole * kept[KEPT_LOAD_RATE] + share * (encoder - kept[KEPT_ENCODER])
     motor_rate = pole * kept[KEPT_MOTOR_RATE] + share * (resolver - kept[KEPT_RESOLVER])
     kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE] = load_rate, motor_rate
-    kept[KEPT_ENCODER], kept[KEPT_RESOLVER], kept[KEPT_GYRO] = encoder, resolver, gyro
+    rate = load_rate if controller.fed_by_encoder else gyro
+    if not first:
+        turned = 0.5 * controller.period * (kept[KEPT_GYRO] + rate)
+        kept[KEPT_POINTING] = kept[KEPT_POINTING] * controller.pointing_pole + turned
+    kept[KEPT_ENCODER], kept[KEPT_RESOLVER], kept[KEPT_GYRO] = encoder, resolver, rate
+    return rate
 
 
 @inlined

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import Field, model_validator
 
 from campaign.options import Options
+from campaign.physics.friction_paths import invalid
 from campaign.units import Angle, AngularRate, Current, MotorAngle, Time
 
 
@@ -19,24 +23,48 @@ class RateSensor(Options):
     """Age of a reading, rounded to whole controller samples."""
 
 
-class AngleSensor(Options):
+_PER_REVOLUTION = {"counts": 1.0, "lines": 4.0}
+"""Counts for each of what a data sheet gives; a line has four edges."""
+
+
+class _Divided(Options):
+    """A sensor whose resolution may be given by how a revolution is divided."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_revolution(cls, tree: Any) -> Any:
+        given = [name for name in _PER_REVOLUTION if isinstance(tree, Mapping) and name in tree]
+        if not given:
+            return tree
+        if len(given) > 1 or "resolution" in tree:
+            raise ValueError("'resolution', 'lines' and 'counts' say the same; keep one")
+        (name,) = given
+        number = tree[name]
+        if isinstance(number, bool) or not isinstance(number, int | float) or not number >= 1:
+            raise invalid([((name,), "a number per revolution, 1 or more, without a unit")])
+        rest = {key: value for key, value in tree.items() if key != name}
+        return {**rest, "resolution": f"{360.0 / (number * _PER_REVOLUTION[name])!r} deg"}
+
+
+class AngleSensor(_Divided):
     """A sensor of angle relative to the hull, read by the sampled controller."""
 
     noise: Angle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: Angle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
+    """One count; 0 for no quantisation. Instead, of an encoder: `lines = 1024` per revolution,
+    which are four counts each, or `counts`."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
 
-class MotorAngleSensor(Options):
+class MotorAngleSensor(_Divided):
     """A sensor of the motor's angle relative to the hull, read by the sampled controller."""
 
     noise: MotorAngle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: MotorAngle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
+    """One count; 0 for no quantisation. Instead: `lines` or `counts` per revolution."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 

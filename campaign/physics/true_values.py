@@ -16,6 +16,8 @@ from campaign.physics.friction.stribeck import in_direction
 from campaign.physics.loop import at_load
 
 DIRECTIONS = {"positive": +1.0, "negative": -1.0}
+COULOMB = ("viscous_friction", "negative")
+"""What every model of sliding friction has besides a Coulomb torque."""
 SAME = 1e-9
 """Relative difference up to which two interfaces have the same Stribeck velocity."""
 
@@ -77,10 +79,12 @@ def stribeck_parameters(bench: Bench, sign: float) -> dict[str, float]:
     sums = dict.fromkeys(("coulomb_torque", "static_torque", "viscous_friction"), 0.0)
     shapes: list[tuple[float, float]] = []
     for options in bench.friction.values():
-        if not all(hasattr(options, name) for name in (*_SLIDING, "negative")):
+        if not all(hasattr(options, name) for name in ("coulomb_torque", *COULOMB)):
             return {}
         torque, rate = at_load(options, bench)
-        own = {name: in_direction(options, name, sign) for name in _SLIDING}
+        known = [name for name in _SLIDING if hasattr(options, name)]
+        own = {name: in_direction(options, name, sign) for name in known}
+        own.setdefault("static_torque", own["coulomb_torque"])
         sums["coulomb_torque"] += torque * own["coulomb_torque"]
         sums["static_torque"] += torque * own["static_torque"]
         sums["viscous_friction"] += torque * rate * own["viscous_friction"]

@@ -170,9 +170,16 @@ def simulate_events(
 
 
 def simulate_sampled(
-    loop: DryLoop, samples: int, period: float = 1e-3, compensate: Function = still
+    loop: DryLoop,
+    samples: int,
+    period: float = 1e-3,
+    compensate: Function = still,
+    *,
+    fed_by_encoder: bool = False,
 ) -> dict[str, np.ndarray]:
     """As `simulate_events`, of a rate controller that reads ideal sensors and holds its output.
+
+    It reads the gyro, or the newest relative rate where it is `fed_by_encoder`.
 
     Each period (s) is solved for itself; the integral is summed backwards. Values at the samples.
     compensate: torque (N m) over the newest relative rate, a backward difference of the encoder
@@ -187,7 +194,7 @@ def simulate_sampled(
         t = n * period
         rate = pole * rate + (1.0 - pole) * (y[2] - angle) / period
         angle, added = y[2], compensate(rate)
-        error = loop.command(t) - y[0]
+        error = loop.command(t) - (rate if fed_by_encoder else y[0])
         integral += gain * loop.integral * period * error
         torque = RATIO * KT * (gain * error + integral) + added
         held = replace(loop, torque=lambda _, torque=torque: torque)

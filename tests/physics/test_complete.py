@@ -79,7 +79,6 @@ def test_what_a_simulation_needs() -> None:
         "motor.back_emf_constant",  # Ke
         "motor.resistance",  # R
         "motor.inductance",  # L
-        "gear.ratio",  # N
         "controller.rate",  # Kpv, Kiv
         "controller.current",  # Kpc, Kic
         "limits",
@@ -100,8 +99,7 @@ def test_all_that_is_missing_is_named_with_what_it_is_for() -> None:
 
 @pytest.mark.parametrize("path", [path for path in PURPOSES if path != "motor.torque_constant"])
 def test_each_fact_is_missed_by_itself(path: str) -> None:
-    gone = {"gear.ratio": ("gear", "friction")}.get(path, (path,))  # the motor's side needs a gear
-    incomplete = without(*gone)
+    incomplete = without(path)
     assert lacking(incomplete) == (path,)
     with pytest.raises(ValidationError):  # and the types say the same
         CompleteBench.model_validate(incomplete.model_dump(mode="json"), context={"si": True})

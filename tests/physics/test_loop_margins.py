@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.physics.bench import Bench
+from campaign.physics.complete import complete
 from campaign.physics.friction import friction_models
 from campaign.physics.linear_friction import NoLoopError, Regime, bench_friction
 from campaign.physics.loop_margins import LoopMargins, Response, margins_of
@@ -477,3 +478,20 @@ def test_margins_are_low_below_20_deg_or_3_db() -> None:
     assert not made(None, None).low
     assert not made(10.0, None, 1.0).low  # unstable is worse than low
     assert made(10.0, None, 1.0).tightness < made(1.0, None).tightness
+
+
+def test_a_loop_that_the_encoder_feeds_is_half_a_sample_later() -> None:
+    """A difference of angles is the mean rate of the sample: sinc(w T / 2) exp(-i w T / 2)."""
+
+    def phase(feedback: str) -> LoopMargins:
+        on = bench(
+            lambda tree: tree["controller"].update(
+                {"sample_rate": "200 Hz", "rate_feedback": feedback}
+            )
+        )
+        return margins_of(open_loop(complete(on), "none", "rate", "sliding"))
+
+    gyro, encoder = phase("gyro"), phase("encoder")
+    assert gyro.crossover and gyro.phase_margin and encoder.phase_margin
+    lost = gyro.phase_margin - encoder.phase_margin
+    assert lost == pytest.approx(0.5 * gyro.crossover / 200.0, rel=0.02)

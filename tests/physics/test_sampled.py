@@ -69,6 +69,22 @@ def test_compensation_runs_on_the_newest_filtered_rate(
         assert error < (1e-4 if name == "load_rate" else 1e-6), name
 
 
+@pytest.mark.parametrize("low_pass", [0.0, 3e-3])
+def test_loop_can_be_fed_by_the_encoder(low_pass: float) -> None:
+    """Against scipy from sample to sample, as above; and that it is another loop than the gyro's."""
+    loop = DryLoop(bristles=True, low_pass=low_pass, **swing(SWING))  # type: ignore[arg-type]
+    expected = simulate_sampled(loop, 700, fed_by_encoder=True)
+    feedback = {"relative_rate_filter": f"{low_pass} s", "rate_feedback": "encoder"}
+    moving = task(base_acceleration=SWING, duration=0.7, sample_rate=1000)
+    _, out = run(sampled(**feedback), moving, 1 / 16e3)
+    for name in ("relative_rate", "motor_current", "load_rate"):
+        error = np.std(out[name] - expected[name]) / np.std(expected[name])
+        assert error < (1e-4 if name == "load_rate" else 1e-6), name
+    np.testing.assert_array_equal(out["gyro_rate"], out["relative_rate"])
+    _, by_gyro = run(sampled(), moving, 1 / 16e3)
+    assert np.std(by_gyro["load_rate"] - out["load_rate"]) > 0.1 * np.std(out["load_rate"])
+
+
 def test_readings_are_multiples_of_the_resolution() -> None:
     resolution = {"gyro": 2e-4, "encoder": 3e-5, "resolver": 1e-3, "current": 0.05}
     coarse = {name: {"resolution": f"{resolution[name]} {unit}"} for name, unit in SENSORS.items()}

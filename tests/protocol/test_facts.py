@@ -114,7 +114,7 @@ def test_a_plan_tells_what_it_cannot_predict(desk: Desk) -> None:
     unpredicted, loops = test.warnings
     assert unpredicted == (
         "its torque and current cannot be predicted: the bench 'rig' does not say axis.inertia, "
-        "motor.torque_constant, gear.ratio"
+        "motor.torque_constant"
     )
     assert loops.startswith("the margins of its loops are not known: the bench 'rig' does not say")
     assert test.loops == ()

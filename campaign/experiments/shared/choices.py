@@ -37,8 +37,7 @@ class Choices:
         """What the option will be: as written, or `value`."""
         if name in self.options.model_fields_set:
             return getattr(self.options, name)
-        if value != getattr(self.options, name):
-            self.told[name] = Chosen(value, why)
+        self.told[name] = Chosen(value, why)
         return value
 
     def sample_rate(self, rig: Rig) -> float:

@@ -27,8 +27,11 @@ SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
 UNKNOWN_LOOP = 1.0
 """s to settle where nobody says how fast the rate loop is: ten time constants of one of 1.6 Hz."""
+RAMP = 0.5
+"""s from rest to the fastest speed of a map."""
 MINUTE = 60.0
 """s that a run of a map takes at most, one way."""
+WARM_UP_CYCLES = 3
 SLOWEST = 0.1
 """of the fastest speed of a map, at most: its slowest, so that it is a curve."""
 SPEEDS = 40
@@ -58,18 +61,22 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     allowed = _longest_run(limits.duration, options.rest)
     longest = min(MINUTE, allowed)
     own = options.speeds
-    travel = choices.least(
-        "max_travel", "deg", {"a usual size": usual(60), share("angle", 0.8): 1.6 * limits.angle}
-    )
+    cruise = 0.7 * rig.rate_left
     acceleration = choices.least(
         "acceleration",
         "deg/s^2",
         {
-            "a usual size": usual(300),
+            f"the fastest speed in {RAMP:g} s": cruise / RAMP,
             "half of what torque and friction leave": 0.5 * rig.acceleration(0.7 * limits.rate),
         },
     )
     settling, settles = _settling(rig, options)
+    whole = cruise * (cruise / acceleration + settling + options.window_time)
+    travel = choices.least(
+        "max_travel",
+        "deg",
+        {"what the fastest speed takes": whole, share("angle", 0.8): 1.6 * limits.angle},
+    )
     fastest = (
         max(own)
         if own
@@ -78,7 +85,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "deg/s",
             {
                 "its ramps take half of a run": 0.25 * acceleration * longest,
-                share("rate", 0.7): 0.7 * limits.rate,
+                f"{share('rate', 0.7)}, less six deviations of its noise": cruise,
                 "the travel leaves room to settle and measure": _fastest(
                     travel, acceleration, max(1.0, settling + 0.5)
                 ),
@@ -125,11 +132,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "what the limit of duration leaves a run": allowed,
         },
     )
-    warm = choices.least(
-        "warm_up_speed",
-        "deg/s",
-        {"a usual size": usual(20), "half of the fastest speed": 0.5 * fastest},
-    )
+    warm = choices.least("warm_up_speed", "deg/s", {"half of the fastest speed": 0.5 * fastest})
     run = min(max_time, travel / warm + warm / acceleration)
     _warm_up_cycles(choices, run, limits.duration)
     if not own:
@@ -141,8 +144,10 @@ def _warm_up_cycles(choices: Choices, run: float, duration: float) -> None:
     """As many moves out and back, of two runs (s) and two rests each, as a trial may last."""
     rest = choices.options.rest
     most = int((MOST * duration - rest) / (2.0 * (run + rest)))
-    if most < choices.options.warm_up_cycles:
+    if most < WARM_UP_CYCLES:
         choices.take("warm_up_cycles", most, f"what fits into {share('duration', MOST)}")
+    else:
+        choices.take("warm_up_cycles", WARM_UP_CYCLES, "a usual number")
 
 
 def _overcome_friction(rig: Rig) -> None:
@@ -186,6 +191,8 @@ def _slowest(
         "fifty times the gyro's noise in a second": 50
         * rig.rate_noise
         / math.sqrt(rig.sample_rate),
+        "three counts of the gyro": 3.0 * rig.bench.sensors.gyro.resolution,
+        "thirty counts of the encoder in a second": 30.0 * rig.bench.sensors.encoder.resolution,
         "it settles within a minute": (settle + 0.5 * window) / longest,
     }
     why = max(reasons, key=lambda reason: reasons[reason])
@@ -276,13 +283,15 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     amplitude, torque = options.amplitude, options.torque
     if options.loop == "closed":
-        vs = rig.stribeck_velocity or 0.0
+        vs, noise = rig.stribeck_velocity or 0.0, rig.rate_noise
         amplitude = choices.least(
             "amplitude",
             "deg/s",
             {
-                "a usual size, ten Stribeck velocities at least": max(usual(30), 10 * vs),
-                share("rate", 0.5): 0.5 * limits.rate,
+                "a quarter of the rate limit, ten Stribeck velocities and fifty deviations of the "
+                "gyro's noise at least": max(0.25 * limits.rate, 10 * vs, 50 * noise),
+                f"{share('rate', 0.7)}, less six deviations of its noise, with what the loop "
+                "overshoots": 0.7 * rig.rate_left / rig.overshoot,
             },
         )
     else:

@@ -12,13 +12,17 @@ from functools import cached_property
 from campaign.physics.bench import Bench, LimitsOptions
 from campaign.physics.complete import control_rate, lacking, limits_of
 from campaign.physics.friction import friction_models
+from campaign.physics.limit_watch import judged_samples
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.loops_used import loops_of
+from campaign.units import rate_here
 
 SLOW = 1e-9
 """rad/s; friction at this rate is that of the onset of sliding."""
+UNKNOWN_OVERSHOOT = 1.5
+"""of a loop whose margins nobody knows: a phase margin of 39 deg."""
 MOST = 0.9
 """of a limit that an experiment may use up by its own choice."""
 
@@ -113,9 +117,49 @@ class Rig:
 
     @property
     def rate_noise(self) -> float:
-        """Standard deviation of a gyro sample with its quantisation (rad/s); 0 for an ideal one."""
-        gyro = self.bench.sensors.gyro
-        return math.hypot(gyro.noise, gyro.resolution / math.sqrt(12.0))
+        """Standard deviation of a sample of the rate, quantisation included (rad/s); 0 for none.
+
+        Of a rate that is made of the encoder: of the filtered difference of two angles.
+        """
+        bench, controller = self.bench, self.bench.controller
+        gyro, encoder = (
+            math.hypot(sensor.noise, sensor.resolution / math.sqrt(12.0))
+            for sensor in (bench.sensors.gyro, bench.sensors.encoder)
+        )
+        if controller is None or controller.rate_feedback == "gyro":
+            return gyro
+        rate = controller.sample_rate or 1.0
+        low_pass = controller.relative_rate_filter
+        pole = math.exp(-1.0 / (rate * low_pass)) if low_pass > 0.0 else 0.0
+        return encoder * rate * (1.0 - pole) * math.sqrt(2.0 / (1.0 + pole))
+
+    @property
+    def rate_left(self) -> float:
+        """The rate limit (rad/s), less what the watched rate shows of its sensor alone.
+
+        Six deviations of the encoder's noise and quantisation, in the mean that the limit watch
+        takes: the difference of two angles over its time. ValueError where nothing is left.
+        """
+        limits, encoder = self.limits, self.bench.sensors.encoder
+        deviation = math.hypot(encoder.noise, encoder.resolution / math.sqrt(12.0))
+        watched = judged_samples(limits, self.sample_rate) / self.sample_rate
+        left = limits.rate - 6.0 * math.sqrt(2.0) * deviation / watched
+        if left <= 0.0:
+            raise ValueError(
+                f"the encoder's noise alone reaches the rate limit of {rate_here(limits.rate)}; "
+                "raise limits.rate or limits.rate_time"
+            )
+        return left
+
+    @cached_property
+    def overshoot(self) -> float:
+        """Largest amplitude of the rate over that of its command, from the loop's phase margin.
+
+        |L / (1 + L)| at the crossover is 1 / (2 sin(margin / 2)).
+        """
+        loop = dict(loops_of(self.bench, "none", "rate")).get("sliding")
+        margin = loop.phase_margin if isinstance(loop, LoopMargins) else None
+        return UNKNOWN_OVERSHOOT if margin is None else max(1.0, 0.5 / math.sin(0.5 * margin))
 
     @property
     def sample_rate(self) -> float:

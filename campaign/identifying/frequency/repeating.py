@@ -36,7 +36,7 @@ def found_repeating(period: float) -> str:
 
 def unused(trials: Sequence[ArchivedTrial], bench: Bench) -> Iterator[str]:
     """Of motor sensors that nobody can use, a sentence."""
-    if bench.gear is not None:
+    if bench.ratio is not None:
         return
     there = {name for trial in trials for name in trial.channel_names()}
     if names := [name for name in SENSORS["motor"] if name in there]:

@@ -126,13 +126,13 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
             if not np.nanstd(samples) > 0:
                 continue
             if side == "motor":
-                if bench.gear is None:
+                if bench.ratio is None:
                     continue  # a motor's angle says nothing of the load's without a ratio
-                samples = samples / bench.gear.ratio
+                samples = samples / bench.ratio
             answers[side], channels[side] = samples, name
             break
     if not answers:
-        only = bench.gear is None and any(name in recording.channels for name in SENSORS["motor"])
+        only = bench.ratio is None and any(name in recording.channels for name in SENSORS["motor"])
         why = ": a motor's angle says nothing of the load's without the bench's [gear] ratio"
         raise ValueError(f"nothing that answers its torque moves{why if only else ''}")
     return answers, channels
