@@ -70,16 +70,15 @@ def init_for_bench(folder: Path, written: str) -> None:
     cannot be written; nothing is written then.
     """
     bench = load_bench(written)
-    identify = _identify(bench)
-    for test in (*identify, _stabilize(bench)):
+    identify, stabilize = _identify(bench), _stabilize(bench)
+    for test in (*identify, *stabilize):
         _check_fit(test, bench)
     source = _source(written)
     own = folder / "benches" / source.name
     name = f"benches/{source.name}"
-    files = {
-        folder / "identify.toml": _page(bench, name, "Identification of", identify),
-        folder / "stabilize.toml": _page(bench, name, "Compensation on", [_stabilize(bench)]),
-    }
+    files = {folder / "identify.toml": _page(bench, name, "Identification of", identify)}
+    if stabilize:
+        files[folder / "stabilize.toml"] = _page(bench, name, "Compensation on", stabilize)
     if not _is(source, own):
         files[own] = source.read_text(encoding="utf-8")
     taken = [path for path in files if path.exists()]
@@ -121,14 +120,19 @@ def _is(one: Path, other: Path) -> bool:
     return other.exists() and one.resolve() == other.resolve()
 
 
-def _stabilize(bench: Bench) -> _Test:
+def _stabilize(bench: Bench) -> tuple[_Test, ...]:
+    """Where the bench has a compensation: a motor on a table has no hull that swings."""
+    if not bench.compensation:
+        return ()
     methods = ", ".join(f'"{name}"' for name in ("none", *bench.compensation))
-    return _Test(
-        "stabilization",
-        "stabilization",
-        "Stabilization error by compensation method",
-        "The hull swings, the load should not: what each compensation of the bench leaves.",
-        f"repeat = 3\n\n[test.matrix]\ncompensation = [{methods}]\n",
+    return (
+        _Test(
+            "stabilization",
+            "stabilization",
+            "Stabilization error by compensation method",
+            "The hull swings, the load should not: what each compensation of the bench leaves.",
+            f"repeat = 3\n\n[test.matrix]\ncompensation = [{methods}]\n",
+        ),
     )
 
 

@@ -55,12 +55,17 @@ def init(
             show_default=False,
         ),
     ] = "",
+    everything: Annotated[
+        bool,
+        typer.Option("--all", help="Beside those of a bench, copy all that is shipped, too."),
+    ] = False,
 ) -> None:
     """Copy the shipped protocols, benches and templates into DIR, or write a bench its own."""
     if bench:
         from campaign.cli.rig_protocols import init_for_bench
 
         init_for_bench(folder, bench)
+    if bench and not everything:
         return
     from campaign.cli.archives import init_folder
 

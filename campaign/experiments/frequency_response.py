@@ -270,6 +270,8 @@ def _point(data: TrialData) -> SinePoint:
     real, imaginary = found["response_real"], found["response_imag"]
     if not math.isfinite(real.value + imaginary.value):
         raise ValueError("its signals have no numbers")
+    if real.value == 0.0 == imaginary.value:
+        raise ValueError("the rate shows no response: it is below one count of its sensor")
     return SinePoint(
         _frequency(data),
         complex(real.value, imaginary.value),

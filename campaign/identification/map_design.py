@@ -28,6 +28,7 @@ COUNTED = {"static_torque": 2.0, "stribeck_velocity": 2.0}
 """How often the variance of a parameter counts; the others once."""
 WIDEST = 2.0
 """Factor by which vs and delta of the curves differ from what was found, at most."""
+ROUNDING = 1e-12
 RIDGE = 1e-9
 """of the information, for measured speeds that leave a parameter open."""
 
@@ -55,7 +56,8 @@ def telling_speeds(
         moved = np.einsum("cpq,cnq->cnp", covariance, offered)
         whole = 1.0 + np.einsum("cnp,cnp->cn", offered, moved)[:, :, None]
         variance = np.einsum("cpp->cp", covariance)[:, None, :]
-        gain = -np.log1p(-(moved**2) / (whole * variance)) @ weight
+        share = moved**2 / (whole * variance)  # of the variance that goes: below 1 but for rounding
+        gain = -np.log1p(-np.minimum(share, 1.0 - ROUNDING)) @ weight
         best = int(np.argmax(np.where(left, gain.mean(axis=0), -np.inf)))
         left[best] = False
         lost = moved[:, best, :, None] * moved[:, best, None, :]

@@ -244,10 +244,10 @@ def test_a_pilot_without_friction_leaves_the_plain_map() -> None:
 
 
 def test_a_rig_without_room_to_settle_keeps_the_plain_map(soft: Piloted) -> None:
-    """With a fortieth of the integral gain it turns round in 50 deg; the pilot settled for 30."""
+    """With a four-hundredth of the integral gain it turns round in 500 deg: beyond all travel."""
     bench = make_case(SOFT).stated
     gains = bench.controller.rate
-    weak = gains.model_copy(update={"integral": gains.integral / 40.0})
+    weak = gains.model_copy(update={"integral": gains.integral / 400.0})
     controller = bench.controller.model_copy(update={"rate": weak})
     choice = choose(soft.options, bench.model_copy(update={"controller": controller}), soft.pilot)
     assert "and no run has room for it" in choice.reason

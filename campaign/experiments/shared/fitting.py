@@ -101,10 +101,10 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
             "what the fastest speed leaves": max(room - 0.5, 0.5 * room),
         },
     )
-    memory = rig.presliding
+    memory = rig.presliding or 0.0
     undescribed = {"a usual size; friction is not described": usual(0.75)}
     turned = rig.unwinding
-    known = memory and {
+    known = bench.friction and {
         f"{SETTLED:.0f} times Ts/σ0 of {angle_here(memory, '.2g')}, once the loop's "
         f"integral has turned round in {angle_here(turned, '.2g')}": SETTLED * memory + turned
     }

@@ -80,8 +80,9 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 def _sliding(parameters: Any, direction: float, speed: float) -> float:
     """See `campaign.physics.sliding_torque`."""
-    torque: float = where(direction >= 0.0, parameters[0], parameters[1])
-    return torque + direction * parameters[2] * speed
+    coulomb = where(direction >= 0.0, parameters[0], parameters[1])
+    torque: float = coulomb + direction * parameters[2] * speed
+    return torque
 
 
 FRICTION = FrictionModel(
