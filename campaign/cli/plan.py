@@ -115,9 +115,12 @@ def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
 
 def print_warnings(plan: Plan) -> None:
     """What experiments say of their tests, and a line for each that is stable and hardly so."""
+    tests: dict[str, list[str]] = {}
     for test in plan.tests:
         for line in test.warnings:
-            print_note(f"{test.name}: {line}", "yellow")
+            tests.setdefault(line, []).append(test.name)
+    for line, names in tests.items():
+        print_note(f"{', '.join(names)}: {line}", "yellow")
     for line in low_margins(plan):
         print_note(line, "yellow")
 

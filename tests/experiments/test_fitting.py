@@ -9,7 +9,7 @@ import pytest
 
 from campaign.experiments import experiments
 from campaign.experiments.friction_map.runs import plan_run
-from campaign.experiments.shared.choices import nice
+from campaign.experiments.shared.choices import Choices, nice
 from campaign.experiments.shared.rig import Rig
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -18,6 +18,7 @@ from campaign.protocol.bench_file import load_bench
 from campaign.trial import TrialRequest
 from tests.coverage.benches import make_case
 from tests.physics.random_benches import Draw, random_bench
+from tests.physics.test_data_sheet import motor
 
 KINDS = ("velocity_map", "breakaway", "frequency_response", "stabilization", "step_response")
 DEG = math.pi / 180
@@ -272,3 +273,57 @@ def test_what_counts_as_sliding_stays_within_the_limits() -> None:
         "breakaway", within(load_bench("platform"), rate=0.1 * DEG), sliding_rate="0.05 deg/s"
     )
     assert own.sliding_rate == pytest.approx(0.05 * DEG)
+
+
+def bench_top() -> Bench:
+    """A motor that turns for ever, without gear and gyro (`tests.physics.test_data_sheet`)."""
+    tree = motor(sensors={"encoder": {"lines": 2000}})
+    tree["controller"] |= {"sample_rate": "1 kHz", "rate_feedback": "encoder"}
+    tree["limits"] |= {"rate": "60 rad/s"}
+    return Bench.model_validate(tree)
+
+
+def test_speeds_of_a_map_follow_from_the_limits_of_its_rig() -> None:
+    """A motor of 60 rad/s was mapped up to 1 % of that: its travel was a usual size, 60 deg."""
+    options, reasons = fitted("velocity_map", bench_top())
+    assert 0.6 * 60 < options.fastest < 60
+    assert "rate limit" in reasons["fastest"]
+    run = plan_run(options.fastest, options)
+    assert run.settled >= options.window_time
+
+
+def test_a_choice_that_equals_the_default_is_told_too() -> None:
+    options = experiments()["velocity_map"].options()
+    choices = Choices(options)
+    assert choices.take("points", options.points, "why") == options.points
+    assert choices.told["points"].reason == "why"
+
+
+def test_an_amplitude_leaves_room_for_noise_and_overshoot() -> None:
+    """The limit watch sees n Tc of an encoder's noise as sqrt(2) sigma / (n Tc); here 10 ms."""
+    quiet = load_bench("platform")
+    noise = 0.02 * DEG
+    encoder = quiet.sensors.encoder.model_copy(update={"noise": noise, "resolution": 0.0})
+    sensors = quiet.sensors.model_copy(update={"encoder": encoder})
+    noisy = quiet.model_copy(update={"sensors": sensors})
+    assert quiet.limits.rate - Rig(noisy).rate_left == pytest.approx(
+        6 * math.sqrt(2) * noise / 0.01, rel=1e-9
+    )
+    slow = quiet.limits.model_copy(update={"rate": 20.0 * DEG})
+    few, reasons = fitted("frequency_response", noisy.model_copy(update={"limits": slow}))
+    left = (20.0 * DEG - 6 * math.sqrt(2) * noise / 0.01) / Rig(noisy).overshoot
+    assert few.amplitude <= 0.7 * left
+    assert "overshoots" in reasons["amplitude"]
+
+
+def test_the_noise_of_a_rate_that_is_made_of_the_encoder() -> None:
+    """Filtered differences of white noise, against their simulation."""
+    bench = bench_top()
+    controller = bench.controller.model_copy(update={"relative_rate_filter": 2e-3})
+    rig = Rig(bench.model_copy(update={"controller": controller}))
+    count = 2 * math.pi / 8000
+    angle = np.random.default_rng(1).normal(0.0, count / math.sqrt(12), 200_000)
+    pole, rate = math.exp(-0.5), np.zeros(len(angle))
+    for k in range(1, len(angle)):
+        rate[k] = pole * rate[k - 1] + (1 - pole) * (angle[k] - angle[k - 1]) / 1e-3
+    assert rig.rate_noise == pytest.approx(float(np.std(rate)), rel=0.01)

@@ -1,4 +1,4 @@
-"""What a data sheet says of a rig: no gear, lines of an encoder, no end of travel, Coulomb friction."""
+"""A data sheet's facts: no gear, lines of an encoder, no end of travel, Coulomb friction."""
 
 from __future__ import annotations
 

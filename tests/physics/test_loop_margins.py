@@ -492,6 +492,8 @@ def test_a_loop_that_the_encoder_feeds_is_half_a_sample_later() -> None:
         return margins_of(open_loop(complete(on), "none", "rate", "sliding"))
 
     gyro, encoder = phase("gyro"), phase("encoder")
-    assert gyro.crossover and gyro.phase_margin and encoder.phase_margin
+    assert gyro.crossover
+    assert gyro.phase_margin
+    assert encoder.phase_margin
     lost = gyro.phase_margin - encoder.phase_margin
     assert lost == pytest.approx(0.5 * gyro.crossover / 200.0, rel=0.02)

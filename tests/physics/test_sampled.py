@@ -71,7 +71,7 @@ def test_compensation_runs_on_the_newest_filtered_rate(
 
 @pytest.mark.parametrize("low_pass", [0.0, 3e-3])
 def test_loop_can_be_fed_by_the_encoder(low_pass: float) -> None:
-    """Against scipy from sample to sample, as above; and that it is another loop than the gyro's."""
+    """Against scipy from sample to sample, as above; it is another loop than the gyro's."""
     loop = DryLoop(bristles=True, low_pass=low_pass, **swing(SWING))  # type: ignore[arg-type]
     expected = simulate_sampled(loop, 700, fed_by_encoder=True)
     feedback = {"relative_rate_filter": f"{low_pass} s", "rate_feedback": "encoder"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from campaign.errors import ProtocolError
 from campaign.experiments import experiments
+from campaign.physics.complete import lacking
 from campaign.physics.known import KnownOptions
 from campaign.protocol import ProtocolFile, TestEntry, check_limits, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
@@ -65,6 +67,14 @@ def test_a_linear_bench_of_the_page(tmp_path: Path) -> None:
     path.write_text(f'name = "linear"\n{block}\n{rest}', encoding="utf-8")
     bench, own = load_bench(str(path)), load_bench("linear")
     assert bench.model_copy(update={"description": own.description}) == own
+
+
+def test_a_bench_of_a_data_sheet_of_the_page(tmp_path: Path) -> None:
+    (block,) = blocks("toml sheet")
+    (tmp_path / "motor.toml").write_text(block, encoding="utf-8")
+    bench = load_bench(str(tmp_path / "motor.toml"))
+    assert not lacking(bench)
+    assert bench.sensors.encoder.resolution == pytest.approx(2 * math.pi / 8000)
 
 
 def test_scatter_and_preload_of_the_page(tmp_path: Path) -> None:

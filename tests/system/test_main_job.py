@@ -209,6 +209,21 @@ def without_friction(text: str) -> str:
     return tomlkit.dumps(document)
 
 
+def test_init_writes_what_a_bench_top_motor_needs(tmp_path: Path):
+    """Its loop is fed by an encoder, it turns for ever, it has no hull that swings."""
+    page = (Path(__file__).parents[2] / "docs" / "protocols.md").read_text("utf-8")
+    write(tmp_path, page.split("```toml sheet\n")[1].split("```")[0], "motor.toml")
+    assert not campaign(tmp_path, "init", "lab", "--bench", "motor.toml").err
+    lab = tmp_path / "lab"
+    assert sorted(path.name for path in lab.rglob("*.toml")) == ["identify.toml", "motor.toml"]
+    planned = campaign(lab, "plan", "identify.toml")
+    assert not planned.err  # of its own plan the program has no warning
+    assert "70 % of the rate limit" in planned.out
+    campaign(tmp_path, "init", "all", "--bench", "motor.toml", "--all")
+    assert (tmp_path / "all" / "identify.toml").is_file()
+    assert (tmp_path / "all" / "protocols" / "quickstart.toml").is_file()
+
+
 def test_init_for_a_bench_that_cannot_move_writes_nothing(tmp_path: Path):
     shipped = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
     write(tmp_path, shipped.replace('torque = "2500 N m"', 'torque = "20 N m"'), "weak.toml")

@@ -25,6 +25,8 @@ MILLIMETRE = 1e-3
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
+TURNED = 1.1
+"""times what an integral takes to turn round: what is chosen is rounded down."""
 UNKNOWN_LOOP = 1.0
 """s to settle where nobody says how fast the rate loop is: ten time constants of one of 1.6 Hz."""
 RAMP = 0.5
@@ -104,10 +106,11 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     memory = rig.presliding or 0.0
     undescribed = {"a usual size; friction is not described": usual(0.75)}
     turned = rig.unwinding
-    known = bench.friction and {
+    told = (
         f"{SETTLED:.0f} times Ts/σ0 of {angle_here(memory, '.2g')}, once the loop's "
-        f"integral has turned round in {angle_here(turned, '.2g')}": SETTLED * memory + turned
-    }
+        f"integral has turned round in {angle_here(turned, '.2g')}"
+    )
+    known = bench.friction and {told: SETTLED * memory + TURNED * turned}
     slow = {} if own else {"half of what slow speeds turn": 0.5 * longest * SLOWEST * fastest}
     settle = choices.least(
         "settle_angle",
