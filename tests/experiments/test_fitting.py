@@ -279,7 +279,7 @@ def bench_top() -> Bench:
     """A motor that turns for ever, without gear and gyro (`tests.physics.test_data_sheet`)."""
     tree = motor(sensors={"encoder": {"lines": 2000}})
     tree["controller"] |= {"sample_rate": "1 kHz", "rate_feedback": "encoder"}
-    tree["limits"] |= {"rate": "60 rad/s"}
+    tree["limits"] = {**tree["limits"], "rate": "60 rad/s"}
     return Bench.model_validate(tree)
 
 
