@@ -115,8 +115,7 @@ class SimulatedTrial:
     def _take(self, time: Array, out: Array, half: Array | None) -> Ending | None:
         block = self._block(time, out)
         # By the gyro where there is one: an angle, differenced, is too coarse for slow motion.
-        fed_by_encoder = self._bench.controller.rate_feedback == "encoder"
-        rate = block[2] if fed_by_encoder else block[2] - block[1]
+        rate = block[2] if self._bench.rate_is_of_encoder else block[2] - block[1]
         reached = _first_beyond(rate, self._task.stop_rate)
         end, ending = _first_violation(self._watch, time[:reached], block[:, :reached])
         self._recorder.append(time[:end], block[:, :end])

@@ -112,7 +112,7 @@ class BristleFit:
 def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None:
     """The curve through the bins at rest and those from the torque `smallest` (N m) on.
 
-    None where the bins do not determine it: too few, no convergence, a stiffness or a second
+    None where the bins do not determine it: too few or at rest, no convergence, a stiffness or a second
     interface at its bound, parameters that cannot be told apart.
     """
     from scipy.optimize import least_squares
@@ -120,7 +120,9 @@ def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None
     used = ramp.used(smallest)
     if int(used[ramp.resting :].sum()) < FEWEST_BINS:
         return None
-    scale = max(float(np.std(ramp.rate)), float(np.finfo(float).tiny))
+    scale = float(np.std(ramp.rate))
+    if scale == 0.0:  # nothing moved
+        return None
     data = ramp.rate[used] / scale
     bias = float(np.mean(data[: ramp.resting])) if ramp.resting else 0.0
     lower, upper = np.array([*start.lower, -np.inf]), np.array([*start.upper, np.inf])

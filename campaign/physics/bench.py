@@ -395,6 +395,11 @@ class Bench(Options):
         return friction.at_load(self.gear.ratio if self.gear else 1.0)
 
     @property
+    def rate_is_of_encoder(self) -> bool:
+        """Whether the rate that its loop sees and that is recorded is made of the encoder."""
+        return self.controller is not None and self.controller.rate_feedback == "encoder"
+
+    @property
     def ratio(self) -> float | None:
         """N: motor rate over load rate; 1 without a gear, None where no motor is known either."""
         if self.gear is not None:

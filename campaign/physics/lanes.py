@@ -137,7 +137,7 @@ class Lane:
             grid.per_control and self.task.mode,
             self.bench.controller.sample_rate,
             self.bench.controller.delay,
-            self.bench.controller.rate_feedback,
+            self.bench.rate_is_of_encoder,
             *sensors,
         )
         return (
@@ -339,7 +339,7 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
     return Controller(
         every=per_control,
         closes_rate_loop=first.task.mode == "rate",
-        fed_by_encoder=gains.rate_feedback == "encoder",
+        fed_by_encoder=first.bench.rate_is_of_encoder,
         output_delay=delay_steps // per_control if per_control else 0,
         output_offset=delay_steps % per_control if per_control else 0,
         delay=np.array([round(sensor.delay / period) for sensor in sensors], dtype=np.int64),

@@ -189,7 +189,7 @@ class _Sampled:
         after = np.zeros((self.size, self.size + 1))
         entered = np.zeros(self.size + 1)
         entered[-1] = 1.0
-        fed = gyro[-1] if self.bench.controller.rate_feedback == "gyro" else rates[0]
+        fed = rates[0] if self.bench.rate_is_of_encoder else gyro[-1]
         torque, moved_block = self.compensation(fed, current[-1], angle, rates)
         output = torque if self.mode == "rate" else entered
         output = output / self.bench.torque_per_current

@@ -63,7 +63,7 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
             bench.axis.inertia,
             ripple.periods if ripple else None,
             # A recording that was imported may have made its rate of an encoder's counts.
-            own_sensor=not data.trial.recording,
+            own_sensor=not (data.trial.recording or bench.rate_is_of_encoder),
         )
         found += _metrics(name, sliding, ripple)
     return tuple(found)

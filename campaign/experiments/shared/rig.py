@@ -126,7 +126,7 @@ class Rig:
             math.hypot(sensor.noise, sensor.resolution / math.sqrt(12.0))
             for sensor in (bench.sensors.gyro, bench.sensors.encoder)
         )
-        if controller is None or controller.rate_feedback == "gyro":
+        if controller is None or not bench.rate_is_of_encoder:
             return gyro
         rate = controller.sample_rate or 1.0
         low_pass = controller.relative_rate_filter
