@@ -14,6 +14,7 @@ from campaign.cli.plan import in_short
 from campaign.errors import CampaignError, UsageError
 from campaign.execution.display import clock
 from campaign.experiments import experiments
+from campaign.experiments.shared.rig import Rig
 from campaign.interrupts import unwinding
 from campaign.physics.bench import Bench
 from campaign.physics.complete import lacking
@@ -35,7 +36,7 @@ class _Test:
     more: str = ""
 
 
-PILOT = "pilot = true    # friction is not described: ten speeds first tell which others to run\n"
+PILOT = "pilot = true    # no Stribeck curve is described: ten speeds tell which others to run\n"
 
 
 def _identify(bench: Bench) -> tuple[_Test, ...]:
@@ -45,7 +46,7 @@ def _identify(bench: Bench) -> tuple[_Test, ...]:
             "velocity_map",
             "Friction torque over speed",
             "Constant speeds in both directions, and the Stribeck curve through them.",
-            "" if bench.friction else PILOT,
+            PILOT if Rig(bench).stribeck_velocity is None else "",
         ),
         _Test(
             "breakaway",

@@ -22,7 +22,14 @@ from campaign.experiments.conclusions.servo import (
     closed_loop_conclusions,
     open_loop_conclusions,
 )
-from campaign.experiments.interface import Experiment, Stage, TestData, TrialData, metrics
+from campaign.experiments.interface import (
+    Experiment,
+    Stage,
+    TestData,
+    TrialData,
+    bench_of,
+    metrics,
+)
 from campaign.experiments.results.frequency_response_figures import (
     closed_loop_figures,
     torque_figure,
@@ -49,6 +56,7 @@ from campaign.experiments.shared.common import (
     swept,
 )
 from campaign.experiments.shared.found_trials import sine_response
+from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.sine_commands import rate_sine, told_amplitude, torque_sine
 from campaign.experiments.shared.swept_words import words
 from campaign.identification.frequency_response import Response, make_response
@@ -62,6 +70,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate
 from campaign.reason import Cause
 from campaign.result import Conclusion, Figure, Finding, Result, Table
+from campaign.signals import Sine
 from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
@@ -257,6 +266,8 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     )
 
 
+COUNTS = 3.0
+"""of its sensor that a response has at least: a staircase of fewer is off by more than 3 %."""
 TORQUE_TO_RATE = "rad/s/(N m)"
 
 
@@ -270,8 +281,11 @@ def _point(data: TrialData) -> SinePoint:
     real, imaginary = found["response_real"], found["response_imag"]
     if not math.isfinite(real.value + imaginary.value):
         raise ValueError("its signals have no numbers")
-    if real.value == 0.0 == imaginary.value:
-        raise ValueError("the rate shows no response: it is below one count of its sensor")
+    task, size = data.trial.task, abs(complex(real.value, imaginary.value))
+    if isinstance(task.command, Sine) and not data.trial.recording:
+        count = Rig(bench_of(data.trial)).rate_count(2.0 * math.pi * _frequency(data))
+        if not size * task.command.amplitude > COUNTS * count:
+            raise ValueError(f"its response is below {COUNTS:g} counts of the rate's sensor")
     return SinePoint(
         _frequency(data),
         complex(real.value, imaginary.value),

@@ -112,8 +112,8 @@ class BristleFit:
 def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None:
     """The curve through the bins at rest and those from the torque `smallest` (N m) on.
 
-    None where the bins do not determine it: too few or at rest, no convergence, a stiffness or a second
-    interface at its bound, parameters that cannot be told apart.
+    None where the bins do not determine it: too few or at rest, no convergence, a stiffness or a
+    second interface at its bound, parameters that cannot be told apart.
     """
     from scipy.optimize import least_squares
 

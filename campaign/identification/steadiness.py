@@ -31,7 +31,8 @@ window is below 3.3 times their number in 99.9 % of cases."""
 STICKS = 0.25
 """Share of the mean rate below which the load all but sticks."""
 DRIFTS = 0.25
-"""Share of its mean by which a rate may change across a window, or be uncertain."""
+"""Share of its mean by which a rate may change across a window, be uncertain, or miss its
+command."""
 FEWEST_COUNTS = 10.0
 """of the sensor that a window spans."""
 TORQUE_DRIFT = 0.01
@@ -51,6 +52,7 @@ RATE_VARIES = Cause(
     "the rate varies by {spread_percent:.2g} % of its mean (1σ), down to {least_percent:.2g} %",
 )
 RATE_DRIFTS = Cause("rate drifts", "the rate changes by {percent:.2g} % across the window")
+NOT_REACHED = Cause("speed not reached", "the mean rate is {percent:.2g} % of what was commanded")
 RATE_UNCERTAIN = Cause("rate uncertain", "the mean rate is uncertain by {percent:.2g} %")
 TORQUE_DRIFTS = Cause("torque drifts", "the torque changes by {percent:.2g} % across the window")
 
@@ -107,11 +109,16 @@ def unsteady(
     )
 
 
-def drifting(change: float, half_width: float, mean: float) -> Reason:
+def drifting(
+    change: float, half_width: float, mean: float, commanded: float | None = None
+) -> Reason:
     """Why a mean rate is none of steady sliding: its change across the window, or its interval.
 
-    All in one unit; `half_width` is NaN where there is no interval.
+    All in one unit; `half_width` is NaN where there is no interval. A load that is stuck creeps at
+    a rate of its own, which is not the `commanded` one, where that is known.
     """
+    if commanded is not None and abs(mean - commanded) > DRIFTS * abs(commanded):
+        return NOT_REACHED(percent=100.0 * mean / commanded if commanded else math.inf)
     if abs(change) > DRIFTS * abs(mean):
         return RATE_DRIFTS(percent=100.0 * abs(change / mean) if mean else math.inf)
     if half_width > DRIFTS * abs(mean):

@@ -59,6 +59,7 @@ def steady_sliding(
     periods: float | None = None,
     *,
     own_sensor: bool = True,
+    commanded: float | None = None,
 ) -> SteadySliding:
     """Rate and friction torque of a settled window.
 
@@ -71,6 +72,7 @@ def steady_sliding(
         inertia: J (kg m²); None where nobody knows it.
         periods: of the ripple per revolution, where known.
         own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
+        commanded: rate that was asked for (rad/s); None where nobody knows it.
 
     Raises ValueError for fewer than 3 samples.
     """
@@ -90,7 +92,9 @@ def steady_sliding(
             columns -= columns.mean(axis=0)
             noise = torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
     of_rate = of_series("rate", rate, "rad/s")
-    trouble = drifting(slope * float(np.ptp(time)), of_rate.half_width, float(rate.mean()))
+    trouble = drifting(
+        slope * float(np.ptp(time)), of_rate.half_width, float(rate.mean()), commanded
+    )
     trouble = unsteady(time, rate, angle, columns, own_sensor=own_sensor) or trouble
     # Of a window that is shorter than a known ripple, a change is that of the place.
     short = periods is not None and columns is None

@@ -229,9 +229,10 @@ def fitted_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
 def passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
     """A parameter of one direction, or of the mean of both, as it may be reported."""
     shape = told.name in ("stribeck_velocity", "stribeck_exponent")
+    of_effect = shape or told.name == "static_torque"  # which may lie below the slowest speed
     freedom = min(fit.freedom for fit in fits)
     effect = all(differs(fit.fits[model], freedom) for fit in fits)
-    if shape and not effect and told.origin is Origin.MEASURED:
+    if of_effect and not effect and told.origin is Origin.MEASURED:
         return refused(told, NO_EFFECT())
     force = max(float(fit.torque.max()) for fit in fits)
     rate = max(float(fit.speed.max()) for fit in fits)

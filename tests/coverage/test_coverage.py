@@ -15,7 +15,7 @@ from campaign.physics.variation import of_its_day
 from tests.coverage.benches import BENCHES, INERTIA_ERROR, TORQUE_CONSTANT_ERROR, make_case
 from tests.coverage.bounds import NAMES, _curve, _slope
 from tests.coverage.judging import Entry, entries, holm, pooled
-from tests.coverage.laboratory import KINDS, execute, plan, run
+from tests.coverage.laboratory import KINDS, execute, options_for, plan, run
 from tests.coverage.truths import Array, Truths, largest_friction, loop_numbers
 
 SAMPLE = range(0, 12, 2)
@@ -115,7 +115,7 @@ def test_nothing_of_the_truth_is_recorded() -> None:
 def test_the_loop_of_platform_is_known() -> None:
     """As whole sweeps find it that have a point every 0.1 or 0.2 Hz: 7.158 Hz and 70.74 degrees (at
     34 deg/s); 30.99 dB by one to 300 Hz."""
-    found = loop_numbers(make_case(0))
+    found = loop_numbers(make_case(0), options_for(make_case(0), "frequency_response")[0])
     assert found["bandwidth"] == pytest.approx(7.158, rel=0.0005)
     assert math.degrees(found["phase_margin"]) == pytest.approx(70.74, abs=0.03)
     assert found["gain_margin"] == pytest.approx(30.99, abs=0.05)

@@ -15,6 +15,7 @@ from campaign.experiments.friction_map.fits import MapFits, fit_map
 from campaign.experiments.friction_map.points import points_of, steady
 from campaign.identification.stribeck import fit_stribeck, stribeck
 from campaign.physics.bench import Bench
+from campaign.physics.complete import complete, control_rate
 from campaign.physics.lanes import Lane
 from campaign.physics.rows import OUTPUTS
 from campaign.physics.simulate import simulate_together
@@ -22,9 +23,9 @@ from campaign.physics.true_values import DIRECTIONS, stribeck_parameters, true_v
 from campaign.physics.truth import plant_of, simulated
 from campaign.physics.variation import as_it_is, of_its_day
 from campaign.result import Finding
-from campaign.trial import Task, Trial
+from campaign.trial import Task, Tree, Trial, canonical_json
 from tests.coverage.benches import Case, make_case
-from tests.coverage.laboratory import Run, options_for, plan
+from tests.coverage.laboratory import Run, plan
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,10 @@ IN_TORQUE = frozenset(
     }
 )
 """Quantities that are proportional to the torque constant that was stated."""
+_LOOPS: dict[tuple[str, str], Mapping[str, float]] = {}
+"""Of a bench and the options of a sweep; the draws of one bench share them."""
+HIGHEST = 0.395
+"""of the controller's sample rate: up to there crossings of a loop are looked for."""
 SEEDS = 48
 """trials whose mean is the true stabilization error: 48 times as many as in one."""
 
@@ -61,7 +66,7 @@ class Truths:
             case "breakaway_torque":
                 return self._ramp_mean(finding, 0)
             case "bandwidth" | "phase_margin" | "gain_margin":
-                return _loop_of(self._case.number).get(finding.quantity)
+                return self._loop().get(finding.quantity)
             case "stabilization_error":
                 return _error_of(self._case.number)
         own = self._trials_of(finding)
@@ -83,7 +88,8 @@ class Truths:
 
     def _closest_curve(self, exponent: float, direction: str) -> Mapping[str, float]:
         if (exponent, direction) not in self._closest:
-            true = stribeck_parameters(of_its_day(self._case.truth), DIRECTIONS[direction])
+            own = stribeck_parameters(of_its_day(self._case.truth), DIRECTIONS[direction])
+            true = {"stribeck_velocity": 1.0, "stribeck_exponent": 1.0, **own}  # without effect
             fit = self._map().fits[direction]
             curve = stribeck(fit.speed, true)
             closest = fit_stribeck(fit.speed, curve, fit.deviation, exponent)
@@ -108,15 +114,17 @@ class Truths:
         trials = [done.trial for done in self._run.done]
         return [t for t in trials if all(told.get(k, v) == v for k, v in t.point.items())]
 
+    def _loop(self) -> Mapping[str, float]:
+        options = self._run.done[0].trial.options
+        key = self._case.name, canonical_json(options)
+        if key not in _LOOPS:
+            _LOOPS[key] = loop_numbers(self._case, options)
+        return _LOOPS[key]
+
     def _ramp(self, trial: Trial) -> tuple[float, float]:
         if trial.number not in self._ramps:
             self._ramps[trial.number] = largest_friction(self._case, trial)
         return self._ramps[trial.number]
-
-
-@cache
-def _loop_of(number: int) -> Mapping[str, float]:
-    return loop_numbers(make_case(number))
 
 
 @cache
@@ -131,7 +139,7 @@ def largest_friction(case: Case, trial: Trial) -> tuple[float, float]:
     sensors: it has the systematic part that a wrong inertia leaves, and no scatter.
     """
     bench = _whole(case.truth, case)
-    lane = Lane.of(bench, trial.task, trial.seed, None, case.stated)
+    lane = Lane.of(bench, trial.task, trial.seed, None, complete(case.stated))
     blocks = [out for _, (out,) in simulate_together([lane])]
     rows = dict(zip(OUTPUTS, np.concatenate(blocks, axis=1), strict=True))
     rate = rows["load_rate"]
@@ -160,17 +168,16 @@ def _quiet(case: Case) -> Bench:
     )
 
 
-def loop_numbers(case: Case) -> dict[str, float]:
+def loop_numbers(case: Case, options: Tree) -> dict[str, float]:
     """Bandwidth (Hz), phase margin (rad), gain margin (dB) of the noise-free loop.
 
-    At the amplitudes of the test, on a grid that is ever finer around each crossing. The bandwidth
-    is the first frequency at which the gain falls through -3 dB, the margins are the least of all
-    crossings.
+    At the amplitudes of the test (`options`, SI), on a grid that is ever finer around each
+    crossing. The bandwidth is the first frequency at which the gain falls through -3 dB, the
+    margins are the least of all crossings.
     """
-    written, _ = options_for(case, "frequency_response")
-    first = written["frequencies"][0]
-    grid = np.geomspace(first, 395.0, 60)
-    response = _response(case, grid)
+    highest = HIGHEST * (control_rate(case.stated) or 1000.0)
+    grid = np.geomspace(options["frequencies"][0], highest, 60)
+    response = _response(case, options, grid)
     found: dict[str, float] = {}
     for name, level in {
         "bandwidth": lambda t: np.abs(t) - 10.0 ** (-3.0 / 20.0),
@@ -179,7 +186,8 @@ def loop_numbers(case: Case) -> dict[str, float]:
     }.items():
         values = level(response)
         places = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
-        crossings = [_refined(case, grid[k], grid[k + 1], level) for k in places]
+        places = [k for k in places if response[k] and response[k + 1]]  # 0: it sticks
+        crossings = [_refined(case, options, grid[k], grid[k + 1], level) for k in places]
         if not crossings:
             continue
         if name == "bandwidth":
@@ -189,7 +197,7 @@ def loop_numbers(case: Case) -> dict[str, float]:
         if name == "phase_margin":
             found[name] = min(math.pi + float(np.angle(loop)) for loop in loops)
         else:
-            found[name] = min(-20.0 * math.log10(abs(loop)) for loop in loops)
+            found[name] = min(-20.0 * math.log10(abs(loop)) for loop in loops if loop)
     return found
 
 
@@ -198,10 +206,12 @@ def _lead_over_half_turn(t: Array) -> Array:
     return np.asarray(np.unwrap(np.angle(t / (1.0 - t))) + math.pi)
 
 
-def _refined(case: Case, low: float, high: float, level: Any) -> tuple[float, complex]:
+def _refined(
+    case: Case, options: Tree, low: float, high: float, level: Any
+) -> tuple[float, complex]:
     """Frequency and response where `level` crosses zero, on 9 points between two frequencies."""
     grid = np.geomspace(low, high, 9)
-    response = _response(case, grid)
+    response = _response(case, options, grid)
     values = level(response)
     if _is_phase(values):
         values = values - 2.0 * math.pi * np.round(values / (2.0 * math.pi))
@@ -215,12 +225,11 @@ def _is_phase(values: Array) -> bool:
     return bool(np.max(np.abs(values)) > math.pi)
 
 
-def _response(case: Case, frequencies: Array) -> Array:
+def _response(case: Case, tree: Tree, frequencies: Array) -> Array:
     """Closed-loop response gyro over command (complex), of the quiet bench, shape (n,)."""
     experiment = experiments()["frequency_response"]
-    written, _ = options_for(case, "frequency_response")
     options = experiment.options.model_validate(
-        written | {"frequencies": list(map(float, frequencies))}, context={"si": True}
+        {**tree, "frequencies": list(map(float, frequencies))}, context={"si": True}
     )
     bench = _quiet(case)
     tasks = [request.task for request in experiment.trials(options, case.stated)]
@@ -245,7 +254,7 @@ def _sine(bench: Bench, case: Case, task: Task, frequency: float) -> complex:
 
 
 def _simulated(bench: Bench, case: Case, task: Task, seed: int) -> tuple[Array, Array]:
-    lane = Lane.of(bench, task, seed, None, case.stated)
+    lane = Lane.of(bench, task, seed, None, complete(case.stated))
     blocks = [(time, out) for time, (out,) in simulate_together([lane])]
     row = OUTPUTS.index("gyro_rate")
     return (
@@ -260,7 +269,9 @@ def mean_error(case: Case) -> float:
     bench, row = _whole(case.truth, case), OUTPUTS.index("pointing_angle")
     errors: list[float] = []
     for first in range(0, SEEDS, 8):
-        lanes = [Lane.of(bench, task, 10_000 + first + k, None, case.stated) for k in range(8)]
+        lanes = [
+            Lane.of(bench, task, 10_000 + first + k, None, complete(case.stated)) for k in range(8)
+        ]
         blocks = list(simulate_together(lanes))
         time = np.concatenate([time for time, _ in blocks])
         inside = (time >= task.window[0] - 1e-9) & (time < task.window[1] - 1e-9)

@@ -13,7 +13,7 @@ from campaign.experiments.friction_map.points import MapPoint, points_of, steady
 from campaign.experiments.friction_map.runs import VelocityMapOptions
 from campaign.experiments.shared.fitting import velocity_map
 from campaign.experiments.shared.rig import Rig
-from campaign.identification.steadiness import STICK_SLIP, drifting
+from campaign.identification.steadiness import NOT_REACHED, STICK_SLIP, drifting
 from campaign.physics.bench import Bench
 from tests.experiments.laboratory import Tree, analyse, execute, finding, trials
 from tests.physics.benches import SIMULINK, bench
@@ -51,7 +51,13 @@ def test_the_angle_to_settle_has_the_integral_in_it() -> None:
     assert static is not None
     gains = rig.controller.rate
     turned = 2 * static / (rig.gear.ratio * rig.motor.torque_constant * gains.integral_gain)
-    assert Rig(rig).unwinding == pytest.approx(turned)
+    assert Rig(rig).unwinding(0.0) == pytest.approx(turned)
+    # At a speed the proportional gain gives Kp v of it at once.
+    per_ampere = rig.gear.ratio * rig.motor.torque_constant
+    speed = static / (per_ampere * gains.proportional)
+    assert Rig(rig).unwinding(speed) == pytest.approx(0.5 * turned)
+    assert Rig(rig).turned_within(0.5 * turned) == pytest.approx(speed)
+    assert Rig(rig).unwinding(2.1 * speed) == 0.0
     chosen = velocity_map(VelocityMapOptions(max_travel="2000 deg"), rig)["settle_angle"]
     assert chosen.value >= 0.99 * turned
     assert "integral" in chosen.reason
@@ -67,6 +73,13 @@ def test_a_rate_that_changes_or_is_uncertain_is_not_steady(
     """Of 0.1 rad/s: either alone is enough."""
     assert bool(drifting(change, half, 0.1)) is not steady
     assert not drifting(change, math.nan, 1.0)
+
+
+@pytest.mark.parametrize(("mean", "reached"), [(0.1, True), (0.08, True), (0.07, False)])
+def test_a_load_that_creeps_has_not_reached_its_speed(mean: float, *, reached: bool) -> None:
+    """Commanded 0.1 rad/s: a stuck load bends its bristles at a steady rate of its own."""
+    assert (drifting(0.0, 1e-6, mean, 0.1) in NOT_REACHED) is not reached
+    assert not drifting(0.0, 1e-6, mean)
 
 
 def soft(proportional: str) -> Bench:

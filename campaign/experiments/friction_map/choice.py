@@ -82,10 +82,20 @@ def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData])
         longer = _longer(options, bench, fits, _memory(pilot, bench))
         speeds = _speeds(options, longer, points, curves)
     except ValueError as error:
-        done = set(pilot_speeds(options))
-        rest = tuple(speed for speed in map_speeds(options) if speed not in done)
-        return Choice(options, rest, f"after a pilot that leaves the speeds as they were: {error}")
+        told = f"after a pilot that tells too little of friction: {error}"
+        return Choice(options, _plain(options, points), told)
     return Choice(longer, speeds, _reason(options, longer, fits))
+
+
+def _plain(options: PilotedMapOptions, points: Sequence[MapPoint]) -> tuple[float, ...]:
+    """The rest of the plain map; between the speeds at which the pilot slid steadily."""
+    done = set(pilot_speeds(options))
+    found = [abs(point.speed) for point in points] or [options.slowest, options.fastest]
+    slowest, fastest = min(found), max(found)
+    if slowest <= options.slowest * (1.0 + ROUNDING) and fastest >= max(done) * (1.0 - ROUNDING):
+        return tuple(speed for speed in map_speeds(options) if speed not in done)
+    between = np.geomspace(slowest, fastest, options.points - SPEEDS + 2)[1:-1]
+    return tuple(float(speed) for speed in between)
 
 
 def _curves(fits: MapFits) -> list[Mapping[str, float]]:
@@ -143,7 +153,7 @@ def _longer(
     slowest = sorted({abs(point.speed) for point in fits.points})[:SLOW]
     torque = max(abs(p.torque.value) for p in fits.points if abs(p.speed) in slowest)
     forgotten = options.settle_angle if np.isnan(memory) else MEMORIES * memory
-    settle = max(options.settle_angle, forgotten + Rig(bench).unwinding_from(torque))
+    settle = max(options.settle_angle, forgotten + Rig(bench).unwinding(options.slowest, torque))
     ripples = [ripple for ripple in fits.ripples.values() if ripple is not None]
     period = max((2.0 * np.pi / ripple.periods for ripple in ripples), default=0.0)
     window = max(options.window_angle, PERIODS * period)
@@ -164,7 +174,8 @@ def _speeds(
     own = {speed: pilot_run(plan_run(speed, options)) for speed in pilot_speeds(options)}
     settled = [v for v, run in own.items() if v * run.settle >= longer.settle_angle]
     measured = np.intersect1d(steadily, settled)
-    offered = np.geomspace(steadily[0], options.fastest, FINER * options.points)
+    fastest = steadily[-1] if steadily[-1] < max(own) else options.fastest
+    offered = np.geomspace(steadily[0], fastest, FINER * options.points)
     apart = np.min(np.abs(np.log(offered[:, None] / steadily)), axis=1)
     offered = offered[apart > ROUNDING]  # a repeat would be averaged with what it repeats
     candidates = np.array([speed for speed in offered if _fits(float(speed), options, longer)])

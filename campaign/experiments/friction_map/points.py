@@ -64,6 +64,7 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
             ripple.periods if ripple else None,
             # A recording that was imported may have made its rate of an encoder's counts.
             own_sensor=not (data.trial.recording or bench.rate_is_of_encoder),
+            commanded=None if data.trial.recording else DIRECTIONS[name] * speed_of(data.trial),
         )
         found += _metrics(name, sliding, ripple)
     return tuple(found)

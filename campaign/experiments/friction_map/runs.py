@@ -203,9 +203,11 @@ def _replanned(trial: Trial) -> Run:
     return plan_run(speed_of(trial), validated(VelocityMapOptions, known))
 
 
-def settling_advice(rig: Rig, settled: float) -> str:
-    """What to do when runs settle for too short an angle (rad); empty when they do not."""
-    memory, turned = rig.presliding or 0.0, rig.unwinding
+def settling_advice(rig: Rig, speed: float, settled: float) -> str:
+    """What to do when a run at `speed` (rad/s) settles for too short an angle (rad); empty when it
+    does not.
+    """
+    memory, turned = rig.presliding or 0.0, rig.unwinding(speed)
     turned = turned if turned > memory else 0.0  # less is over while friction forgets
     needed = MEMORIES * memory + turned
     if settled >= needed * (1.0 - ROUNDING):
@@ -248,7 +250,7 @@ def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
             continue
         key = canonical_json(trial.bench)
         rig = rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
-        if advice := settling_advice(rig, settled_angle(trial)):
+        if advice := settling_advice(rig, speed_of(trial), settled_angle(trial)):
             told.setdefault(advice, []).append(speed_of(trial))
     for advice, speeds in told.items():
         low, high = rate_here(min(speeds)), rate_here(max(speeds))
@@ -272,7 +274,7 @@ def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[Tr
         )
     (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
     told = f"window {run.window:.3g} s, {angle_here(run.window * run.speed)}: {run.rule}"
-    advice = settling_advice(rig, run.speed * run.settle)
+    advice = settling_advice(rig, run.speed, run.speed * run.settle)
     many = bool(options.start_angles)
     for start_angle in _starts(options):
         yield TrialRequest(

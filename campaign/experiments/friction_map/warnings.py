@@ -75,7 +75,7 @@ def _settling(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
     rig = Rig(bench)
     told: dict[str, list[float]] = {}
     for run in runs:
-        if advice := settling_advice(rig, run.settle * run.speed):
+        if advice := settling_advice(rig, run.speed, run.settle * run.speed):
             told.setdefault(advice, []).append(run.speed)
     for advice, speeds in told.items():
         yield f"at {_range(speeds)} runs settle for too short an angle: {advice}"

@@ -36,6 +36,8 @@ MINUTE = 60.0
 WARM_UP_CYCLES = 3
 SLOWEST = 0.1
 """of the fastest speed of a map, at most: its slowest, so that it is a curve."""
+FEW = 5.0
+"""times that, where the loop is too weak to turn friction round at lower speeds."""
 SPEEDS = 40
 """of a map: the fit needs some ten, the rest shows where the curve is not the model's."""
 SWEPT = 40
@@ -105,7 +107,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     )
     memory = rig.presliding or 0.0
     undescribed = {"a usual size; friction is not described": usual(0.75)}
-    turned = rig.unwinding
+    turned = rig.unwinding(0.0)
     told = (
         f"{SETTLED:.0f} times Ts/σ0 of {angle_here(memory, '.2g')}, once the loop's "
         f"integral has turned round in {angle_here(turned, '.2g')}"
@@ -124,7 +126,8 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     if own:
         slowest = min(own)
     else:
-        slowest = _slowest(rig, choices, settle, window, longest, SLOWEST * fastest)
+        turning = rig.turned_within(max(settle - SETTLED * memory, 0.0) / TURNED)
+        slowest = _slowest(rig, choices, settle, window, longest, turning, SLOWEST * fastest)
     needed = max((settle + window) / slowest, settle_time + options.window_time)
     max_time = choices.least(
         "max_time",
@@ -182,7 +185,13 @@ def _fastest(travel: float, acceleration: float, steady: float) -> float:
 
 
 def _slowest(
-    rig: Rig, choices: Choices, settle: float, window: float, longest: float, most: float
+    rig: Rig,
+    choices: Choices,
+    settle: float,
+    window: float,
+    longest: float,
+    turning: float,
+    most: float,
 ) -> float:
     """Lowest rate (rad/s): where the curve bends, above the gyro's noise, in the time there is."""
     vs = rig.stribeck_velocity
@@ -194,11 +203,12 @@ def _slowest(
         "fifty times the gyro's noise in a second": 50
         * rig.rate_noise
         / math.sqrt(rig.sample_rate),
-        "three counts of the gyro": 3.0 * rig.bench.sensors.gyro.resolution,
-        "thirty counts of the encoder in a second": 30.0 * rig.bench.sensors.encoder.resolution,
+        "thirty counts of the encoder, or three of the gyro": rig.slowest_seen(longest),
+        "the loop turns friction round while it settles": turning,
         "it settles within a minute": (settle + 0.5 * window) / longest,
     }
     why = max(reasons, key=lambda reason: reasons[reason])
+    most = max(most, min(turning, FEW * most))
     return float(choices.take("slowest", nice(min(reasons[why], most), "deg/s", up=True), why))
 
 

@@ -70,22 +70,32 @@ class Rig:
         ]
         return max(periods, default=None)
 
-    @property
-    def unwinding(self) -> float:
-        """Angle (rad) that a stuck load lags at a reversal until the loop's integral has turned."""
-        return self.unwinding_from(self.static_torque or 0.0)
+    def unwinding(self, speed: float, static_torque: float | None = None) -> float:
+        """Angle (rad) that a stuck load lags at a reversal until the loop has turned its torque.
 
-    def unwinding_from(self, static_torque: float) -> float:
-        """The same for a static torque (N m) that was found.
+        From -Ts to Ts, of which the proportional gain gives Kp v at once: the integral needs
+        (2 Ts / (N Kt) - Kp v) / Ki. 0 without an integral, which then never breaks it away, and
+        where nobody says how large it is.
 
-        From -Ts to Ts: 2 Ts / (N Kt Ki); 0 without an integral, which then never breaks it away,
-        and where nobody says how large it is.
+        Args:
+            speed: of the run (rad/s).
+            static_torque: one that was found (N m), in place of the bench's.
         """
         controller, per_ampere = self.bench.controller, self.bench.torque_per_current
         if controller is None or controller.rate is None or per_ampere is None:
             return 0.0
-        gain = per_ampere * controller.rate.integral_gain
-        return 2.0 * static_torque / gain if gain > 0 else 0.0
+        gains = controller.rate
+        torque = (self.static_torque or 0.0) if static_torque is None else static_torque
+        left = max(2.0 * torque / per_ampere - gains.proportional * speed, 0.0)
+        return left / gains.integral_gain if gains.integral_gain > 0 else 0.0
+
+    def turned_within(self, angle: float) -> float:
+        """Lowest speed (rad/s) at which `unwinding` is an angle (rad) at most."""
+        controller = self.bench.controller
+        whole = self.unwinding(0.0)
+        if controller is None or controller.rate is None or whole <= angle:
+            return 0.0
+        return (whole - angle) * controller.rate.integral_gain / controller.rate.proportional
 
     @property
     def limits(self) -> LimitsOptions:
@@ -160,6 +170,23 @@ class Rig:
         loop = dict(loops_of(self.bench, "none", "rate")).get("sliding")
         margin = loop.phase_margin if isinstance(loop, LoopMargins) else None
         return UNKNOWN_OVERSHOOT if margin is None else max(1.0, 0.5 / math.sin(0.5 * margin))
+
+    def rate_count(self, omega: float) -> float:
+        """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 where noise smooths it.
+
+        An encoder counts the angle, which swings by the rate over omega.
+        """
+        encoder, gyro = self.bench.sensors.encoder, self.bench.sensors.gyro
+        sensor = encoder if self.bench.rate_is_of_encoder else gyro
+        count = sensor.resolution if sensor.noise < 0.5 * sensor.resolution else 0.0
+        return count * omega if self.bench.rate_is_of_encoder else count
+
+    def slowest_seen(self, longest: float) -> float:
+        """Lowest rate (rad/s) that its sensor tells in half of a run of `longest` (s)."""
+        sensors = self.bench.sensors
+        if self.bench.rate_is_of_encoder:
+            return 30.0 * sensors.encoder.resolution / (0.5 * longest)
+        return 3.0 * sensors.gyro.resolution
 
     @property
     def sample_rate(self) -> float:
