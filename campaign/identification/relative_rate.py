@@ -22,6 +22,8 @@ WORST_COUNT = 1.5
 """Slope that one count, wherever in a window, adds at most: times a count per window."""
 SHORTEST = 3
 """Samples of a line; fewer have no middle."""
+STOP_FACTOR = 4.0
+"""Rate that ends a torque ramp, over the rate that counts as sliding: enough to see it slide."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,22 @@ def resolved_rate(
     if not own_sensor:
         return by_angle
     return min(by_rate, by_angle, key=lambda each: (max(each.finest, finest), each.window))
+
+
+def slides_from(rate: Array, threshold: float) -> int | None:
+    """First sample of sliding; None where the load never slides.
+
+    It slides once its rate, shape (n,), either way, stays at `threshold` (rad/s) or above until it
+    is `STOP_FACTOR` times as fast or the recording ends. What creeps, or scatters, comes back.
+    """
+    size = np.abs(rate)
+    fast = size > STOP_FACTOR * threshold
+    stop = int(np.argmax(fast)) if fast.any() else len(size)
+    slow = np.flatnonzero(size[:stop] < threshold)
+    known = np.flatnonzero(size[:] >= threshold)
+    first = int(slow[-1]) + 1 if len(slow) else 0
+    later = known[known >= first]
+    return int(later[0]) if len(later) else None
 
 
 def _resolution(samples: Array) -> tuple[float, float]:
