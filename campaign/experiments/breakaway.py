@@ -30,7 +30,15 @@ from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, wit
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.found_excitation import found_ramp
 from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
-from campaign.identification.relative_rate import RelativeRate, resolved_rate
+from campaign.identification.relative_rate import (
+    LONGEST,
+    STOP_FACTOR,
+    RelativeRate,
+    made_of_counts,
+    resolved_rate,
+    slides_from,
+    stop_rate,
+)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
@@ -52,10 +60,6 @@ from campaign.units import (
     rate_here,
 )
 
-STOP_FACTOR = 4.0
-"""Rate that ends the trial, over the rate that counts as sliding: enough to see it slide."""
-LONGEST = 0.2
-"""s over which a rate of counts is smoothed, at most: a load gathers speed as fast."""
 WAYS = {"positive": 1.0, "negative": -1.0}
 OF_INERTIA = Cause("part of the inertia", "it serves the inertia's part alone")
 ASSUMED_RATIO = Cause(
@@ -91,7 +95,8 @@ class BreakawayOptions(Options):
     rest: Time = Field(default=0.5, ge=0)
     """Standstill before the ramp: it says what the gyro's bias is."""
     sliding_rate: AngularRate = Field(default=0.005, gt=0)
-    """Rate at which the load counts as sliding; the trial ends when it is four times this fast."""
+    """Rate at which the load counts as sliding; the trial ends when it is four times this fast, and
+    two counts of a gyro at least."""
     fit_share: float = Field(default=0.8, gt=0.1, lt=1.0)
     """The presliding curve is fitted up to this share of the breakaway torque."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
@@ -107,7 +112,7 @@ class BreakawayOptions(Options):
 def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
     windows = windows_of(options)
     _, ramp = windows
-    stop_rate = STOP_FACTOR * options.sliding_rate
+    ends = stop_rate(options.sliding_rate, bench.sensors.gyro.resolution)
     places = [(way, position) for way in options.directions for position in options.positions]
     for number, (direction, position) in enumerate(places, start=1):
         peak = WAYS[direction] * options.peak_torque
@@ -119,10 +124,10 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
                 window=(ramp.start, ramp.stop),
                 sample_rate=options.sample_rate,
                 start_angle=position,
-                stop_rate=stop_rate,
+                stop_rate=ends,
             ),
             point={"measurement": number, "position": position, "direction": direction},
-            note=f"ends early, once the load slides at {rate_here(stop_rate)}",
+            note=f"ends early, once the load slides at {rate_here(ends)}",
             windows=windows,
         )
 
@@ -139,14 +144,13 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     """The ramp of a recording that nobody planned: up to when the load first slides."""
     known = {RELATIVE_ANGLE} & offered.channels
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
-    seen = _resolved(recording, options.sliding_rate)
-    rate, threshold = np.abs(seen.values), max(options.sliding_rate, seen.finest)
-    sliding = rate > threshold
-    if not sliding.any():
+    seen = _resolved(recording, options.sliding_rate, own_sensor=False)
+    threshold = max(options.sliding_rate, seen.finest)
+    slides = slides_from(seen.values, threshold)
+    if slides is None:
         raise ValueError(f"the load never slides at {rate_here(threshold)} (sliding_rate)")
-    slides = float(recording.time[int(np.argmax(sliding))])
-    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], slides)
-    stops = rate > STOP_FACTOR * threshold
+    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides]))
+    stops = np.abs(seen.values) > STOP_FACTOR * threshold
     stop = offered.duration
     if stops.any():  # and what the smoothing needs behind it
         stop = min(stop, float(recording.time[int(np.argmax(stops))]) + 0.5 * seen.window)
@@ -172,15 +176,21 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     )
 
 
-def _resolved(recording: Recording, finest: float) -> RelativeRate:
-    """The rate of an imported recording, smoothed until its sensor resolves `finest` (rad/s).
+def _resolved(recording: Recording, finest: float, *, own_sensor: bool) -> RelativeRate:
+    """The rate of a recording, smoothed until its sensor resolves `finest` (rad/s).
 
-    It may be made of an encoder's counts, of which each is many times as fast.
+    It may be made of an encoder's counts, of which each is many times as fast; of an imported rate
+    nobody tells. It is then the slope of the angle.
     """
     angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
-    step = float(np.ptp(recording.time)) / max(len(recording.time) - 1, 1)
-    rate = recording[GYRO_RATE]
-    return resolved_rate(rate, angle, step, finest, LONGEST, own_sensor=False)
+    rate, step = recording[GYRO_RATE], _step(recording)
+    if angle is not None and own_sensor:
+        own_sensor = not made_of_counts(rate, angle, step)
+    return resolved_rate(rate, angle, step, finest, LONGEST, own_sensor=own_sensor)
+
+
+def _step(recording: Recording) -> float:
+    return float(np.ptp(recording.time)) / max(len(recording.time) - 1, 1)
 
 
 def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
@@ -203,17 +213,24 @@ def direction_of(trial: Trial) -> str:
 
 
 def _samples(data: TrialData) -> tuple[Array, Array, Array]:
-    """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,)."""
+    """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,).
+
+    A rate of counts that are rounded is differenced anew: what is below one of them is lost else.
+    """
     recording, way = data.recording(), WAYS[direction_of(data.trial)]
-    return recording.time, way * recording[GYRO_RATE], way * recording[DRIVE_TORQUE]
+    rate = recording[GYRO_RATE]
+    if not data.trial.recording and RELATIVE_ANGLE in recording.channels:
+        angle, step = recording[RELATIVE_ANGLE], _step(recording)
+        if made_of_counts(rate, angle, step):
+            rate = np.gradient(angle, step)
+    return recording.time, way * rate, way * recording[DRIVE_TORQUE]
 
 
 def _seen(data: TrialData, finest: float) -> Array:
     """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
-    recording, way = data.recording(), WAYS[direction_of(data.trial)]
-    if not data.trial.recording:
-        return way * recording[GYRO_RATE]
-    return way * _resolved(recording, finest).values
+    own_sensor = not data.trial.recording
+    seen = _resolved(data.recording(), finest, own_sensor=own_sensor)
+    return WAYS[direction_of(data.trial)] * seen.values
 
 
 def curve_of(data: TrialData, breakaway: float) -> Presliding:
@@ -318,7 +335,7 @@ def _analyse(data: TestData) -> Result:
 def _slid(item: TrialData) -> bool:
     """Whether the load came to the rate that counts as sliding."""
     bound = _options(item.trial).sliding_rate
-    return bool(np.any(np.abs(_seen(item, bound)) >= bound))
+    return slides_from(_seen(item, bound), bound) is not None
 
 
 def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:

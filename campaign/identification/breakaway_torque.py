@@ -3,6 +3,9 @@
 Friction is the drive torque less what accelerates the load (Eq. 4.1). Around its maximum the load
 creeps faster and faster until it slides, so that both parts change smoothly: the drive torque is a
 line, the rate a polynomial, and friction is their difference, without a filter that would bend it.
+
+The instability sets its own pace: the time in which the rate doubles. The slower the ramp, the more
+paces before its end friction is largest, and the less of it does the end of the rate show.
 """
 
 from __future__ import annotations
@@ -12,25 +15,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.identification.autocorrelated import Array, errors_of
+from campaign.identification.autocorrelated import Array, FitErrors, errors_of
 from campaign.identification.intervals import student, with_error
+from campaign.identification.relative_rate import mean, slides_from, slope
 from campaign.reason import Cause
 
+NAME = "breakaway_torque"
 DEGREE = 5
 """of the polynomial that the rate is around the maximum."""
 BINS = 60
 """into which the rate is averaged around the maximum."""
 REACH = 1.75
-"""Half-width of what is fitted, in times that the rate takes from half of its last value to all of
-it. The instability sets its own pace, 0.2 to 0.4 s on an axis of 70 kg m^2: with 1.5 to 2 of it the
-polynomial bends as friction does (coverage 94 to 98 %), with 2.5 no longer (68 to 99 %)."""
-FIRST_REACH = 6.0
-"""The same, before the end of the ramp, where the maximum is looked for."""
+"""Half-width of what is fitted, in paces. On an axis of 70 kg m^2 a pace is 0.2 to 0.4 s: with 1.5
+to 2 of it the polynomial bends as friction does (coverage 94 to 98 %), with 2.5 no longer (68 to
+99 %)."""
+INNER = 0.6
+"""of the half-width, within which the maximum lies: near its ends a polynomial's slope is noise."""
+NARROWER = 0.7
+"""times the half-width, as long as what is left of the fit is the polynomial's own error."""
 SMOOTH = 0.95
 """AR(1) coefficient of the residuals from which on they are the polynomial's own error: no noise of
 a gyro lasts that long against a bin."""
 METHOD = "line through the torque less inertia times the slope of a quintic through the rate"
 STILL_RISING = Cause("friction still rising", "friction was still rising when the recording ended")
+NO_FALL = Cause(
+    "no significant fall", "the recording ends before the fall of friction is significant"
+)
 TOO_LITTLE_NOISE = Cause(
     "error of the polynomial", "noise is so small that the polynomial's own error is larger"
 )
@@ -41,16 +51,14 @@ class Breakaway:
     """What the end of a torque ramp says.
 
     Attributes:
-        torque: the largest friction (N m); a bound of "at least" when friction still rose as the
-            recording ended.
-        sliding: the sample at which the rate passed the threshold.
+        torque: the largest friction (N m); a bound of "at least" when friction did not fall
+            significantly before the recording ended.
         peak_time: when friction was largest (s).
         acceleration: of the load at that time (rad/s^2), as fast as the torque falls when the
             inertia is said to be larger (N m per kg m^2).
     """
 
     torque: Estimate
-    sliding: int
     peak_time: float
     acceleration: float
 
@@ -73,89 +81,98 @@ def breakaway_torque(
     not known; absent: the rate itself. It decides when the load slides, and its pace.
     Raises ValueError when the load never moved that fast, or for too few samples.
     """
-    seen = rate if seen is None else np.nan_to_num(seen)
-    moving = np.abs(seen) >= threshold
-    if not moving.any():
+    seen = rate if seen is None else seen
+    sliding = slides_from(seen, threshold)
+    if sliding is None:
         raise ValueError(
             f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
         )
-    sliding = int(np.argmax(moving))
-    sign = float(np.sign(np.mean(seen[sliding:])))
+    sign = float(np.sign(np.nanmean(seen[sliding:])))
     interval = float(np.ptp(time)) / max(len(time) - 1, 1)
-    pace = interval * float(np.sum(sign * seen > 0.5 * np.max(sign * seen)))
-    stop = float(time[-1]) + interval
-    first = _fit(time, sign * rate, sign * torque, inertia, (stop - FIRST_REACH * pace, stop))
-    near = (first.peak_time - REACH * pace, first.peak_time + REACH * pace)
-    found = _fit(time, sign * rate, sign * torque, inertia, near)
-    return Breakaway(found.estimate(), sliding, found.peak_time, found.acceleration)
+    forwards = sign * np.nan_to_num(seen)
+    span = 2 * (max(int(np.sum(forwards > 0.5 * np.max(forwards))), 2) // 2) + 1
+    pace, stop = span * interval, float(time[-1]) + interval
+
+    def fit(middle: float, half: float) -> _Fit:
+        part = slice(*np.searchsorted(time, (middle - half, middle + half)))
+        return _fit(time[part], sign * rate[part], sign * torque[part], inertia)
+
+    reach = REACH * pace
+    end = fit(stop - reach, reach)
+    smooth = mean(sign * torque, span) - inertia * slope(sign * rate, interval, span)
+    about = float(time[np.nanargmax(smooth)])
+    found = fit(about, reach)
+    while found.errors.correlation >= SMOOTH and reach > 0.5 * pace:
+        reach *= NARROWER
+        try:
+            found = fit(about, reach)
+        except ValueError:  # too few samples
+            break
+    peak_time = found.peak_time
+    value, error = found.friction(peak_time)
+    more = {"standard_error": error, "freedom": found.errors.freedom, "method": METHOD}
+    times = student(found.errors.freedom)
+    late, before = (end.friction(stop - paces * pace) for paces in (0.5, 1.5))
+    if value - late[0] <= times * (error + late[1]):
+        rises = late[0] - before[0] > times * (late[1] + before[1])
+        reason = STILL_RISING() if rises else NO_FALL()
+        told = Estimate.without_interval(NAME, value - times * error, "N m", reason, kind="at least", **more)
+    elif found.errors.correlation >= SMOOTH:
+        told = Estimate.without_interval(NAME, value, "N m", TOO_LITTLE_NOISE(), **more)
+    else:
+        told = with_error(NAME, value, "N m", error, found.errors.freedom, METHOD)
+    return Breakaway(told, peak_time, found.acceleration(peak_time))
 
 
 @dataclass(frozen=True)
-class _Peak:
-    """A maximum of friction: value and standard error (N m), how far it falls to the end."""
+class _Fit:
+    """A polynomial through the rate and a line through the torque, over 2 `half` (s) of time."""
 
-    value: float
-    error: float
-    freedom: int
-    correlation: float
-    fall: float
-    fall_error: float
-    peak_time: float
-    acceleration: float
+    centre: float
+    half: float
+    of_rate: Array
+    of_torque: Array
+    errors: FitErrors
+    levels: FitErrors
+    inertia: float
 
-    def estimate(self) -> Estimate:
-        more = {"standard_error": self.error, "freedom": self.freedom, "method": METHOD}
-        if self.fall <= student(self.freedom) * self.fall_error:
-            low = self.value - student(self.freedom) * self.error
-            return Estimate.without_interval(
-                "breakaway_torque", low, "N m", STILL_RISING(), kind="at least", **more
-            )
-        if self.correlation >= SMOOTH:
-            reason = TOO_LITTLE_NOISE()
-            return Estimate.without_interval("breakaway_torque", self.value, "N m", reason, **more)
-        return with_error("breakaway_torque", self.value, "N m", self.error, self.freedom, METHOD)
+    def acceleration(self, time: float) -> float:
+        """Of the load (rad/s^2)."""
+        return float(self._slope(time) @ self.of_rate)
+
+    def friction(self, time: float) -> tuple[float, float]:
+        """Value and standard error (N m)."""
+        slope, line = self._slope(time), np.array([1.0, (time - self.centre) / self.half])
+        variance = self.inertia**2 * slope @ self.errors.covariance @ slope
+        variance += line @ self.levels.covariance @ line
+        return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), variance**0.5
+
+    @property
+    def peak_time(self) -> float:
+        """When friction is largest (s)."""
+        tried = self.centre + self.half * np.linspace(-INNER, INNER, 1001)
+        return float(max(tried, key=lambda time: self.friction(time)[0]))
+
+    def _slope(self, time: float) -> Array:
+        """Of each power of the polynomial (1/s)."""
+        place, powers = (time - self.centre) / self.half, np.arange(1, DEGREE + 1)
+        return np.append(0.0, powers * place ** (powers - 1)) / self.half
 
 
-def _fit(
-    time: Array, rate: Array, torque: Array, inertia: float, window: tuple[float, float]
-) -> _Peak:
-    """The largest friction within a window of time, where torque and rate are positive."""
-    first, last = np.searchsorted(time, window)
-    each = max(1, int(last - first) // BINS)
-    count = int(last - first) // each
+def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
+    """Of samples where torque and rate are positive; as many bins as fit, the first are left out."""
+    each = max(1, len(time) // BINS)
+    count = len(time) // each
     if count < 2 * (DEGREE + 1):
-        raise ValueError(f"only {last - first} samples around breakaway: too few for its torque")
-    first = last - count * each
-    centre, half = float(np.mean(time[first:last])), 0.5 * float(np.ptp(time[first:last]))
-    at = (time[first:last] - centre) / half
-
-    rates = rate[first:last].reshape(count, each).mean(axis=1)
+        raise ValueError(f"only {len(time)} samples around breakaway: too few for its torque")
+    time, rate, torque = (values[len(values) - count * each :] for values in (time, rate, torque))
+    centre, half = float(np.mean(time)), 0.5 * float(np.ptp(time))
+    at = (time - centre) / half
+    rates = rate.reshape(count, each).mean(axis=1)
     powers = np.vander(at.reshape(count, each).mean(axis=1), DEGREE + 1, increasing=True)
     of_rate = np.linalg.lstsq(powers, rates, rcond=None)[0]
     line = np.stack([np.ones_like(at), at], axis=1)
-    of_torque = np.linalg.lstsq(line, torque[first:last], rcond=None)[0]
-
-    fine = np.linspace(powers[0, 1], powers[-1, 1], 2001)
-    slopes = np.arange(1, DEGREE + 1) * np.vander(fine, DEGREE, increasing=True) / half
-    accelerations = slopes @ of_rate[1:]
-    friction = of_torque[0] + of_torque[1] * fine - inertia * accelerations
-    peak = int(np.argmax(friction))
-
+    of_torque = np.linalg.lstsq(line, torque, rcond=None)[0]
     errors = errors_of(powers, rates - powers @ of_rate)
-    levels = errors_of(line, torque[first:last] - line @ of_torque)
-
-    def error(of_slope: Array, of_line: Array) -> float:
-        row = np.concatenate([[0.0], of_slope])
-        variance = inertia**2 * row @ errors.covariance @ row
-        return float(np.sqrt(variance + of_line @ levels.covariance @ of_line))
-
-    return _Peak(
-        float(friction[peak]),
-        error(slopes[peak], np.array([1.0, fine[peak]])),
-        errors.freedom,
-        errors.correlation,
-        float(friction[peak] - friction[-1]),
-        error(slopes[peak] - slopes[-1], np.array([0.0, fine[peak] - fine[-1]])),
-        centre + half * float(fine[peak]),
-        float(accelerations[peak]),
-    )
+    levels = errors_of(line, torque - line @ of_torque)
+    return _Fit(centre, half, of_rate, of_torque, errors, levels, inertia)

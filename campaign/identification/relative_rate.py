@@ -22,6 +22,12 @@ WORST_COUNT = 1.5
 """Slope that one count, wherever in a window, adds at most: times a count per window."""
 SHORTEST = 3
 """Samples of a line; fewer have no middle."""
+STOP_FACTOR = 4.0
+"""Rate that ends a torque ramp, over the rate that counts as sliding: enough to see it slide."""
+STOP_COUNTS = 2.0
+"""Counts of the rate that end a torque ramp, at least: a load that creeps shows one at a time."""
+LONGEST = 0.2
+"""s over which a rate of counts is smoothed on a ramp, at most: a load gathers speed as fast."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +167,30 @@ def resolved_rate(
     if not own_sensor:
         return by_angle
     return min(by_rate, by_angle, key=lambda each: (max(each.finest, finest), each.window))
+
+
+def stop_rate(sliding: float, count: float) -> float:
+    """Rate (rad/s) that ends a torque ramp, by what counts as sliding and one count of the rate."""
+    return max(STOP_FACTOR * sliding, STOP_COUNTS * count)
+
+
+def slides_from(rate: Array, threshold: float) -> int | None:
+    """First sample of sliding; None where the load never slides.
+
+    It slides once its rate, shape (n,), either way, stays at `threshold` (rad/s) or above until it
+    is `STOP_FACTOR` times as fast or the recording ends. What creeps, or scatters, comes back. NaN
+    is neither.
+    """
+    size = np.abs(rate)
+    fast = np.append(np.flatnonzero(size > STOP_FACTOR * threshold), len(size))
+    slow = np.append(-1, np.flatnonzero(size[: fast[0]] < threshold))
+    sliding = np.flatnonzero(size[slow[-1] + 1 :] >= threshold)
+    return int(slow[-1] + 1 + sliding[0]) if len(sliding) else None
+
+
+def made_of_counts(rate: Array, angle: Array, step: float) -> bool:
+    """Whether one count of a rate (rad/s) is as large as a count of the angle (rad) per sample."""
+    return 2.0 * count_of(rate) * step > count_of(angle) > 0.0
 
 
 def _resolution(samples: Array) -> tuple[float, float]:

@@ -15,9 +15,11 @@ import numpy as np
 from campaign.axis_kind import is_linear
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.choices import Choices, Reasons, nice, share
-from campaign.experiments.shared.rig import MOST, Rig
+from campaign.experiments.shared.rig import MOST, SLOW, Rig
+from campaign.identification.relative_rate import LONGEST, STOP_FACTOR, WORST_COUNT, stop_rate
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate, inertia_of, limits_of, require
+from campaign.physics.steady_friction import steady_friction
 from campaign.units import angle_here, rate_here
 
 DEG = math.pi / 180.0
@@ -43,7 +45,12 @@ SPEEDS = 40
 SWEPT = 40
 """frequencies, evenly in their logarithm."""
 RAMP_TIME = 30.0
-"""s, of a torque ramp up to breakaway: slow against friction's own rates."""
+"""s, of a torque ramp up to breakaway, at most: slow against friction's own rates."""
+RAMP_PACES = 400.0
+"""times that sliding takes to grow e-fold, up to breakaway: its friction is then 1 % below Ts, and
+largest within some ten of them before the ramp ends."""
+PACE_SAMPLES = 40.0
+"""in which sliding grows e-fold, at least: enough for a polynomial through them."""
 SLIDING = 0.1
 """of the rate limit, at most: a rate that counts as sliding."""
 RUN_OUT = 4.0
@@ -217,7 +224,8 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
     sliding = _sliding(rig, options)
-    reach = _reach(rig, options, max(sliding.values()))
+    ends = stop_rate(max(sliding.values()), bench.sensors.gyro.resolution)
+    reach = _reach(rig, options, ends / STOP_FACTOR)
     positions = tuple(nice(p, "deg", 3) for p in np.linspace(-reach, reach, 10))
     if reach < 45 * DEG:
         choices.take("positions", positions, f"ten, within {share('angle', 0.75)}")
@@ -225,12 +233,16 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     drive = {share("torque", MOST): MOST * rig.torque}
     friction = {} if static is None else {f"{PEAK:g} times the static torque": PEAK * static}
     peak = choices.least("peak_torque", "N m", {**friction, **drive})
+    tau = _instability(rig, max(sliding.values()))
     slope = choices.most(
         "torque_rate",
         "N m/s",
         {
             f"breakaway after about {RAMP_TIME:.0f} s": (static or 0.5 * peak) / RAMP_TIME,
             "the ramp ends within the limit of duration": 1.2 * peak / limits.duration,
+            f"breakaway after {RAMP_PACES:.0f} times the {tau:.2g} s in which sliding grows e-fold": (
+                (static or 0.0) / (RAMP_PACES * tau)
+            ),
         },
     )
     if rig.rate_noise > 0:
@@ -238,8 +250,23 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         why = "a third of the ramp up to breakaway, to know the gyro's bias"
         choices.take("rest", nice(length / 3.0, "s"), why)
     choices.most("sliding_rate", "deg/s", sliding)
-    choices.sample_rate(rig)
+    if PACE_SAMPLES > tau * rig.sample_rate:
+        fastest = control_rate(bench) or nice(PACE_SAMPLES / tau, "Hz", up=True)
+        choices.take("sample_rate", fastest, f"sliding grows e-fold within {tau:.2g} s")
+    else:
+        choices.sample_rate(rig)
     return choices.told
+
+
+def _instability(rig: Rig, rate: float) -> float:
+    """Time (s) in which the rate of a load grows e-fold as friction falls up to `rate` (rad/s).
+
+    J over the slope of friction; infinite where it does not fall, or nobody says how.
+    """
+    (rest, slow), (_, viscous) = steady_friction(rig.bench, np.array([SLOW, rate]))
+    fall = (rest - slow - viscous) / rate
+    inertia = rig.bench.axis.inertia
+    return inertia / fall if inertia is not None and fall > 0 else math.inf
 
 
 def _settling(rig: Rig, options: Any) -> tuple[float, str]:
@@ -258,10 +285,14 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     """
     if "sliding_rate" in options.model_fields_set:
         return {"as written": options.sliding_rate}
-    vs, limits, noise = rig.stribeck_velocity, rig.limits, 6.0 * rig.rate_noise
+    vs, limits, sensors = rig.stribeck_velocity, rig.limits, rig.bench.sensors
+    noise, count = 6.0 * sensors.gyro.noise, math.sqrt(3.0) * sensors.gyro.resolution
+    if encoder := sensors.encoder.resolution:
+        count = min(count, WORST_COUNT * encoder / LONGEST)
     usual_rate = 0.3 * MILLIMETRE if is_linear() else 0.005
     wanted = {
         "six deviations of the gyro's noise": noise,
+        f"what counts of a sensor show in {LONGEST:g} s": count,
         **({"a fifth of the Stribeck velocity": 0.2 * vs} if vs else {"a usual size": usual_rate}),
     }
     allowed = {
@@ -269,15 +300,14 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
         "what half of the angle limit leaves to stop": 0.5 * limits.angle / RUN_OUT,
     }
     why = min(allowed, key=lambda reason: allowed[reason])
-    if max(wanted.values()) <= allowed[why]:
-        return wanted
-    if allowed[why] < noise:
+    least = max(noise, count, stop_rate(0.0, sensors.gyro.resolution) / STOP_FACTOR)
+    if allowed[why] < least:
         raise ValueError(
-            f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and six "
-            f"deviations of the gyro's noise are {rate_here(noise, '.2g')}: raise the limits of "
-            "angle or rate, or write sliding_rate"
+            f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and "
+            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, or "
+            "counts): raise the limits of angle or rate, or write sliding_rate"
         )
-    return {why: allowed[why]}
+    return wanted if max(wanted.values()) <= allowed[why] else {why: allowed[why]}
 
 
 def _reach(rig: Rig, options: Any, sliding: float) -> float:
