@@ -199,7 +199,7 @@ def _told(run: Run, rig: Rig, finding: Finding, parameter: str, true: float) -> 
     low, high = (None if end is None else end * ratio for end in ends)
     held = None
     if low is not None or high is not None:
-        held = (low is None or low <= true) and (high is None or true <= high)
+        held = bool((low is None or low <= true) and (high is None or true <= high))
     half = None if low is None or high is None else 0.5 * (high - low)
     bound = bound_of(run, finding)
     return Told(

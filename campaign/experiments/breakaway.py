@@ -26,6 +26,7 @@ from campaign.experiments.shared import fitting
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.found_trials import named_or_found
+from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.identification.breakaway_torque import breakaway_torque
 from campaign.identification.found_excitation import found_ramp
@@ -112,7 +113,7 @@ class BreakawayOptions(Options):
 def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
     windows = windows_of(options)
     _, ramp = windows
-    ends = stop_rate(options.sliding_rate, bench.sensors.gyro.resolution)
+    ends = stop_rate(options.sliding_rate, Rig(bench).rate_step)
     places = [(way, position) for way in options.directions for position in options.positions]
     for number, (direction, position) in enumerate(places, start=1):
         peak = WAYS[direction] * options.peak_torque
@@ -228,7 +229,7 @@ def _samples(data: TrialData) -> tuple[Array, Array, Array]:
 
 def _seen(data: TrialData, finest: float) -> Array:
     """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
-    own_sensor = not data.trial.recording
+    own_sensor = not (data.trial.recording or bench_of(data.trial).rate_is_of_encoder)
     seen = _resolved(data.recording(), finest, own_sensor=own_sensor)
     return WAYS[direction_of(data.trial)] * seen.values
 

@@ -74,7 +74,7 @@ def unsteady(
         own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
     """
     mean = abs(float(np.mean(rate)))
-    if mean == 0.0:
+    if mean < np.finfo(float).tiny:
         return RATE_UNCERTAIN(percent=math.inf)
     step = float(np.median(np.diff(time)))
     duration = step + float(np.ptp(time))

@@ -54,6 +54,7 @@ ROUNDS = 20
 """of fit and deviation in turn, at most; usually five."""
 SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
+TINY = 1e-300
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
 HELD_EXPONENT = Cause("held", "held at {value:g}")
@@ -255,7 +256,29 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
     if name in found.open:
         return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
-    return with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
+    told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
+    return _by_profile(fit, model, told) if told.reason and model != "none" else told
+
+
+def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
+    """What is extrapolated, by profile likelihood: there the curve is not straight within its errors.
+
+    Refused where the points give no limit on a side.
+    """
+    found, rise = fit.fits[model], student(fit.freedom) ** 2
+    step = 0.5 * (told.standard_error or 0.0)
+
+    def cost(tried: float) -> float:
+        return held_at(found, fit.speed, fit.torque, told.name, max(tried, TINY), HELD[model])
+
+    try:
+        low, high = (
+            float(profile_limit(cost, told.value, way * step, rise)) for way in (-1.0, 1.0)
+        )
+    except ValueError:
+        return refused(told, LEFT_OPEN())
+    method = f"profile likelihood, t({fit.freedom})"
+    return replace(told, low=low, high=high, method=method)
 
 
 def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estimate:

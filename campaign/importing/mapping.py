@@ -7,7 +7,7 @@ is as written here; `channel_plan` makes numbers of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -60,7 +60,8 @@ class ChannelColumn(ColumnPlace):
     times: str = ""
     """By what the column is multiplied, as in `35.15 N/V`, where it measures something else."""
     uncertainty: str = ""
-    """Standard uncertainty (1 sigma) of `times`, in its unit; or a share of it, as in `5 %`."""
+    """Standard uncertainty (1 sigma) of `times`, in its unit; or a share of the value, as in `5 %`,
+    which needs no `times`."""
     offset: float = 0.0
     """What the column reads at zero, in its own unit."""
     sign: Literal[1, -1] = 1
@@ -203,30 +204,33 @@ def recordings_of(
         if isinstance(valid, list):
             problems += valid
             continue
-        if fault := _file_fault(valid.file):
-            problems.append(at.problem(("file",), "value", fault))
-            continue
-        if unknown := [name for name in valid.windows if windows and name not in windows]:
-            message = f"no analysis of this test looks for a window {shown(unknown[0])}; "
-            message += allowed(windows) + nearest(unknown[0], windows)
-            problems.append(at.problem(("windows", unknown[0]), "key", message))
-            continue
-        several = [k for k in ("where", "each", "trigger") if getattr(valid, k) is not None]
-        several += ["restarts"] * valid.restarts
-        bounded = [key for key in ("start", "stop") if getattr(valid, key) is not None]
-        if valid.restarts and bounded:
-            message = f"{bounded[0]!r} is a time, and with 'restarts' there are several of it"
-            problems.append(at.problem((bounded[0],), "key", message))
-            continue
-        if len(several) > 1:
-            message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
-            problems.append(at.problem((several[1],), "key", message))
-        elif valid.trial is not None and several:
-            message = f"'trial' says which trial it is, and '{several[0]}' that it may be several"
-            problems.append(at.problem((several[0],), "key", message))
-        else:
+        faults = list(_entry_faults(valid, windows, at))
+        problems += faults
+        if not faults:
             found.append((index, valid))
     return found
+
+
+def _entry_faults(entry: RecordingEntry, windows: Sequence[str], at: Origin) -> Iterator[Problem]:
+    """What of a valid entry does not go together."""
+    if fault := _file_fault(entry.file):
+        yield at.problem(("file",), "value", fault)
+    for unknown in (name for name in entry.windows if windows and name not in windows):
+        message = f"no analysis of this test looks for a window {shown(unknown)}; "
+        message += allowed(windows) + nearest(unknown, windows)
+        yield at.problem(("windows", unknown), "key", message)
+    several = [k for k in ("where", "each", "trigger") if getattr(entry, k) is not None]
+    several += ["restarts"] * entry.restarts
+    bounded = [key for key in ("start", "stop") if getattr(entry, key) is not None]
+    if entry.restarts and bounded:
+        message = f"{bounded[0]!r} is a time, and with 'restarts' there are several of it"
+        yield at.problem((bounded[0],), "key", message)
+    if len(several) > 1:
+        message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
+        yield at.problem((several[1],), "key", message)
+    elif entry.trial is not None and several:
+        message = f"'trial' says which trial it is, and '{several[0]}' that it may be several"
+        yield at.problem((several[0],), "key", message)
 
 
 def _file_fault(file: str | tuple[str, ...]) -> str:
@@ -262,22 +266,24 @@ def _time_faults(time: TimeColumn, at: Origin) -> list[Problem]:
 def _channel_faults(
     name: str, entry: ChannelColumn, table: Mapping[str, Any], at: Origin
 ) -> list[Problem]:
+    found = []
     if entry.column is None and not entry.derive:
         message = "say which 'column' it is, or what to 'derive' it from"
-        return [at.problem((), "key", message)]
+        found.append(at.problem((), "key", message))
     if entry.column is not None and entry.derive:
         message = "it is a 'column' or it is derived; remove one of the two"
-        return [at.problem(("derive",), "key", message)]
-    unknown = [kind for kind in entry.accept if kind not in CHANNEL_KINDS]
-    if unknown:
-        message = f"{shown(unknown[0])} is nothing that is looked for; {allowed(CHANNEL_KINDS)}"
-        message += nearest(unknown[0], CHANNEL_KINDS)
-        return [at.problem(("accept",), "value", message)]
-    if entry.uncertainty and not entry.times:
-        return [at.problem(("uncertainty",), "key", "'uncertainty' is that of 'times'")]
+        found.append(at.problem(("derive",), "key", message))
+    for kind in entry.accept:
+        if kind not in CHANNEL_KINDS:
+            message = f"{shown(kind)} is nothing that is looked for; {allowed(CHANNEL_KINDS)}"
+            message += nearest(kind, CHANNEL_KINDS)
+            found.append(at.problem(("accept",), "value", message))
+    if entry.uncertainty and not entry.times and not entry.uncertainty.strip().endswith("%"):
+        message = "write it as a share, as in '2 %': only beside 'times' it has a unit of its own"
+        found.append(at.problem(("uncertainty",), "value", message))
     others = [key for key in table if key not in (TIME, name)]
     if entry.derive and entry.derive not in others:
         message = f"there is no channel {shown(entry.derive)} here; {allowed(others)}"
         message += nearest(entry.derive, others)
-        return [at.problem(("derive",), "value", message)]
-    return []
+        found.append(at.problem(("derive",), "value", message))
+    return found

@@ -273,3 +273,23 @@ file = "a.csv"
     (tmp_path / "m.toml").write_text(mapping.replace('"mm"', '"mrad"'))
     with pytest.raises(UsageError, match=r"\[columns.NAME.drive_torque\] which column"):
         prepare(Request(str(tmp_path / "m.toml"), backend="import")).open_backend()
+
+
+def test_an_uncertainty_without_a_factor_is_a_share(tmp_path: Path):
+    """A torque sensor that is known to 2 %; in a unit of its own it would say nothing of what."""
+    plain = COLUMNS.replace('times = "2.5 N m/A"\n', "").replace('unit = "A"', 'unit = "N m"')
+    (trial,) = planned(tmp_path, plain.replace("0.05 N m/A", "2 %") + TEST + ENTRY).trials
+    known = {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
+    assert known["drive_torque"] == pytest.approx(0.02)
+    assert "write it as a share" in refused(tmp_path, plain + TEST + ENTRY)
+
+
+def test_all_mistakes_of_a_column_and_of_an_entry_are_told_at_once(tmp_path: Path):
+    wrong = COLUMNS.replace('times = "2.5 N m/A"\n', 'accept = ["nothing"]\n')
+    told = refused(tmp_path, wrong + TEST + ENTRY + "where = { column = 1, equals = 2 }\n")
+    assert "'nothing' is nothing that is looked for" in told
+    assert "write it as a share" in told
+    entry = 'each = "run"\nrestarts = true\nstart = "1 s"\n'
+    told = refused(tmp_path, COLUMNS + TEST + ENTRY + entry)
+    assert "both tell trials apart" in told
+    assert "is a time, and with 'restarts'" in told

@@ -35,6 +35,7 @@ RAMP = 0.5
 """s from rest to the fastest speed of a map."""
 MINUTE = 60.0
 """s that a run of a map takes at most, one way."""
+A_TURN = "a turn, over which friction's ripple averages"
 WARM_UP_CYCLES = 3
 SLOWEST = 0.1
 """of the fastest speed of a map, at most: its slowest, so that it is a curve."""
@@ -126,9 +127,12 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         "deg",
         {"a quarter of the travel": 0.25 * travel, **slow, **(known or undescribed)},
     )
-    period = rig.ripple_period
-    wide = {"a period of the ripple": 1.05 * period} if period else {"a usual size": usual(5)}
+    period, whole_turn = rig.ripple_period, 2.0 * math.pi
+    wide = {"a period of the ripple": 1.05 * period} if period else {A_TURN: whole_turn}
+    if is_linear() and not period:
+        wide = {"ten usual sizes": usual(50)}
     window = choices.least("window_angle", "deg", {"half of the travel": 0.5 * travel, **wide})
+    window = min(window, 1.05 * period if period else usual(5))  # what the slowest need
     choices.sample_rate(rig)
     if own:
         slowest = min(own)
@@ -224,7 +228,7 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
     sliding = _sliding(rig, options)
-    ends = stop_rate(max(sliding.values()), bench.sensors.gyro.resolution)
+    ends = stop_rate(max(sliding.values()), rig.rate_step)
     reach = _reach(rig, options, ends / STOP_FACTOR)
     positions = tuple(nice(p, "deg", 3) for p in np.linspace(-reach, reach, 10))
     if reach < 45 * DEG:
@@ -287,8 +291,11 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
         return {"as written": options.sliding_rate}
     vs, limits, sensors = rig.stribeck_velocity, rig.limits, rig.bench.sensors
     noise, count = 6.0 * sensors.gyro.noise, math.sqrt(3.0) * sensors.gyro.resolution
-    if encoder := sensors.encoder.resolution:
-        count = min(count, WORST_COUNT * encoder / LONGEST)
+    seen = WORST_COUNT * sensors.encoder.resolution / LONGEST
+    if rig.bench.rate_is_of_encoder:
+        noise, count = 6.0 * sensors.encoder.noise / LONGEST, seen
+    elif seen:
+        count = min(count, seen)
     usual_rate = 0.3 * MILLIMETRE if is_linear() else 0.005
     wanted = {
         "six deviations of the gyro's noise": noise,
@@ -300,7 +307,7 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
         "what half of the angle limit leaves to stop": 0.5 * limits.angle / RUN_OUT,
     }
     why = min(allowed, key=lambda reason: allowed[reason])
-    least = max(noise, count, stop_rate(0.0, sensors.gyro.resolution) / STOP_FACTOR)
+    least = max(noise, count, stop_rate(0.0, rig.rate_step) / STOP_FACTOR)
     if allowed[why] < least:
         raise ValueError(
             f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and "

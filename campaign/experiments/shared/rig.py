@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from campaign.physics.bench import Bench, LimitsOptions
+from campaign.physics.bench_facts import rate_steps
 from campaign.physics.complete import control_rate, lacking, limits_of
 from campaign.physics.friction import friction_models
 from campaign.physics.limit_watch import judged_samples
@@ -147,13 +148,13 @@ class Rig:
     def rate_left(self) -> float:
         """The rate limit (rad/s), less what the watched rate shows of its sensor alone.
 
-        Six deviations of the encoder's noise and quantisation, in the mean that the limit watch
-        takes: the difference of two angles over its time. ValueError where nothing is left.
+        Six deviations of the encoder's noise and one count, in the mean that the limit watch takes:
+        the difference of two angles over its time. ValueError where nothing is left.
         """
         limits, encoder = self.limits, self.bench.sensors.encoder
-        deviation = math.hypot(encoder.noise, encoder.resolution / math.sqrt(12.0))
+        shown = 6.0 * math.sqrt(2.0) * encoder.noise + encoder.resolution
         watched = judged_samples(limits, self.sample_rate) / self.sample_rate
-        left = limits.rate - 6.0 * math.sqrt(2.0) * deviation / watched
+        left = limits.rate - shown / watched
         if left <= 0.0:
             raise ValueError(
                 f"the encoder's noise alone reaches the rate limit of {rate_here(limits.rate)}; "
@@ -170,6 +171,13 @@ class Rig:
         loop = dict(loops_of(self.bench, "none", "rate")).get("sliding")
         margin = loop.phase_margin if isinstance(loop, LoopMargins) else None
         return UNKNOWN_OVERSHOOT if margin is None else max(1.0, 0.5 / math.sin(0.5 * margin))
+
+    @property
+    def rate_step(self) -> float:
+        """One count of the rate as one sample shows it (rad/s); of an encoder's behind its filter."""
+        if self.bench.rate_is_of_encoder:
+            return rate_steps(self.bench).get("encoder", 0.0)
+        return self.bench.sensors.gyro.resolution
 
     def rate_count(self, omega: float) -> float:
         """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 where noise smooths it.
