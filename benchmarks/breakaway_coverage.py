@@ -176,7 +176,12 @@ def main() -> None:
     names = [name for name in benches() if chosen.only in name]
     with ProcessPoolExecutor(2) as pool:
         rows = list(pool.map(of_bench, names, [chosen.seeds] * len(names)))
-    print(table(["bench", "chosen", "ramps", "median of value, half-width, over truth"], [list(r) for r in rows]))
+    print(
+        table(
+            ["bench", "chosen", "ramps", "median of value, half-width, over truth"],
+            [list(r) for r in rows],
+        )
+    )
 
 
 if __name__ == "__main__":
