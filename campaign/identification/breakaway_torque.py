@@ -37,8 +37,6 @@ NARROWEST, WIDEST = 0.5, 7.0
 WIDEN, UNSURE = 2.0, 0.4
 """Standard error over what the torque gains in a pace, which is what the inertia takes at the peak:
 above the first a fit is widened, above the second it does not tell where the peak is."""
-MISFIT = 1.25
-"""Of residuals; of 60 white ones it is 1.0 ± 0.13."""
 INNER = 0.6
 """of the half-width, within which the maximum lies: near its ends a polynomial's slope is noise."""
 POLYNOMIAL = "polynomial of the rate"
@@ -120,7 +118,7 @@ def breakaway_torque(
     middle = fit(about, max(reach, 1.6 * REACH * pace)).peak_time if noisy else about
     slid = min(float(time[last - 1]), stop - 0.5 * pace)
     found, end = fit(middle, reach), fit(min(slid, stop - reach), reach)
-    while found.errors.misfit > MISFIT and reach > NARROWEST * pace:
+    while found.errors.correlation >= SMOOTH and reach > NARROWEST * pace:
         try:
             found = fit(middle, reach / WIDER)
         except ValueError:  # too few samples
@@ -198,7 +196,7 @@ class _Fit:
 
 
 def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
-    """Of samples where torque and rate are positive; as many bins as fit, the first are left out."""
+    """Of samples where torque and rate are positive; what fills no bin is left out at the start."""
     each = max(1, len(time) // BINS)
     count = len(time) // each
     if count < 2 * (DEGREE + 1):

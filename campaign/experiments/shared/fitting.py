@@ -214,15 +214,14 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     friction = {} if static is None else {f"{PEAK:g} times the static torque": PEAK * static}
     peak = choices.least("peak_torque", "N m", {**friction, **drive})
     tau = _instability(rig)
+    paces = f"breakaway after {RAMP_PACES:.0f} times {tau:.2g} s, in which sliding grows e-fold"
     slope = choices.most(
         "torque_rate",
         "N m/s",
         {
             f"breakaway after about {RAMP_TIME:.0f} s": (static or 0.5 * peak) / RAMP_TIME,
             "the ramp ends within the limit of duration": 1.2 * peak / limits.duration,
-            f"breakaway after {RAMP_PACES:.0f} times the {tau:.2g} s in which sliding grows e-fold": (
-                (static or 0.0) / (RAMP_PACES * tau)
-            ),
+            paces: (static or 0.0) / (RAMP_PACES * tau),
         },
     )
     if rig.rate_noise > 0:
@@ -286,8 +285,8 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     if allowed[why] < least:
         raise ValueError(
             f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and "
-            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, or "
-            "counts): raise the limits of angle or rate, or write sliding_rate"
+            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, "
+            "or counts): raise the limits of angle or rate, or write sliding_rate"
         )
     return wanted if max(wanted.values()) <= allowed[why] else {why: allowed[why]}
 
