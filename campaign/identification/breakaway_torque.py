@@ -181,7 +181,9 @@ class _Fit:
             slope, line = slope - self._slope(less), np.array([0.0, (time - less) / self.half])
         variance = self.inertia**2 * slope @ self.errors.covariance @ slope
         variance += line @ self.levels.covariance @ line
-        return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), variance**0.5
+        return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), float(
+            variance**0.5
+        )
 
     @property
     def peak_time(self) -> float:
@@ -206,7 +208,7 @@ def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
     at = (time - centre) / half
     rates = rate.reshape(count, each).mean(axis=1)
     powers = np.vander(at.reshape(count, each).mean(axis=1), DEGREE + 1, increasing=True)
-    of_rate = np.linalg.lstsq(powers, rates, rcond=None)[0]
+    of_rate = np.asarray(np.linalg.lstsq(powers, rates, rcond=None)[0], dtype=np.float64)
     line = np.stack([np.ones_like(at), at], axis=1)
     of_torque = np.linalg.lstsq(line, torque, rcond=None)[0]
     errors = errors_of(powers, rates - powers @ of_rate)
