@@ -62,7 +62,7 @@ def axis(
             "delay": 0.5 / sample_rate,
             "relative_rate_filter": 3.0 / sample_rate,
             "rate": {"form": "parallel", "proportional": gain, "integral": gain * omega / 6.0},
-            "current": {"form": "ideal", "proportional": 0.3 * sample_rate * 1e-3, "integral": 30.0},
+            "current": {"form": "ideal", "proportional": 3e-4 * sample_rate, "integral": 30.0},
         },
         "sensors": {
             "gyro": {"noise": more.get("noise", 0.0), "resolution": more.get("resolution", 0.0)},
@@ -89,7 +89,9 @@ def benches() -> dict[str, Bench]:
         "light, tight angle": axis(
             *MOTOR, 1.0, 1e4, {"angle": 1.0, "rate": 30.0}, noise=0.01, resolution=1e-3, count=1e-4
         ),
-        "light, slow Stribeck": axis(*MOTOR, 0.1, 1e4, WIDE, noise=0.01, resolution=1e-3, count=1e-4),
+        "light, slow Stribeck": axis(
+            *MOTOR, 0.1, 1e4, WIDE, noise=0.01, resolution=1e-3, count=1e-4
+        ),
         "heavy, 200 Hz": axis(1e3, 400.0, 0.01, 200.0, TURN, noise=1e-4, resolution=1e-6),
         "heavy, quiet, 200 Hz": axis(1e3, 1200.0, 0.03, 200.0, TURN, noise=1e-5, resolution=1e-6),
         "noisy, two interfaces": axis(
@@ -97,7 +99,7 @@ def benches() -> dict[str, Bench]:
             resolution=1e-4, shares=((0.65, 1.0), (0.35, 8.0)), current=0.02,
         ),
         "encoder alone, coarse": axis(
-            0.01, 0.5, 0.1, 1e3, {"angle": 1000.0, "rate": 60.0}, resolution=COUNT * 1e3, count=COUNT
+            0.01, 0.5, 0.1, 1e3, WIDE, resolution=1e3 * COUNT, count=COUNT
         ),
         "encoder alone, light": axis(
             *MOTOR, 1.0, 1e4, WIDE, resolution=COUNT * 1e4, count=COUNT
@@ -176,7 +178,12 @@ def main() -> None:
     names = [name for name in benches() if chosen.only in name]
     with ProcessPoolExecutor(2) as pool:
         rows = list(pool.map(of_bench, names, [chosen.seeds] * len(names)))
-    print(table(["bench", "chosen", "ramps", "median of value, half-width, over truth"], [list(r) for r in rows]))
+    print(
+        table(
+            ["bench", "chosen", "ramps", "median of value, half-width, over truth"],
+            [list(r) for r in rows],
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -33,7 +33,6 @@ from campaign.identification.found_excitation import found_ramp
 from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
 from campaign.identification.relative_rate import (
     LONGEST,
-    STOP_FACTOR,
     RelativeRate,
     made_of_counts,
     resolved_rate,
@@ -150,11 +149,9 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     slides = slides_from(seen.values, threshold)
     if slides is None:
         raise ValueError(f"the load never slides at {rate_here(threshold)} (sliding_rate)")
-    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides]))
-    stops = np.abs(seen.values) > STOP_FACTOR * threshold
-    stop = offered.duration
-    if stops.any():  # and what the smoothing needs behind it
-        stop = min(stop, float(recording.time[int(np.argmax(stops))]) + 0.5 * seen.window)
+    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides[0]]))
+    # And what the smoothing needs behind it.
+    stop = min(offered.duration, float(recording.time[slides[1] - 1]) + 0.5 * seen.window)
     coarse = ""
     if threshold > options.sliding_rate:
         coarse = f"; sliding is {rate_here(threshold)}, the least that its sensor resolves"

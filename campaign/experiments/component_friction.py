@@ -30,6 +30,7 @@ from campaign.identification.readings import (
     deviation_of_readings,
     mean_of_readings,
 )
+from campaign.identification.relative_rate import STOP_FACTOR
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import inertia_of
@@ -50,8 +51,6 @@ from campaign.signals import Polyline
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate
 
-STOP_FACTOR = 4.0
-"""Rate that ends a trial, over the rate that counts as sliding."""
 REACH = 2.0
 """The ramp ends at this many times the friction that the bench describes."""
 OWN = ("component", "measurement")

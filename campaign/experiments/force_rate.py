@@ -31,6 +31,7 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
+from campaign.identification.relative_rate import STOP_FACTOR
 from campaign.identification.sampled import at_sample, bracketed, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -55,8 +56,6 @@ SAMPLES = 4000
 """of the shortest ramp: its peak is then known to a part in thousands."""
 SLOWEST_RECORDING = 1000.0
 """Hz, for the slow ramps: the breakaway itself is as quick there."""
-STOP_FACTOR = 4.0
-"""Rate that ends the trial, over the rate that counts as sliding."""
 STEP = 2e-3
 """of a torque: what the time step of a simulation may change it by."""
 

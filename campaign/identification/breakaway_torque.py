@@ -16,7 +16,7 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import Array, FitErrors, errors_of
-from campaign.identification.intervals import student, with_error
+from campaign.identification.intervals import shifted_by, student, with_error
 from campaign.identification.relative_rate import mean, slides_from, slope
 from campaign.reason import Cause
 
@@ -29,10 +29,17 @@ REACH = 1.75
 """Half-width of what is fitted, in paces. On an axis of 70 kg m^2 a pace is 0.2 to 0.4 s: with 1.5
 to 2 of it the polynomial bends as friction does (coverage 94 to 98 %), with 2.5 no longer (68 to
 99 %)."""
+WIDER = 1.4
+"""times the half-width, as long as noise hides the peak; divided by it, as long as what is left of
+the fit is the polynomial's own error."""
+NARROWEST, WIDEST = 0.5, 7.0
+"""Half-width (paces) at which that ends."""
+WIDEN, UNSURE = 2.0, 0.4
+"""Standard error over what the torque gains in a pace, which is what the inertia takes at the peak:
+above the first a fit is widened, above the second it does not tell where the peak is."""
 INNER = 0.6
 """of the half-width, within which the maximum lies: near its ends a polynomial's slope is noise."""
-NARROWER = 0.7
-"""times the half-width, as long as what is left of the fit is the polynomial's own error."""
+POLYNOMIAL = "polynomial of the rate"
 SMOOTH = 0.95
 """AR(1) coefficient of the residuals from which on they are the polynomial's own error: no noise of
 a gyro lasts that long against a bin."""
@@ -87,9 +94,10 @@ def breakaway_torque(
         raise ValueError(
             f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
         )
-    sign = float(np.sign(np.nanmean(seen[sliding:])))
+    first, last = sliding
+    sign = float(np.sign(np.nanmean(seen[first:last])))
     interval = float(np.ptp(time)) / max(len(time) - 1, 1)
-    forwards = sign * np.nan_to_num(seen)
+    forwards = sign * np.nan_to_num(seen[:last])
     span = 2 * (max(int(np.sum(forwards > 0.5 * np.max(forwards))), 2) // 2) + 1
     pace, stop = span * interval, float(time[-1]) + interval
 
@@ -97,31 +105,57 @@ def breakaway_torque(
         part = slice(*np.searchsorted(time, (middle - half, middle + half)))
         return _fit(time[part], sign * rate[part], sign * torque[part], inertia)
 
-    reach = REACH * pace
-    end = fit(stop - reach, reach)
-    smooth = mean(sign * torque, span) - inertia * slope(sign * rate, interval, span)
-    about = float(time[np.nanargmax(smooth)])
+    def friction(half: int) -> Array:
+        return mean(sign * torque, half) - inertia * slope(sign * rate, interval, half)
+
+    about, reach = float(time[np.nanargmax(friction(2 * span - 1))]), REACH * pace
+    gain = float(np.median(np.diff(sign * torque[:last:span])))
     found = fit(about, reach)
-    while found.errors.correlation >= SMOOTH and reach > 0.5 * pace:
-        reach *= NARROWER
+    while found.friction(about)[1] > WIDEN * gain and reach < WIDEST * pace:
+        reach *= WIDER
+        found = fit(about, reach)
+    noisy = found.friction(about)[1] > UNSURE * gain
+    middle = fit(about, max(reach, 1.6 * REACH * pace)).peak_time if noisy else about
+    slid = min(float(time[last - 1]), stop - 0.5 * pace)
+    found, end = fit(middle, reach), fit(min(slid, stop - reach), reach)
+    while found.errors.correlation >= SMOOTH and reach > NARROWEST * pace:
         try:
-            found = fit(about, reach)
+            found = fit(middle, reach / WIDER)
         except ValueError:  # too few samples
             break
-    peak_time = found.peak_time
-    value, error = found.friction(peak_time)
-    more = {"standard_error": error, "freedom": found.errors.freedom, "method": METHOD}
-    times = student(found.errors.freedom)
-    late, before = (end.friction(stop - paces * pace) for paces in (0.5, 1.5))
+        reach /= WIDER
+    peak_time = middle if noisy else found.peak_time
+    wider = fit(peak_time, WIDER * reach).friction(peak_time)
+    told = _told(found, peak_time, end.friction(slid), end.friction(slid - pace))
+    return Breakaway(_with_shift(told, wider), peak_time, found.acceleration(peak_time))
+
+
+def _told(
+    found: _Fit, peak_time: float, late: tuple[float, float], before: tuple[float, float]
+) -> Estimate:
+    """The estimate, by friction and its error (N m) as the load slides and a pace before.
+
+    Errors add up: those of two fits that share samples are not independent.
+    """
+    (value, error), freedom = found.friction(peak_time), found.errors.freedom
+    more = {"standard_error": error, "freedom": freedom, "method": METHOD}
+    times = student(freedom)
     if value - late[0] <= times * (error + late[1]):
         rises = late[0] - before[0] > times * (late[1] + before[1])
-        reason = STILL_RISING() if rises else NO_FALL()
-        told = Estimate.without_interval(NAME, value - times * error, "N m", reason, kind="at least", **more)
-    elif found.errors.correlation >= SMOOTH:
-        told = Estimate.without_interval(NAME, value, "N m", TOO_LITTLE_NOISE(), **more)
-    else:
-        told = with_error(NAME, value, "N m", error, found.errors.freedom, METHOD)
-    return Breakaway(told, peak_time, found.acceleration(peak_time))
+        reason, low = STILL_RISING() if rises else NO_FALL(), value - times * error
+        return Estimate.without_interval(NAME, low, "N m", reason, kind="at least", **more)
+    if found.errors.correlation >= SMOOTH:
+        return Estimate.without_interval(NAME, value, "N m", TOO_LITTLE_NOISE(), **more)
+    return with_error(NAME, value, "N m", error, freedom, METHOD)
+
+
+def _with_shift(told: Estimate, wider: tuple[float, float]) -> Estimate:
+    """With the polynomial's own error: what a wider fit changes beyond scatter (Hausman 1978)."""
+    change = abs(wider[0] - told.value)
+    scatter = abs((told.standard_error or 0.0) ** 2 - wider[1] ** 2) ** 0.5
+    if not told.has_interval or change <= 2.0 * scatter:
+        return told
+    return shifted_by(told, POLYNOMIAL, change)
 
 
 @dataclass(frozen=True)
@@ -140,12 +174,16 @@ class _Fit:
         """Of the load (rad/s^2)."""
         return float(self._slope(time) @ self.of_rate)
 
-    def friction(self, time: float) -> tuple[float, float]:
-        """Value and standard error (N m)."""
+    def friction(self, time: float, less: float | None = None) -> tuple[float, float]:
+        """Value and standard error (N m); `less` that at another time (s)."""
         slope, line = self._slope(time), np.array([1.0, (time - self.centre) / self.half])
+        if less is not None:
+            slope, line = slope - self._slope(less), np.array([0.0, (time - less) / self.half])
         variance = self.inertia**2 * slope @ self.errors.covariance @ slope
         variance += line @ self.levels.covariance @ line
-        return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), variance**0.5
+        return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), float(
+            variance**0.5
+        )
 
     @property
     def peak_time(self) -> float:
@@ -160,7 +198,7 @@ class _Fit:
 
 
 def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
-    """Of samples where torque and rate are positive; as many bins as fit, the first are left out."""
+    """Of samples where torque and rate are positive; what fills no bin is left out at the start."""
     each = max(1, len(time) // BINS)
     count = len(time) // each
     if count < 2 * (DEGREE + 1):
@@ -170,7 +208,7 @@ def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
     at = (time - centre) / half
     rates = rate.reshape(count, each).mean(axis=1)
     powers = np.vander(at.reshape(count, each).mean(axis=1), DEGREE + 1, increasing=True)
-    of_rate = np.linalg.lstsq(powers, rates, rcond=None)[0]
+    of_rate = np.asarray(np.linalg.lstsq(powers, rates, rcond=None)[0], dtype=np.float64)
     line = np.stack([np.ones_like(at), at], axis=1)
     of_torque = np.linalg.lstsq(line, torque, rcond=None)[0]
     errors = errors_of(powers, rates - powers @ of_rate)

@@ -37,7 +37,12 @@ class Start:
 
 
 def one_interface(ramp: Ramp, breakaway: float) -> Start:
-    """Of the fit of a single interface that slips near `breakaway` (N m)."""
+    """Of the fit of a single interface that slips near `breakaway` (N m).
+
+    Raises ValueError where the rate is zero nearly everywhere.
+    """
+    if not ramp.typical_rate > np.finfo(float).tiny:
+        raise ValueError("the rate of this ramp is zero nearly everywhere before it slides")
     stiffness = float(np.log(ramp.slope / ramp.typical_rate))
     lowest, highest = float(np.log(1.02 * ramp.torque[-1])), float(np.log(4.0 * breakaway))
     torque = max(float(np.log(breakaway)), lowest + 0.01)

@@ -174,18 +174,19 @@ def stop_rate(sliding: float, count: float) -> float:
     return max(STOP_FACTOR * sliding, STOP_COUNTS * count)
 
 
-def slides_from(rate: Array, threshold: float) -> int | None:
-    """First sample of sliding; None where the load never slides.
+def slides_from(rate: Array, threshold: float) -> tuple[int, int] | None:
+    """First sample of sliding and the stop of what shows it; None where the load never slides.
 
     It slides once its rate, shape (n,), either way, stays at `threshold` (rad/s) or above until it
     is `STOP_FACTOR` times as fast or the recording ends. What creeps, or scatters, comes back. NaN
     is neither.
     """
     size = np.abs(rate)
-    fast = np.append(np.flatnonzero(size > STOP_FACTOR * threshold), len(size))
-    slow = np.append(-1, np.flatnonzero(size[: fast[0]] < threshold))
-    sliding = np.flatnonzero(size[slow[-1] + 1 :] >= threshold)
-    return int(slow[-1] + 1 + sliding[0]) if len(sliding) else None
+    fast = np.flatnonzero(size > STOP_FACTOR * threshold)
+    stop = int(fast[0]) + 1 if len(fast) else len(size)
+    slow = np.append(-1, np.flatnonzero(size[:stop] < threshold))
+    sliding = np.flatnonzero(size[slow[-1] + 1 : stop] >= threshold)
+    return (int(slow[-1] + 1 + sliding[0]), stop) if len(sliding) else None
 
 
 def made_of_counts(rate: Array, angle: Array, step: float) -> bool:

@@ -7,6 +7,8 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
+from campaign.physics.bench import Bench
+from campaign.protocol.bench_file import load_bench
 from campaign.recording import Channel, Recording
 from campaign.trial import Offered
 from tests.experiments.laboratory import Done, Tree, execute, trials
@@ -103,3 +105,27 @@ def test_what_no_smoothing_resolves_raises_the_rate_that_is_sliding(ramp: Done) 
     assert least == pytest.approx(1.5 * coarse / 0.2, rel=0.05)
     assert "sliding is 2.26 deg/s" in found.trial.note
     assert torque_of(found).value > 0.8 * torque_of(imported(ramp, ramp.samples)).value
+
+
+def by_counts() -> Bench:
+    """One whose rate is the difference of its encoder's counts: 0.38 rad/s each."""
+    platform = load_bench("platform")
+    encoder, gyro = ({"resolution": size, "noise": 0.0} for size in (COUNT, 1000.0 * COUNT))
+    sensors = platform.sensors.model_copy(
+        update={
+            "encoder": platform.sensors.encoder.model_copy(update=encoder),
+            "gyro": platform.sensors.gyro.model_copy(update=gyro),
+        }
+    )
+    limits = platform.limits.model_copy(update={"rate": 10.0})
+    return platform.model_copy(update={"sensors": sensors, "limits": limits})
+
+
+def test_an_executed_ramp_goes_by_the_same_counts() -> None:
+    """It ends at two counts of the rate, and friction is told of the angle's."""
+    options = {"positions": ["0 rad"], "directions": ["positive"], "torque_rate": "2 N m/s"}
+    (planned,) = trials("breakaway", by_counts(), options)
+    assert planned.task.stop_rate == pytest.approx(2000.0 * COUNT)
+    (done,) = execute([planned])
+    true = float(np.max(done.samples["friction_torque"]))
+    assert torque_of(done).value == pytest.approx(true, rel=0.02)

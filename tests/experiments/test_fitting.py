@@ -103,6 +103,20 @@ def test_what_a_test_writes_stays() -> None:
     assert "frequencies" not in reasons
 
 
+def test_a_light_load_is_ramped_and_recorded_as_fast_as_it_slides_away() -> None:
+    """J vs over the fall of friction to vs: 400 times that up to breakaway, 40 samples in it."""
+    platform = load_bench("platform")
+    slow, _ = fitted("breakaway", platform)
+    controller = platform.controller.model_copy(update={"sample_rate": 1e4})
+    axis = platform.axis.model_copy(update={"inertia": platform.axis.inertia / 100.0})
+    light = platform.model_copy(update={"controller": controller, "axis": axis})
+    options, reasons = fitted("breakaway", light)
+    assert options.sample_rate == 1e4
+    assert options.torque_rate > 10.0 * slow.torque_rate
+    assert "e-fold" in reasons["torque_rate"]
+    assert "e-fold" in reasons["sample_rate"]
+
+
 def test_a_noisy_gyro_raises_what_counts_as_sliding() -> None:
     bench = limited(1)
     gyro = bench.sensors.gyro.model_copy(update={"noise": bench.limits.rate / 100})

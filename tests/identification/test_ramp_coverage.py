@@ -13,7 +13,7 @@ import pytest
 from scipy.signal import lfilter
 
 from campaign.estimate import Estimate
-from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.breakaway_torque import NO_FALL, STILL_RISING, breakaway_torque
 from campaign.identification.presliding import fit_presliding
 from campaign.identification.presliding_curve import Interface, presliding_angle
 from campaign.identification.readings import deviation_of_readings, mean_of_readings
@@ -161,6 +161,28 @@ def of_torque(draws: int, seed: int) -> dict[str, list[bool]]:
                     held.setdefault(case, []).append(holds(found, truth))
     assert all(len(each) > 0.9 * draws for each in held.values())
     return held
+
+
+def test_still_rising_is_said_only_of_friction_that_rose() -> None:
+    """The same load, cut before the maximum; and past it, in noise that hides the fall."""
+    random = np.random.default_rng(21)
+    time, rate, torque, _ = letting_go(4.0)
+    top = int(np.searchsorted(time, time[-1] + PACE * np.log(4.0 * PACE**2 / INERTIA / 0.02)))
+    for stop, noise, reason in ((top - 300, 1e-5, STILL_RISING), (top + 150, 1e-3, NO_FALL)):
+        ends = 0.5 * float(rate[stop - 1])
+        part = (time[:stop], rate[:stop] + noise * random.normal(size=stop), torque[:stop])
+        found = breakaway_torque(*part, INERTIA, ends).torque
+        assert found.kind == "at least"
+        assert found.reason in reason, (stop, found.reason)
+
+
+def test_a_slow_ramp_has_its_maximum_many_paces_before_its_end() -> None:
+    """Friction falls over many paces before the end: that is no bound."""
+    random = np.random.default_rng(22)
+    time, rate, torque, truth = letting_go(0.05)
+    found = breakaway_torque(time, white(random, rate), torque, INERTIA, 0.005).torque
+    assert found.has_interval
+    assert holds(found, truth)
 
 
 RATIOS = (0.0, 0.1, 0.3, 0.5, 1.0, 3.0)

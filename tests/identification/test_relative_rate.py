@@ -10,6 +10,7 @@ from campaign.identification.relative_rate import (
     RelativeRate,
     mean,
     relative_rate,
+    slides_from,
     slope,
     window_for,
 )
@@ -141,3 +142,12 @@ def test_a_lost_sample_costs_its_window() -> None:
 
 def test_a_short_recording_has_no_values() -> None:
     assert np.all(np.isnan(slope(np.arange(5.0), STEP, 9)))
+
+
+def test_what_creeps_or_scatters_does_not_slide() -> None:
+    """A spike that comes back counts for nothing; what stays to four times does."""
+    rate = np.array([0.0, 1.5, 0.2, 1.1, 2.0, 3.0, 4.5, 0.0])
+    assert slides_from(rate, 1.0) == (3, 7)
+    assert slides_from(-rate[:6], 1.0) == (3, 6)
+    assert slides_from(rate[:3], 1.0) is None
+    assert slides_from(np.append(rate[:6], np.nan), 1.0) == (3, 7)

@@ -9,6 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.interface import bench_of
 from campaign.experiments.results.breakaway_means import MEASURED, Ramps
+from campaign.identification.breakaway_torque import STILL_RISING
 from campaign.identification.presliding import NOT_RESOLVED, WINDOW
 from campaign.units import angle_here, rate_here
 
@@ -108,11 +109,14 @@ def _hidden(ramps: Ramps) -> Iterator[str]:
 
 
 def _unfinished(ramps: Ramps) -> Iterator[str]:
-    if any(each.kind == "at least" for each in ramps.values("breakaway_torque")):
+    bounds = [each for each in ramps.values("breakaway_torque") if each.kind == "at least"]
+    if bounds:
         rate = float(str(ramps.trials[0].trial.options["sliding_rate"]))
+        risen = all(each.reason in STILL_RISING for each in bounds)
+        why = "was still rising" if risen else "did not fall significantly before"
         yield (
-            "Friction was still rising when ramps ended: their breakaway torque is a bound. Choose "
-            f"a sliding_rate of {rate_here(4.0 * rate, '.2g')} or more."
+            f"Friction {why} {'when ' if risen else ''}ramps ended: their breakaway torque is a "
+            f"bound. Choose a sliding_rate of {rate_here(4.0 * rate, '.2g')} or more."
         )
 
 

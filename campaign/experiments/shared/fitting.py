@@ -237,16 +237,15 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     drive = {share("torque", MOST): MOST * rig.torque}
     friction = {} if static is None else {f"{PEAK:g} times the static torque": PEAK * static}
     peak = choices.least("peak_torque", "N m", {**friction, **drive})
-    tau = _instability(rig, max(sliding.values()))
+    tau = _instability(rig)
+    paces = f"breakaway after {RAMP_PACES:.0f} times {tau:.2g} s, in which sliding grows e-fold"
     slope = choices.most(
         "torque_rate",
         "N m/s",
         {
             f"breakaway after about {RAMP_TIME:.0f} s": (static or 0.5 * peak) / RAMP_TIME,
             "the ramp ends within the limit of duration": 1.2 * peak / limits.duration,
-            f"breakaway after {RAMP_PACES:.0f} times the {tau:.2g} s in which sliding grows e-fold": (
-                (static or 0.0) / (RAMP_PACES * tau)
-            ),
+            paces: (static or 0.0) / (RAMP_PACES * tau),
         },
     )
     if rig.rate_noise > 0:
@@ -254,7 +253,7 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         why = "a third of the ramp up to breakaway, to know the gyro's bias"
         choices.take("rest", nice(length / 3.0, "s"), why)
     choices.most("sliding_rate", "deg/s", sliding)
-    if PACE_SAMPLES > tau * rig.sample_rate:
+    if tau * rig.sample_rate < PACE_SAMPLES:
         fastest = control_rate(bench) or nice(PACE_SAMPLES / tau, "Hz", up=True)
         choices.take("sample_rate", fastest, f"sliding grows e-fold within {tau:.2g} s")
     else:
@@ -262,15 +261,17 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     return choices.told
 
 
-def _instability(rig: Rig, rate: float) -> float:
-    """Time (s) in which the rate of a load grows e-fold as friction falls up to `rate` (rad/s).
+def _instability(rig: Rig) -> float:
+    """Time (s) in which sliding grows e-fold as friction falls up to the Stribeck velocity.
 
     J over the slope of friction; infinite where it does not fall, or nobody says how.
     """
-    (rest, slow), (_, viscous) = steady_friction(rig.bench, np.array([SLOW, rate]))
-    fall = (rest - slow - viscous) / rate
-    inertia = rig.bench.axis.inertia
-    return inertia / fall if inertia is not None and fall > 0 else math.inf
+    speed, inertia = rig.stribeck_velocity, rig.bench.axis.inertia
+    if speed is None or inertia is None:
+        return math.inf
+    dry, viscous = steady_friction(rig.bench, np.array([SLOW, speed]))
+    fall = (dry[0] - dry[1] - viscous[1]) / speed
+    return float(inertia / fall) if fall > 0 else math.inf
 
 
 def _settling(rig: Rig, options: Any) -> tuple[float, str]:
@@ -311,8 +312,8 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     if allowed[why] < least:
         raise ValueError(
             f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and "
-            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, or "
-            "counts): raise the limits of angle or rate, or write sliding_rate"
+            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, "
+            "or counts): raise the limits of angle or rate, or write sliding_rate"
         )
     return wanted if max(wanted.values()) <= allowed[why] else {why: allowed[why]}
 
