@@ -210,7 +210,7 @@ def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
     powers = np.vander(at.reshape(count, each).mean(axis=1), DEGREE + 1, increasing=True)
     of_rate = np.asarray(np.linalg.lstsq(powers, rates, rcond=None)[0], dtype=np.float64)
     line = np.stack([np.ones_like(at), at], axis=1)
-    of_torque = np.linalg.lstsq(line, torque, rcond=None)[0]
+    of_torque = np.asarray(np.linalg.lstsq(line, torque, rcond=None)[0], dtype=np.float64)
     errors = errors_of(powers, rates - powers @ of_rate)
     levels = errors_of(line, torque - line @ of_torque)
     return _Fit(centre, half, of_rate, of_torque, errors, levels, inertia)

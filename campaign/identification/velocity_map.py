@@ -261,7 +261,7 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
 
 
 def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
-    """What is extrapolated, by profile likelihood: there the curve is not straight within its errors.
+    """What is extrapolated, by profile likelihood: the curve is not straight within its errors.
 
     Refused where the points give no limit on a side.
     """

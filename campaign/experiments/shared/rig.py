@@ -174,7 +174,7 @@ class Rig:
 
     @property
     def rate_step(self) -> float:
-        """One count of the rate as one sample shows it (rad/s); of an encoder's behind its filter."""
+        """One count of the rate as a sample shows it (rad/s), behind the filter of an encoder's."""
         if self.bench.rate_is_of_encoder:
             return rate_steps(self.bench).get("encoder", 0.0)
         return self.bench.sensors.gyro.resolution
