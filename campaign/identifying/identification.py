@@ -157,11 +157,15 @@ def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
 
 
 def _bench(chosen: Chosen) -> Bench:
-    names = dict.fromkeys(str(each.trial.bench.get("name", "")) for each in chosen.trials)
-    if len(names) > 1:
+    tests: dict[str, dict[str, None]] = {}
+    for each in chosen.trials:
+        tests.setdefault(str(each.trial.bench.get("name", "")), {})[each.trial.test] = None
+    if len(tests) > 1:
+        told = "; ".join(f"{bench}: {', '.join(own)}" for bench, own in tests.items())
+        first = next(iter(next(iter(tests.values()))))
         raise UsageError(
-            f"{chosen.name}: its trials are of several benches ({', '.join(names)}); name a test, "
-            f"as in {chosen.run.name}:TEST"
+            f"{chosen.name} has tests of several benches ({told}); name one, as in "
+            f"{chosen.run.name}:{first}"
         )
     return bench_of(chosen.trials[0].trial)
 
