@@ -36,6 +36,7 @@ class _Test:
     more: str = ""
 
 
+SPREAD = "spread_starts = true    # a ripple over position then bends no curve\n"
 PILOT = "pilot = true    # no Stribeck curve is described: ten speeds tell which others to run\n"
 
 
@@ -46,7 +47,7 @@ def _identify(bench: Bench) -> tuple[_Test, ...]:
             "velocity_map",
             "Friction torque over speed",
             "Constant speeds in both directions, and the Stribeck curve through them.",
-            PILOT if Rig(bench).stribeck_velocity is None else "",
+            SPREAD + ("" if Rig(bench).stribeck_velocity else PILOT),
         ),
         _Test(
             "breakaway",

@@ -109,7 +109,12 @@ def breakaway_torque(
         return mean(sign * torque, half) - inertia * slope(sign * rate, interval, half)
 
     about, reach = float(time[np.nanargmax(friction(2 * span - 1))]), REACH * pace
-    gain = float(np.median(np.diff(sign * torque[:last:span])))
+    later = slice(last // 2, last)  # without the rest before the ramp
+    gain = pace * float(
+        np.polynomial.Polynomial.fit(time[later], sign * torque[later], 1).deriv()(0)
+    )
+    if not gain > 0:
+        raise ValueError("the torque does not rise before the load slides: that is no ramp")
     found = fit(about, reach)
     while found.friction(about)[1] > WIDEN * gain and reach < WIDEST * pace:
         reach *= WIDER
@@ -174,11 +179,9 @@ class _Fit:
         """Of the load (rad/s^2)."""
         return float(self._slope(time) @ self.of_rate)
 
-    def friction(self, time: float, less: float | None = None) -> tuple[float, float]:
-        """Value and standard error (N m); `less` that at another time (s)."""
+    def friction(self, time: float) -> tuple[float, float]:
+        """Value and standard error (N m)."""
         slope, line = self._slope(time), np.array([1.0, (time - self.centre) / self.half])
-        if less is not None:
-            slope, line = slope - self._slope(less), np.array([0.0, (time - less) / self.half])
         variance = self.inertia**2 * slope @ self.errors.covariance @ slope
         variance += line @ self.levels.covariance @ line
         return float(line @ self.of_torque - self.inertia * slope @ self.of_rate), float(
@@ -208,9 +211,9 @@ def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
     at = (time - centre) / half
     rates = rate.reshape(count, each).mean(axis=1)
     powers = np.vander(at.reshape(count, each).mean(axis=1), DEGREE + 1, increasing=True)
-    of_rate = np.asarray(np.linalg.lstsq(powers, rates, rcond=None)[0], dtype=np.float64)
+    of_rate = np.linalg.lstsq(powers, rates, rcond=None)[0]
     line = np.stack([np.ones_like(at), at], axis=1)
-    of_torque = np.asarray(np.linalg.lstsq(line, torque, rcond=None)[0], dtype=np.float64)
+    of_torque = np.asarray(np.linalg.lstsq(line, torque, rcond=None)[0], np.float64)
     errors = errors_of(powers, rates - powers @ of_rate)
     levels = errors_of(line, torque - line @ of_torque)
     return _Fit(centre, half, of_rate, of_torque, errors, levels, inertia)

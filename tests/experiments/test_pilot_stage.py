@@ -293,7 +293,7 @@ def test_it_keeps_to_what_it_announced_whichever_speeds_are_chosen() -> None:
         )
         most, count = STAGE.most(options, bench), options.points - SPEEDS
         run = plan_run(options.slowest, options)
-        tasks = [each.task for each in run_requests(run, options, Rig(bench))] * count
+        tasks = [each.task for each in run_requests(run, options, Rig(bench), 0)] * count
         assert len(tasks) == most.trials
         assert sum(task.duration for task in tasks) <= most.duration * (1.0 + ROUNDING)
         assert sum(samples_of(task) for task in tasks) <= most.samples

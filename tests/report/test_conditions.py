@@ -43,7 +43,7 @@ def test_only_options_that_acted_are_conditions() -> None:
 
 
 def test_what_nobody_executed_is_no_condition_of_a_recording() -> None:
-    """A recorded ramp: its slope was found, its share of the fit written; positions are defaults."""
+    """A recorded ramp: the share of the fit is written; the slope is a default."""
     (ramp, *_) = trials("breakaway", bench(), {"fit_share": 0.7, "directions": ["positive"]})
     recorded = ramp.task.model_copy(update={"mode": "recorded"})
     for task, told in ((recorded, False), (ramp.task, True)):

@@ -68,8 +68,9 @@ class Choice:
 def following(options: PilotedMapOptions, bench: Bench, data: TestData) -> Iterator[TrialRequest]:
     """The runs after the pilot."""
     choice, rig = choose(options, bench, tuple(data.completed())), Rig(bench)
-    for speed in choice.speeds:
-        for request in run_requests(plan_run(speed, choice.options), choice.options, rig):
+    for number, speed in enumerate(choice.speeds, start=SPEEDS):
+        run = plan_run(speed, choice.options)
+        for request in run_requests(run, choice.options, rig, number):
             yield replace(request, note=f"{choice.reason}; {request.note}")
 
 

@@ -70,10 +70,10 @@ def trials(options: PilotedMapOptions, bench: Bench) -> Iterator[TrialRequest]:
         return
     yield from warm_ups(options)
     rig = Rig(bench)
-    for speed in pilot_speeds(options):
+    for number, speed in enumerate(pilot_speeds(options)):
         run = pilot_run(plan_run(speed, options))
         turn = Window(REVERSAL, run.leg, run.window_of(-1)[0])
-        for request in run_requests(run, options, rig):
+        for request in run_requests(run, options, rig, number):
             windows = (*request.windows, turn)
             yield replace(request, note=f"pilot; {request.note}", windows=windows)
 

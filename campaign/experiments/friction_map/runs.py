@@ -37,6 +37,7 @@ SMALLEST_WINDOW = 10
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 WHOLE = "settled {}"
 """Name of the window of all that a run has behind its settling, by direction."""
+GOLDEN = 0.5 * (1.0 + math.sqrt(5.0))
 MEMORIES = 7.0
 """lengths of friction's memory, Ts / sigma0, after which a reversal is over: 2 exp(-7) is 0.2 %."""
 
@@ -83,6 +84,10 @@ class VelocityMapOptions(Options):
     start_angles: tuple[Angle, ...] = ()
     """Where runs begin: each speed is run from each, and its torques are averaged. Several, half a
     period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
+
+    spread_starts: bool = False
+    """Whether each run begins at another angle within max_travel, by the golden ratio: a ripple of
+    friction over position then scatters between the points, and bends no curve."""
 
     def without_effect(self) -> frozenset[str]:
         found = {"slowest", "fastest", "points"} if self.speeds else set()
@@ -261,12 +266,17 @@ def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialReque
     """The warm-up, then one trial out and back for each speed and each angle to start from."""
     yield from warm_ups(options)
     rig = Rig(bench)
-    for speed in map_speeds(options):
-        yield from run_requests(plan_run(speed, options), options, rig)
+    for number, speed in enumerate(map_speeds(options)):
+        yield from run_requests(plan_run(speed, options), options, rig, number)
 
 
-def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[TrialRequest]:
-    """A trial of the run for each angle to start from. ValueError for too few samples."""
+def run_requests(
+    run: Run, options: VelocityMapOptions, rig: Rig, number: int
+) -> Iterator[TrialRequest]:
+    """A trial of the run for each angle to start from. ValueError for too few samples.
+
+    number: of the run in its map, from 0.
+    """
     if run.window * options.sample_rate < SMALLEST_WINDOW:
         raise ValueError(
             f"at {rate_here(run.speed, '.4g')} the window of {run.window:.3g} s holds fewer "
@@ -276,7 +286,7 @@ def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[Tr
     told = f"window {run.window:.3g} s, {angle_here(run.window * run.speed)}: {run.rule}"
     advice = settling_advice(rig, run.speed, run.speed * run.settle)
     many = bool(options.start_angles)
-    for start_angle in _starts(options):
+    for start_angle in _starts(options, run, number):
         yield TrialRequest(
             Task(
                 mode="rate",
@@ -293,9 +303,15 @@ def run_requests(run: Run, options: VelocityMapOptions, rig: Rig) -> Iterator[Tr
         )
 
 
-def _starts(options: VelocityMapOptions) -> tuple[float, ...]:
-    """Angles to start from (rad)."""
-    return options.start_angles or (-0.5 * options.max_travel,)
+def _starts(
+    options: VelocityMapOptions, run: Run | None = None, number: int = 0
+) -> tuple[float, ...]:
+    """Angles to start from (rad): of the warm-up, or of a run."""
+    lowest = -0.5 * options.max_travel
+    if options.start_angles or run is None or not options.spread_starts:
+        return options.start_angles or (lowest,)
+    room = max(options.max_travel - run.speed * (run.ramp + run.cruise), 0.0)
+    return (lowest + number / GOLDEN % 1.0 * room,)
 
 
 def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:

@@ -35,7 +35,6 @@ RAMP = 0.5
 """s from rest to the fastest speed of a map."""
 MINUTE = 60.0
 """s that a run of a map takes at most, one way."""
-A_TURN = "a turn, over which friction's ripple averages"
 WARM_UP_CYCLES = 3
 SLOWEST = 0.1
 """of the fastest speed of a map, at most: its slowest, so that it is a curve."""
@@ -127,12 +126,9 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         "deg",
         {"a quarter of the travel": 0.25 * travel, **slow, **(known or undescribed)},
     )
-    period, whole_turn = rig.ripple_period, 2.0 * math.pi
-    wide = {"a period of the ripple": 1.05 * period} if period else {A_TURN: whole_turn}
-    if is_linear() and not period:
-        wide = {"ten usual sizes": usual(50)}
+    period = rig.ripple_period
+    wide = {"a period of the ripple": 1.05 * period} if period else {"a usual size": usual(5)}
     window = choices.least("window_angle", "deg", {"half of the travel": 0.5 * travel, **wide})
-    window = min(window, 1.05 * period if period else usual(5))  # what the slowest need
     choices.sample_rate(rig)
     if own:
         slowest = min(own)
