@@ -191,7 +191,7 @@ def judged(run: Run, rig: Rig) -> Iterator[Told]:
 def _told(run: Run, rig: Rig, finding: Finding, parameter: str, true: float) -> Told:
     one = finding.known
     ratio = run.case.torque_ratio if finding.quantity in IN_TORQUE else 1.0
-    if finding.quantity in ("coulomb_torque", "static_torque", "breakaway_torque"):
+    if finding.quantity in ("coulomb_torque", "static_torque"):
         way = str(finding.conditions.get("direction"))
         true += SIGNS.get(way, 0.0) * rig.offset * ratio
     known = tuple(part for part in one.systematic if part.source not in STATED)

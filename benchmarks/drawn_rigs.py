@@ -92,13 +92,17 @@ def drawn(text: str, number: int) -> Rig:
     count = 2.0 * math.pi / 2.0 ** int(draw.random.integers(12, 21))
     if kind == "linear":
         count = way * draw.log(1e-6, 1e-4)
+    low_pass = max(2.0 / control, 0.05 / loop)
+    # One count of the encoder makes the loop ask for a tenth of the torque, at most.
+    quiet = 0.1 * strongest / (loop * inertia * control * -math.expm1(-1.0 / (control * low_pass)))
+    count = min(count, quiet) if feedback == "encoder" else count
     gain = loop * inertia / (ratio * constant)
     noise = velocity * draw.log(1e-3, 0.1)
     controller = {
         "sample_rate": f"{control!r} Hz",
         "delay": f"{0.5 / control!r} s",
         "rate_feedback": feedback,
-        "relative_rate_filter": f"{max(2.0 / control, 0.05 / loop)!r} s",
+        "relative_rate_filter": f"{low_pass!r} s",
         "rate": {
             "form": "parallel",
             "proportional": f"{gain!r} A s/{unit['m']}",

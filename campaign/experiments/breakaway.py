@@ -213,15 +213,22 @@ def direction_of(trial: Trial) -> str:
 def _samples(data: TrialData) -> tuple[Array, Array, Array]:
     """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,).
 
-    A rate of counts that are rounded is differenced anew: what is below one of them is lost else.
+    Of an executed ramp a rate of counts is differenced anew, what is below one of them is lost
+    else; and the torque counts from what its sensor shows at rest.
     """
     recording, way = data.recording(), WAYS[direction_of(data.trial)]
-    rate = recording[GYRO_RATE]
-    if not data.trial.recording and RELATIVE_ANGLE in recording.channels:
+    time, rate, torque = recording.time, recording[GYRO_RATE], recording[DRIVE_TORQUE]
+    if data.trial.recording:
+        return time, way * rate, way * torque
+    if RELATIVE_ANGLE in recording.channels:
         angle, step = recording[RELATIVE_ANGLE], _step(recording)
-        if made_of_counts(rate, angle, step):
+        if bench_of(data.trial).rate_is_of_encoder or made_of_counts(rate, angle, step):
             rate = np.gradient(angle, step)
-    return recording.time, way * rate, way * recording[DRIVE_TORQUE]
+    # At rest no torque is commanded: what is shown is the zero of its sensor.
+    rest = _windows(data.trial, _options(data.trial))["rest"]
+    zero = torque[(time >= rest.start) & (time < rest.stop)]
+    zero = zero[np.isfinite(zero)]
+    return time, way * rate, way * (torque - (np.mean(zero) if len(zero) else 0.0))
 
 
 def _seen(data: TrialData, finest: float) -> Array:

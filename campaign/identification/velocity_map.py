@@ -54,6 +54,11 @@ ROUNDS = 20
 """of fit and deviation in turn, at most; usually five."""
 SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
+DOUBTED = 0.2
+"""p-value below which the points contradict a model that holds a parameter."""
+BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_exponent")
+STRAIGHT = 0.2
+"""Half-width of vs over it up to which intervals follow from the slopes of the curve."""
 TINY = 1e-300
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
@@ -125,7 +130,7 @@ class DirectionFit:
         from scipy.special import fdtrc
 
         p = float(fdtrc(more, self.freedom, max(ratio, 0.0)))
-        return CONTRADICTED[model](p=p) if p < LACKING else NONE
+        return CONTRADICTED[model](p=p) if p < DOUBTED else NONE
 
     @property
     def misfit(self) -> float:
@@ -257,7 +262,14 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
         return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
     told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
-    return _by_profile(fit, model, told) if told.reason and model != "none" else told
+    bent = name in BENT and _is_bent(found, fit.freedom)
+    return _by_profile(fit, model, told) if model != "none" and (told.reason or bent) else told
+
+
+def _is_bent(found: StribeckFit, freedom: float) -> bool:
+    """Whether vs is known so badly that the curve is not straight within its error."""
+    error = math.sqrt(max(found.variance({"stribeck_velocity": 1.0}), 0.0))
+    return student(freedom) * error > STRAIGHT * found.values["stribeck_velocity"]
 
 
 def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:

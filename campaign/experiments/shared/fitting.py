@@ -69,6 +69,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     require(bench, ("limits",), "a plan of runs at constant speed")
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     _overcome_friction(rig)
+    _stands_still(rig)
     allowed = _longest_run(limits.duration, options.rest)
     longest = min(MINUTE, allowed)
     own = options.speeds
@@ -169,6 +170,20 @@ def _overcome_friction(rig: Rig) -> None:
         raise ValueError(
             f"the limits of torque and current leave {rig.torque:.3g} N·m, and friction holds "
             f"{rig.static_torque:.3g} N·m: nothing would move; raise them"
+        )
+
+
+def _stands_still(rig: Rig) -> None:
+    """ValueError where one count of the rate's sensor makes the loop ask for all of the torque."""
+    controller, per_ampere = rig.bench.controller, rig.bench.torque_per_current
+    if controller is None or controller.rate is None or per_ampere is None:
+        return
+    asked = per_ampere * controller.rate.proportional * rig.rate_step
+    if asked >= rig.torque:
+        raise ValueError(
+            f"its loop answers one count of the rate's sensor with {asked:.3g} N·m, and the limits "
+            f"leave {rig.torque:.3g} N·m: lower controller.rate.proportional, or raise "
+            "controller.relative_rate_filter"
         )
 
 
@@ -330,6 +345,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     amplitude, torque = options.amplitude, options.torque
     if options.loop == "closed":
+        _stands_still(rig)
         vs, noise = rig.stribeck_velocity or 0.0, rig.rate_noise
         amplitude = choices.least(
             "amplitude",

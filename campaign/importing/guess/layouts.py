@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from campaign.importing.guess.columns import ColumnGuess, TableGuess
 from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
@@ -18,11 +19,12 @@ _NO_CHANNELS = (TIME, INDEX, UNKNOWN)
 
 @dataclass(frozen=True)
 class Placed:
-    """A column, and where it is: its place from 1 in a table of its name."""
+    """A column, and where it is: its place from 1 in a table of its name, in a file from 1."""
 
     column: ColumnGuess
     table: str
     place: int
+    file: int
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class LayoutGuess:
     Attributes:
         name: a key, of letters and digits, of the columns.
         tables: where its columns are.
-        several: whether each column has to say its table.
+        several: whether each column has to say its table, or its file where there are several.
         axis: which of several axes of the file it is; "" where there is one.
         known: whether the columns of this name were told with an earlier file.
         files: how many have columns of this name.
@@ -46,6 +48,11 @@ class LayoutGuess:
     known: bool = False
     files: int = 1
 
+    @property
+    def paths(self) -> list[Path]:
+        """Of the files that make one recording together."""
+        return list(dict.fromkeys(table.file for table in self.tables))
+
 
 def layouts(tables: Sequence[TableGuess]) -> list[LayoutGuess]:
     """How tables are read, in the order of their files."""
@@ -53,8 +60,8 @@ def layouts(tables: Sequence[TableGuess]) -> list[LayoutGuess]:
     for together in _together(tables):
         bare = _slug(together[0].file.stem) or "recording"
         placed = [
-            Placed(column, table.name, place)
-            for table in together
+            Placed(column, table.name, place, number)
+            for number, table in enumerate(together, start=1)
             for place, column in enumerate(table.columns, start=1)
         ]
         for axis, columns in _axis_by_axis(placed):
@@ -121,7 +128,13 @@ def _with_ranges(one: LayoutGuess, other: LayoutGuess) -> LayoutGuess:
 
 
 def _together(tables: Sequence[TableGuess]) -> Iterator[tuple[TableGuess, ...]]:
-    """Tables of one file that hold different channels, beside each other; others by themselves."""
+    """Tables of one file that hold different channels, beside each other; others by themselves.
+
+    Files of one signal each, of one length and one clock, are one recording.
+    """
+    if _one_signal_each(tables):
+        yield tuple(tables)
+        return
     for file in dict.fromkeys(table.file for table in tables):
         own = tuple(table for table in tables if table.file == file)
         channels = [_channels(table) for table in own]
@@ -132,6 +145,18 @@ def _together(tables: Sequence[TableGuess]) -> Iterator[tuple[TableGuess, ...]]:
             yield tuple(t for t, roles in zip(own, channels, strict=True) if roles) or own
         else:
             yield from ((table,) for table in own)
+
+
+def _one_signal_each(tables: Sequence[TableGuess]) -> bool:
+    signals = [[c for c in table.columns if c.role not in (TIME, INDEX)] for table in tables]
+    known = [(c.role, c.group) for own in signals for c in own if c.role != UNKNOWN]
+    clocks = {(*_clock(table), table.rows, table.step) for table in tables}
+    return (
+        1 < len(tables) == len({table.file for table in tables})
+        and all(len(own) == 1 for own in signals)
+        and len(known) == len(set(known))
+        and len(clocks) == 1
+    )
 
 
 def _channels(table: TableGuess) -> set[tuple[str, str]]:

@@ -76,7 +76,6 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
         for layout in found:
             if layout.axis == axis:
                 lines += ["", *_recording(layout, base)]
-    lines += _joined(guess)
     for layout in found:
         if not layout.known:
             lines += ["", *_columns(layout)]
@@ -105,11 +104,9 @@ def _title(guess: Guess) -> str:
 
 
 def _recording(layout: LayoutGuess, base: Path | None) -> Iterator[str]:
-    file = layout.tables[0].file
-    if base is not None and file.is_absolute() and file.is_relative_to(base.absolute()):
-        file = file.relative_to(base.absolute())
+    files = [_quoted(_from(base, file).as_posix()) for file in layout.paths]
     yield "[[test.recording]]"
-    yield f"file = {_quoted(file.as_posix())}"
+    yield f"file = {files[0]}" if len(files) == 1 else f"file = [{', '.join(files)}]"
     if not layout.several and layout.tables[0].name:
         yield f"table = {_quoted(layout.tables[0].name)}"
     yield f"columns = {_quoted(layout.name)}"
@@ -117,7 +114,7 @@ def _recording(layout: LayoutGuess, base: Path | None) -> Iterator[str]:
         told = f"time begins anew {counted(anew, 'time')}: a trial for each stretch"
         yield _doubt(f"restarts = true  # {told}")
     for table in layout.tables:
-        of = f"{table.name}: " if layout.several else ""
+        of = f"{table.name or table.file.name}: " if layout.several else ""
         rows = f"{'more than ' if table.more else ''}{table.rows} rows"
         rate = "" if table.step is None else f", {1 / table.step:.6g} samples per second"
         yield _comment(f"{of}read as {table.format}: {rows}{rate}")
@@ -127,17 +124,11 @@ def _recording(layout: LayoutGuess, base: Path | None) -> Iterator[str]:
         yield _comment(f"it says {key}: {value}"[:100])
 
 
-def _joined(guess: Guess) -> Iterator[str]:
-    """How files of one signal each become one recording; a time may stand beside each."""
-    files = list(dict.fromkeys(table.file.name for table in guess.tables))
-    if len(files) > 1 and all(len(table.columns) <= 2 for table in guess.tables):
-        names = ", ".join(map(_quoted, files[:3])) + (", ..." if len(files) > 3 else "")
-        yield ""
-        yield _comment("Each file holds one signal. If they are parts of one recording, write one")
-        yield _comment(f"[[test.recording]] with file = [{names}],")
-        yield _comment(
-            "and file = 1, file = 2, ... in each channel; the time is that of each file."
-        )
+def _from(base: Path | None, file: Path) -> Path:
+    """A file as a mapping in the folder `base` names it."""
+    if base is not None and file.is_absolute() and file.is_relative_to(base.absolute()):
+        return file.relative_to(base.absolute())
+    return file
 
 
 def _columns(layout: LayoutGuess) -> Iterator[str]:
@@ -145,10 +136,11 @@ def _columns(layout: LayoutGuess) -> Iterator[str]:
     more = f" and {layout.files - 1} more with the same columns" if layout.files > 1 else ""
     table = f", {first.name}" if first.name and not layout.several else ""
     axis = f", axis {layout.axis}" if layout.axis else ""
-    yield _comment(f"Columns of {first.file.name}{table}{axis}{more}")
+    names = ", ".join(file.name for file in layout.paths)
+    yield _comment(f"Columns of {names}{table}{axis}{more}")
     if first.clock:
         yield _comment(f"Time: the file states a step of {first.step:.9g} s.")
-    called = Counter((placed.table, placed.column.name) for placed in layout.columns)
+    called = Counter((p.file, p.table, p.column.name) for p in layout.columns)
     taken: set[str] = set()
     for placed in _in_order(layout.columns):
         column = placed.column
@@ -160,7 +152,7 @@ def _columns(layout: LayoutGuess) -> Iterator[str]:
             why = f" ({column.why})" if column.why else ""
             yield _comment(f"column {_quoted(column.name)}: {what}{why}; {_seen(column)}")
             if column.role == UNKNOWN and column.low == column.low:
-                twice = called[placed.table, column.name] > 1
+                twice = called[placed.file, placed.table, column.name] > 1
                 unit = column.unit or "..."
                 for line in _block(layout, placed, "CHANNEL", twice):
                     yield f"# {line}"
@@ -172,7 +164,7 @@ def _columns(layout: LayoutGuess) -> Iterator[str]:
             # Of two columns one role is left to the first.
             yield _doubt(f"{column.role} as well: {column.name}; is it this one?")
         taken.add(column.role)
-        twice = called[placed.table, column.name] > 1
+        twice = called[placed.file, placed.table, column.name] > 1
         for line in _section(layout, placed, twice):
             yield f"# {line}" if again and not line.startswith("#") else line
     yield from _lacking(layout, taken)
@@ -220,7 +212,8 @@ def _block(layout: LayoutGuess, placed: Placed, role: str, twice: bool) -> Itera
     yield f"[columns.{layout.name}.{role}]"
     yield f"column = {placed.place if twice else _quoted(placed.column.name)}"
     if layout.several and role != TIME:
-        yield f"table = {_quoted(placed.table)}"
+        joined = len(layout.paths) > 1
+        yield f"file = {placed.file}" if joined else f"table = {_quoted(placed.table)}"
 
 
 def _section(layout: LayoutGuess, placed: Placed, twice: bool) -> Iterator[str]:
