@@ -28,8 +28,9 @@ demo: $(VENV)/installed
 
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 # A test that hangs tells where after 20 minutes, and ends its worker.
+# A process of each core with as many threads of its own would wait for each other.
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 \
 		-o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true $(PYTEST_OPTIONS)
 
 soak: $(VENV)/installed-test

@@ -20,6 +20,7 @@ from campaign.experiments import experiments
 from campaign.export import exports
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.friction.coulomb import CoulombOptions
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.stribeck import StribeckOptions
 from campaign.plugins import Kinds
@@ -78,7 +79,7 @@ model = friction_models()["grease"]
 print(json.dumps([names, there, before, model.summary, kinds()]))
 """
     names, there, before, summary, after = said(packages, code)
-    assert names == ["grease", "lugre", "stribeck"]
+    assert names == ["coulomb", "grease", "lugre", "stribeck"]
     assert there
     assert before == []
     assert summary == "a film with a yield torque"
@@ -150,7 +151,7 @@ for attempt in range(2):
 print(json.dumps([list(models), models["lugre"].name, messages]))
 """
     names, works, [message, again] = said(packages, code)
-    assert names == ["grease", "lugre", "stribeck"]
+    assert names == ["coulomb", "grease", "lugre", "stribeck"]
     assert works == "lugre"
     assert message.startswith(
         "the friction model 'grease' of the package sticky_pack 2.1 (entry point sticky:FRICTION) "
@@ -171,11 +172,11 @@ print(json.dumps([friction_models()["lugre"].step.__module__, described]))
 """
     module, described = said(packages, code)
     assert module == "campaign.physics.friction.lugre"
-    assert described[0] == ["lugre", "lugre"]
-    assert described[1][0] == "lugre"
-    assert "rival 1.0" in described[1][1]
-    assert "the program has one of that name" in described[1][1]
-    assert described[2:] == [["stribeck", "stribeck"]]
+    assert described[:2] == [["coulomb", "coulomb"], ["lugre", "lugre"]]
+    assert described[2][0] == "lugre"
+    assert "rival 1.0" in described[2][1]
+    assert "the program has one of that name" in described[2][1]
+    assert described[3:] == [["stribeck", "stribeck"]]
 
 
 def test_a_name_that_two_packages_claim_is_nobody_s(packages: Packages) -> None:
@@ -194,7 +195,7 @@ except UsageError as error:
     assert "grease_film 1.0" in message
     assert "other 1.0" in message
     assert "remove all but one" in message
-    assert names == ["grease", "lugre", "stribeck"]
+    assert names == ["coulomb", "grease", "lugre", "stribeck"]
 
 
 def test_a_package_that_cannot_be_read_costs_only_its_own(packages: Packages) -> None:
@@ -209,7 +210,7 @@ from campaign.plugins import stray_entries
 print(json.dumps([list(friction_models()), sorted(stray_entries())]))
 """
     names, strays = said(packages, code)
-    assert names == ["grease", "lugre", "stribeck"]
+    assert names == ["coulomb", "grease", "lugre", "stribeck"]
     assert len(strays) == 2
     assert any("lost 1.0" in stray and "no group 'campaign.frictions'" in stray for stray in strays)
     assert any("with mud:FRICTION" in stray and "cannot be read" in stray for stray in strays)
@@ -228,7 +229,7 @@ sys.path.append({str(behind.folder)!r})
 from campaign.physics.friction import friction_models
 print(json.dumps([list(friction_models()), friction_models().plug_in("grease").version]))
 """
-    assert said(packages, code) == [["grease", "lugre", "stribeck"], "2.0"]
+    assert said(packages, code) == [["coulomb", "grease", "lugre", "stribeck"], "2.0"]
 
 
 PAGE = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
@@ -286,7 +287,7 @@ print(json.dumps([options.model_dump(mode="json")["model"], line[0], line[1]]))
 
 def test_a_choice_reports_as_a_union_of_tables_does() -> None:
     """pydantic's own discriminated union, built of the same classes, is what it is held against."""
-    union = Annotated[LuGreOptions | StribeckOptions, Field(discriminator="model")]
+    union = Annotated[CoulombOptions | LuGreOptions | StribeckOptions, Field(discriminator="model")]
     ours, theirs = TypeAdapter(FrictionField), TypeAdapter(union)
     good = bench().friction["load"]
     for value in [

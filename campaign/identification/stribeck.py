@@ -260,6 +260,7 @@ def held_at(
     problem = Problem.of(speed, torque, found.deviation, exponent)
     index = PARAMETERS.index(name)
     held = _vector(problem, {**found.values, name: value})[index]
+    held = np.clip(held, problem.lower[index], problem.upper[index])  # no fit looks beyond
     lower, upper = problem.lower.copy(), problem.upper.copy()
     lower[index] = upper[index] = held
     start = _vector(problem, found.values)

@@ -262,8 +262,9 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
         return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
     told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
-    bent = name in BENT and _is_bent(found, fit.freedom)
-    return _by_profile(fit, model, told) if model != "none" and (told.reason or bent) else told
+    bent = told.reason or (name in BENT and _is_bent(found, fit.freedom))
+    effect = model != "none" and differs(found, fit.freedom)
+    return _by_profile(fit, model, told) if effect and bent else told
 
 
 def _is_bent(found: StribeckFit, freedom: float) -> bool:

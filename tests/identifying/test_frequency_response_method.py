@@ -248,10 +248,10 @@ def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> N
 
 def test_a_motor_sensor_that_nobody_can_use_is_told() -> None:
     trial = SimpleNamespace(channel_names=lambda: {"motor_rate", "relative_rate", "drive_torque"})
-    (told,) = unused([trial], SimpleNamespace(gear=None))  # type: ignore[list-item,arg-type]
+    (told,) = unused([trial], SimpleNamespace(ratio=None))  # type: ignore[list-item,arg-type]
     assert "motor_rate" in told
     assert "[gear] ratio" in told
-    assert not list(unused([trial], SimpleNamespace(gear=object())))  # type: ignore[list-item,arg-type]
+    assert not list(unused([trial], SimpleNamespace(ratio=2.0)))  # type: ignore[list-item,arg-type]
 
 
 def test_lines_that_no_command_names_stand_out_by_a_gap() -> None:

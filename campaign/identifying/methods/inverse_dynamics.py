@@ -137,7 +137,8 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         ),
         correlations=_correlations(found),
         settings=_settings(parameters, material),
-        again={"terms": found.best.structure.names},
+        # A ripple has a period that was found; another recording may not show it.
+        again={"terms": tuple(name for name in found.best.structure.names if name in TERMS)},
         unseen=Unseen(found.best.validation.value) if found.best.validation is not None else None,
     )
 
