@@ -186,7 +186,11 @@ class Controller:
             firmware="campaign device",
             features=(*FEATURES, *clock),
             compensations=tuple(compensation_methods()),
-            limits=tuple(Item(f"limits.{name}", bound) for name, bound in self._setup.bench.limits),
+            limits=tuple(
+                Item(f"limits.{name}", bound)
+                for name, bound in self._setup.bench.limits
+                if math.isfinite(bound)
+            ),
         )
 
     def _refuse(self, client: int, frame: Frame, why: Refused) -> Nak:

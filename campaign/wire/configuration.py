@@ -10,10 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from campaign.physics.bench import UNLIMITED
 from campaign.trial import Trial
 from campaign.wire.parameters import Value
 
 REHEARSAL = "rehearsal"
+ENDLESS = 1e300
+"""An `"unlimited"` limit as it is sent: numbers on the line are finite."""
 SIMULATED_TASK = ("base_acceleration", "disturbance", "start_angle")
 """Of the task: what only a simulated bench can be told."""
 
@@ -29,7 +32,10 @@ def configuration_of(trial: Trial) -> dict[str, Value]:
     tree: dict[str, Any] = {
         "task": task,
         "controller": trial.bench["controller"],
-        "limits": trial.bench["limits"],
+        "limits": {
+            name: ENDLESS if value == UNLIMITED else value
+            for name, value in trial.bench["limits"].items()
+        },
         REHEARSAL: {"seed": trial.seed, **simulated},
     }
     method = trial.task.compensation

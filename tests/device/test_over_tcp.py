@@ -20,6 +20,7 @@ from campaign.device.line import TcpLine
 from campaign.device.machine import Setup
 from campaign.device.server import Server
 from campaign.errors import UsageError
+from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
 from campaign.signals import Sine
 from campaign.trial import Task, Trial
@@ -43,13 +44,13 @@ TRIAL = Trial(number=1, test="t", kind="k", seed=7, bench=BENCH.model_dump(mode=
 
 @contextmanager
 def serving(
-    *faults: str, speed: float = math.inf, timeout: float = 5.0
+    *faults: str, speed: float = math.inf, timeout: float = 5.0, bench: Bench = BENCH
 ) -> Iterator[Callable[[], Host]]:
     line = TcpLine("127.0.0.1:0")
     wanted = parse_faults(faults)
     folder = tempfile.mkdtemp()
     new_memory(Path(folder) / "latch")
-    setup = Setup(BENCH, speed, latch_file=Path(folder) / "latch")
+    setup = Setup(bench, speed, latch_file=Path(folder) / "latch")
     server = Server(line, setup, timeout=timeout, faults=wanted, fault_seed=3)
     thread = threading.Thread(target=server.serve)
     thread.start()
@@ -106,10 +107,10 @@ class Host:
         status: Status = self.until(lambda m: isinstance(m, Status) and m.heartbeat == self.beats)
         return status
 
-    def start(self) -> None:
+    def start(self, trial: Trial = TRIAL) -> None:
         self.command(Hello(2, 2, 77))
         bodies = []
-        for message in parameter_messages(configuration_of(TRIAL)):
+        for message in parameter_messages(configuration_of(trial)):
             bodies.append(encode(message)[1])
             assert isinstance(self.command(message), Ack)
         self.beat()
@@ -127,6 +128,20 @@ def test_configure_arm_start_stream_resend_release() -> None:
         host.send(Resend(3, 0, 1))
         assert host.until(lambda m: isinstance(m, Samples) and m.number == 0) == first
         assert host.command(Release(3)).state is State.IDLE
+
+
+def test_an_axis_that_turns_for_ever_has_no_limit_of_angle_on_the_line() -> None:
+    limits = BENCH.limits.model_copy(update={"angle": math.inf})
+    bench = BENCH.model_copy(update={"limits": limits})
+    trial = TRIAL.model_copy(update={"bench": bench.model_dump(mode="json")})
+    with serving(bench=bench) as connect:
+        host = connect()
+        told = host.command(Hello(2, 2, 77))
+        assert {item.name for item in told.limits} >= {"limits.rate", "limits.torque"}
+        assert "limits.angle" not in {item.name for item in told.limits}
+        host.start(trial)
+        end = host.until(lambda m: isinstance(m, End))
+        assert (end.outcome, end.samples) == (Outcome.COMPLETED, 600)
 
 
 def test_heartbeats_that_stop_lead_to_drive_off_and_standstill() -> None:

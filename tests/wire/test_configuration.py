@@ -73,3 +73,10 @@ def test_a_tree_survives_its_names_but_for_what_is_none() -> None:
 def test_a_name_is_a_value_or_a_table(names: tuple[str, str]) -> None:
     with pytest.raises(ValueError, match="'a"):
         nest({names[0]: 1.0, names[1]: 2.0})
+
+
+def test_a_limit_without_end_is_sent_as_a_finite_number() -> None:
+    limits = {"angle": "unlimited", "rate": 60.0}
+    settings = configuration_of(trial(bench={**BENCH, "limits": limits}))
+    assert settings["limits.angle"] == 1e300
+    assert settings["limits.rate"] == 60.0
