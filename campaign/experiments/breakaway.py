@@ -22,7 +22,7 @@ from campaign.experiments.results.breakaway_figures import position_figure, ramp
 from campaign.experiments.results.breakaway_means import Ramps, means_of, with_comparisons
 from campaign.experiments.results.breakaway_remarks import remarks
 from campaign.experiments.results.breakaway_tables import CHORD, findings_of, table_of, window_table
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import fitting_ramps
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.found_trials import named_or_found
@@ -384,7 +384,7 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting.breakaway,
+    fit=fitting_ramps.breakaway,
     warnings=_warnings,
     measure=_measure,
     recorded=_found,

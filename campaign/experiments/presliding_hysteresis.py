@@ -19,7 +19,7 @@ from campaign.estimate import Estimate, Window
 from campaign.experiments.conclusions.behaviour import hysteresis_conclusions
 from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import fitting_ramps
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import Place, in_models, places
@@ -289,7 +289,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     measure=_measure,
-    fit=fitting.presliding,
+    fit=fitting_ramps.presliding,
     perturbs_bench=True,
     requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

@@ -15,6 +15,7 @@ import numpy as np
 
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.conclusions.friction_map import repeatability_conclusions
+from campaign.experiments.friction_map import fitting
 from campaign.experiments.friction_map.fits import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.repeated import (
@@ -33,7 +34,6 @@ from campaign.experiments.friction_map.runs import (
 )
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared import fitting
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts

@@ -29,13 +29,12 @@ def configuration_of(trial: Trial) -> dict[str, Value]:
     """
     task = trial.task.model_dump(mode="python", exclude={"window"})
     simulated = {name: task.pop(name) for name in SIMULATED_TASK}
+    bench: Mapping[str, Any] = trial.bench
+    limits = {k: ENDLESS if v == UNLIMITED else v for k, v in bench["limits"].items()}
     tree: dict[str, Any] = {
         "task": task,
-        "controller": trial.bench["controller"],
-        "limits": {
-            name: ENDLESS if value == UNLIMITED else value
-            for name, value in trial.bench["limits"].items()
-        },
+        "controller": bench["controller"],
+        "limits": limits,
         REHEARSAL: {"seed": trial.seed, **simulated},
     }
     method = trial.task.compensation

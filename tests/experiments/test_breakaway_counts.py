@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -129,3 +131,23 @@ def test_an_executed_ramp_goes_by_the_same_counts() -> None:
     (done,) = execute([planned])
     true = float(np.max(done.samples["friction_torque"]))
     assert torque_of(done).value == pytest.approx(true, rel=0.02)
+
+
+def test_the_zero_of_a_torque_sensor_is_in_no_number_of_a_ramp() -> None:
+    """A tenth of the friction: it is what the sensor shows at rest, where nothing is commanded."""
+    rig: Bench = bench(servo)
+    (done,) = execute(
+        trials("breakaway", rig, {"positions": ["0 rad"], "directions": ["positive"]})
+    )
+    torque = done.samples.channels["drive_torque"]
+    shifted = torque.info.with_samples(torque.samples + 3.0)
+    samples = Recording(done.samples.time, {**done.samples.channels, "drive_torque": shifted})
+    measure = experiments()["breakaway"].measure
+    assert measure is not None
+    exact, off = (
+        {each.name: each.value for each in measure(one)}
+        for one in (done, replace(done, samples=samples))
+    )
+    assert "bristle_stiffness" in exact
+    for name in ("breakaway_torque", "bristle_stiffness"):
+        assert off[name] == pytest.approx(exact[name], rel=1e-9), name

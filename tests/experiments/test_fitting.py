@@ -341,3 +341,30 @@ def test_the_noise_of_a_rate_that_is_made_of_the_encoder() -> None:
     for k in range(1, len(angle)):
         rate[k] = pole * rate[k - 1] + (1 - pole) * (angle[k] - angle[k - 1]) / 1e-3
     assert rig.rate_noise == pytest.approx(float(np.std(rate)), rel=0.01)
+
+
+@pytest.mark.parametrize("kind", ["velocity_map", "frequency_response"])
+def test_a_loop_that_answers_one_count_with_all_of_its_torque_is_refused(kind: str) -> None:
+    """One count is 45 mdeg in 1 ms: 0.79 rad/s, which a gain of 13 A s/rad makes 10 A of."""
+    rig = bench_top()
+    loud = rig.controller.rate.model_copy(update={"proportional": 14.0})
+    controller = rig.controller.model_copy(update={"rate": loud})
+    with pytest.raises(ValueError, match="answers one count of the rate's sensor"):
+        fitted(kind, rig.model_copy(update={"controller": controller}))
+
+
+def test_starts_are_spread_over_the_travel_and_runs_end_within_it() -> None:
+    bench = load_bench("platform")
+    spread = requests("velocity_map", bench, spread_starts=True, warm_up_cycles=0)
+    options, _ = fitted("velocity_map", bench, spread_starts=True, warm_up_cycles=0)
+    half = 0.5 * options.max_travel
+    places = [request.task.start_angle for request in spread]
+    runs = [plan_run(float(str(request.point["speed"])), options) for request in spread]
+    ends = [at + run.speed * (run.ramp + run.cruise) for at, run in zip(places, runs, strict=True)]
+    assert min(places) >= -half - 1e-9
+    assert max(ends) <= half + 1e-9
+    room = [options.max_travel - end + at for at, end in zip(places, ends, strict=True)]
+    shares = [(at + half) / left for at, left in zip(places, room, strict=True) if left > 0.1]
+    assert np.max(np.diff(np.sort([0.0, *shares, 1.0]))) < 0.1, "and leave no gap between them"
+    plain = requests("velocity_map", bench, warm_up_cycles=0)
+    assert {request.task.start_angle for request in plain} == {-half}

@@ -285,3 +285,22 @@ def test_failed_trials_leave_a_gap() -> None:
     result = analyse(KIND, done)
     assert len(bode(result).panels[0].curves[0].x) == 4
     assert any("1 of 5 trials" in note for note in result.notes)
+
+
+def test_a_response_of_fewer_than_three_counts_is_none() -> None:
+    """Of a gyro of 0.1 deg/s: at 40 Hz the response is 0.03 deg/s, and a staircase of nothing."""
+
+    def coarse(tree: dict[str, Any]) -> None:
+        sampled(tree)
+        tree["sensors"] = {"gyro": {"resolution": "0.1 deg/s"}}
+
+    options = {"frequencies": ["3 Hz", "40 Hz"], "amplitude": "1 deg/s"}
+    done = execute(trials(KIND, bench(coarse), options))
+    exact = execute(trials(KIND, bench(sampled), options))
+    sizes = [abs(_point(each).response) for each in exact]
+    assert sizes[0] * 1.0 > 0.3 > sizes[1] * 1.0
+    assert abs(_point(done[0]).response) == pytest.approx(sizes[0], rel=0.05)
+    with pytest.raises(ValueError, match="below 3 counts"):
+        _point(done[1])
+    notes = " ".join(analyse(KIND, done).notes)
+    assert "frequency=40]: its response is below 3 counts" in notes

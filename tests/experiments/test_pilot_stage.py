@@ -254,6 +254,17 @@ def test_a_rig_without_room_to_settle_keeps_the_plain_map(soft: Piloted) -> None
     assert list(choice.speeds) == rest_of(soft.options)
 
 
+def test_what_follows_stays_where_the_pilot_slid_steadily(soft: Piloted) -> None:
+    """Four of its runs are too few for a curve, and say all the same where the load slides."""
+    some = soft.pilot[4:8]
+    choice = choose(soft.options, make_case(SOFT).stated, some)
+    assert "tells too little of friction" in choice.reason
+    slowest, *_, fastest = speeds(some)
+    assert len(choice.speeds) == soft.options.points - SPEEDS
+    assert slowest < min(choice.speeds)
+    assert max(choice.speeds) < fastest
+
+
 def test_a_pilot_alone_is_a_map(soft: Piloted) -> None:
     """A run that ended there: analysed as it is, and told."""
     found = analyse("velocity_map", soft.pilot)

@@ -9,9 +9,9 @@ import pytest
 
 from campaign.axis_kind import sides_in, speaking_of
 from campaign.experiments.friction_map.fits import fit_map
+from campaign.experiments.friction_map.fitting import velocity_map
 from campaign.experiments.friction_map.points import MapPoint, points_of, steady
 from campaign.experiments.friction_map.runs import VelocityMapOptions
-from campaign.experiments.shared.fitting import velocity_map
 from campaign.experiments.shared.rig import Rig
 from campaign.identification.steadiness import NOT_REACHED, STICK_SLIP, drifting
 from campaign.physics.bench import Bench
@@ -42,6 +42,21 @@ def test_a_load_that_stuck_in_its_window_is_no_point_of_the_curve() -> None:
     static = finding(result, "static_torque", direction="negative", exponent="free").value
     true = sum(f.static_torque * f.at_load(rig.gear.ratio)[0] for f in rig.friction.values())
     assert static == pytest.approx(true, rel=0.01)
+
+
+def test_a_load_that_stays_stuck_is_no_point_and_told_once() -> None:
+    """Up to 2 deg/s the gain alone does not break it away, and the integral takes 98 deg."""
+
+    def weak(tree: Tree) -> None:
+        tree["controller"]["rate"]["integral"] = "0.02 1/s"
+
+    result = analyse("velocity_map", execute(trials("velocity_map", bench(weak), SLOW)))
+    assert any(
+        note.startswith("8 of 16 points are left out of the fit, for speed not reached (0.1, -0.1")
+        for note in result.notes
+    )
+    (settling,) = [note for note in result.notes if "or more: Ts/sigma0" in note]
+    assert settling.startswith("At 0.1 to 4 deg/s: settle for 99 deg or more")
 
 
 def test_the_angle_to_settle_has_the_integral_in_it() -> None:

@@ -92,6 +92,8 @@ def test_a_flat_map_says_that_it_shows_no_stribeck_effect(noise: float) -> None:
     estimates = direction_estimates(found, "free")
     assert estimates["stribeck_velocity"].origin == "not determined"
     assert estimates["stribeck_velocity"].reason in NO_EFFECT
+    # A fall below the slowest speed would not show: the curve's end there is no static torque.
+    assert estimates["static_torque"].reason in NO_EFFECT
     line = direction_estimates(found, "none")
     low, high = line["coulomb_torque"].combined
     assert low is not None
@@ -106,6 +108,22 @@ def test_a_map_without_slow_points_doubts_its_parameters() -> None:
     found = fit_direction(fast, equation_4_6(fast) + 0.05 * random.normal(size=30), np.zeros(30))
     assert any("stribeck_velocity" in doubt for doubt in doubts(found))
     assert direction_estimates(found, "free")["stribeck_velocity"].origin == "not determined"
+
+
+@pytest.mark.parametrize("slowest", [0.035, 0.04])
+def test_static_torque_of_maps_that_begin_above_vs_holds_where_it_is_told(slowest: float) -> None:
+    """vs is 0.03: by the slopes of the curve half of those that were told missed the truth."""
+    speed, told = np.geomspace(slowest, 1.2, 30), []
+    for seed in range(100):
+        noise = 0.002 * np.random.default_rng([seed, 7]).standard_normal(30)
+        fit = fit_direction(speed, equation_4_6(speed) * (1.0 + noise), np.zeros(30))
+        one = direction_estimates(fit, "free")["static_torque"]
+        if one.origin is Origin.MEASURED:
+            assert one.low is not None
+            assert one.high is not None
+            told.append(one.low <= TRUE["static_torque"] <= one.high)
+    assert len(told) >= 3
+    assert told.count(False) <= 2  # binomial, 30 of 0.05, 98 %
 
 
 def test_few_speeds_below_the_stribeck_velocity_are_told() -> None:

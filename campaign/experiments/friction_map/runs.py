@@ -7,11 +7,12 @@ homing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
@@ -88,6 +89,14 @@ class VelocityMapOptions(Options):
     spread_starts: bool = False
     """Whether each run begins at another angle within max_travel, by the golden ratio: a ripple of
     friction over position then scatters between the points, and bends no curve."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Runs that begin at one angle are archived as before there was another way."""
+        tree: dict[str, Any] = dump(self)
+        if not self.spread_starts:
+            tree.pop("spread_starts", None)
+        return tree
 
     def without_effect(self) -> frozenset[str]:
         found = {"slowest", "fastest", "points"} if self.speeds else set()
@@ -248,18 +257,35 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
 
 def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
     """What to do where runs of a map settle for too short an angle, once for each bench."""
-    told: dict[str, list[float]] = {}
+    runs: dict[str, list[tuple[float, float]]] = {}
     rigs: dict[str, Rig] = {}
     for trial in trials:
         if trial.task.mode == "recorded":  # nobody here decided how long it settled
             continue
         key = canonical_json(trial.bench)
-        rig = rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
-        if advice := settling_advice(rig, speed_of(trial), settled_angle(trial)):
-            told.setdefault(advice, []).append(speed_of(trial))
-    for advice, speeds in told.items():
-        low, high = rate_here(min(speeds)), rate_here(max(speeds))
-        yield f"At {low.split()[0]} to {high}: {advice}."
+        rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
+        runs.setdefault(key, []).append((speed_of(trial), settled_angle(trial)))
+    for key, own in runs.items():
+        where, advice = settling_of_runs(rigs[key], own)
+        if advice:
+            yield f"At {where}: {advice}."
+
+
+def settling_of_runs(rig: Rig, runs: Iterable[tuple[float, float]]) -> tuple[str, str]:
+    """At which speeds runs settle for too short an angle, and the advice for the slowest of them.
+
+    Args:
+        runs: speed (rad/s) and settled angle (rad) of each.
+    """
+    told = {speed: settling_advice(rig, speed, settled) for speed, settled in runs}
+    short = sorted(speed for speed, advice in told.items() if advice)
+    return (speed_range(short), told[short[0]]) if short else ("", "")
+
+
+def speed_range(speeds: Sequence[float]) -> str:
+    """From the slowest to the fastest (rad/s), in words."""
+    low, high = rate_here(min(speeds)), rate_here(max(speeds))
+    return high if low == high else f"{low.split()[0]} to {high}"
 
 
 def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:

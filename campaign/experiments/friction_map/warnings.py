@@ -12,7 +12,8 @@ from campaign.experiments.friction_map.runs import (
     VelocityMapOptions,
     map_speeds,
     plan_run,
-    settling_advice,
+    settling_of_runs,
+    speed_range,
 )
 from campaign.experiments.shared.rig import Rig
 from campaign.identification.extrapolated import FAR, FEWEST_BELOW
@@ -72,13 +73,9 @@ def _none_far_above(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
 
 
 def _settling(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
-    rig = Rig(bench)
-    told: dict[str, list[float]] = {}
-    for run in runs:
-        if advice := settling_advice(rig, run.speed, run.settle * run.speed):
-            told.setdefault(advice, []).append(run.speed)
-    for advice, speeds in told.items():
-        yield f"at {_range(speeds)} runs settle for too short an angle: {advice}"
+    where, advice = settling_of_runs(Rig(bench), [(r.speed, r.settle * r.speed) for r in runs])
+    if advice:
+        yield f"at {where} runs settle for too short an angle: {advice}"
 
 
 def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
@@ -101,12 +98,7 @@ def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> I
         )
         return
     yield (
-        f"at {_range(short)} windows are shorter than {told}, and it cannot be taken out: of the "
-        f"runs below {rate_here(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
+        f"at {speed_range(short)} windows are shorter than {told}, and it cannot be taken out: of "
+        f"the runs below {rate_here(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
         "have to; raise max_travel or max_time, or write two start_angles half a period apart"
     )
-
-
-def _range(speeds: Sequence[float]) -> str:
-    low, high = rate_here(min(speeds)), rate_here(max(speeds))
-    return high if low == high else f"{low.split()[0]} to {high}"
