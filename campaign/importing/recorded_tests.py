@@ -367,6 +367,7 @@ def _offered(
             request,
             task=task,
             point={**conditions, **request.point},
+            planned=False,
             recording=part.model_dump(mode="json", exclude_defaults=True),
             note=_note(found, request.note),
         )
