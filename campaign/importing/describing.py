@@ -13,7 +13,6 @@ import numpy as np
 from campaign.importing.checked import WRAPAROUND, defects_of, remedy
 from campaign.importing.cutting import (
     NEEDED,
-    SHORTEST,
     CutError,
     Stretch,
     by_restart,
@@ -21,9 +20,10 @@ from campaign.importing.cutting import (
     by_value,
 )
 from campaign.importing.defects import Severity
+from campaign.importing.defects.clock import SHORTEST
 from campaign.importing.defects.defect import counted
+from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.described import Cells, ClockUsed, Described, FileUsed, Made, file_used
-from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.interface import Array
 from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
 from campaign.importing.mapping import (
@@ -106,9 +106,10 @@ class _Finding:
     def trials(self) -> list[tuple[Described, Stretch]]:
         """Raises MappingError with everything that is wrong."""
         made, remarks, clocks, chosen = self._columns()
-        clocked = (*made.values(), *clocks.values())
-        for cells in (*(each.cells for each in clocked if each.cells is not None), *chosen):
-            self.opened.want(cells)
+        used: list[Made | ClockUsed] = [*made.values(), *clocks.values()]
+        for cells in (*(each.cells for each in used), *chosen):
+            if cells is not None:
+                self.opened.want(cells)
         main = self._main(clocks)
         faults: list[MappingError] = []
         for each in chosen:
@@ -132,19 +133,25 @@ class _Finding:
         clocks: Clocks = {}
         chosen: list[Cells] = []
         faults: list[MappingError] = []
-        given = self.layout.channels.items()
-        for name, channel in sorted(given, key=lambda each: each[1].column is None):
-            with _collected(faults):
-                if channel.column is not None:
-                    made[name] = self._of_column(name, channel, remarks)
-                elif channel.derive in made:
-                    made[name] = self._derived(name, channel, made[channel.derive], remarks)
-                elif self.layout.channels[channel.derive].derive:
-                    message = f"{channel.derive} is derived itself; derive {name} from a column"
-                    raise MappingError(message, (name, "derive"), of_columns=True)
-        for table in sorted({_table(each) for each in made.values() if each.cells is not None}):
+        cells: dict[str, Cells] = {}
+        channels = self.layout.channels
+        for name, channel in channels.items():
+            if channel.column is not None:
+                with _collected(faults):
+                    cells[name] = self._find((name, "column"), channel, of_columns=True)
+        for table in sorted({(each.file, each.table) for each in cells.values()}):
             with _collected(faults):
                 clocks[table] = self._clock(*table)
+        for name in (*cells, *(name for name in channels if channels[name].derive)):
+            channel = channels[name]
+            with _collected(faults):
+                if name in cells:
+                    made[name] = self._of_column(name, channel, cells[name], remarks)
+                elif channel.derive in made:
+                    made[name] = self._derived(name, channel, made[channel.derive], remarks)
+                elif channels[channel.derive].derive:
+                    message = f"{channel.derive} is derived itself; derive {name} from a column"
+                    raise MappingError(message, (name, "derive"), of_columns=True)
         for key, column in self._choosing():
             with _collected(faults):
                 chosen.append(self._find(key, column))
@@ -160,8 +167,7 @@ class _Finding:
         except AmbiguousError as error:
             raise MappingError(f"{self._names()}: {error}", keys, of_columns=of_columns) from None
 
-    def _of_column(self, name: str, channel: ChannelColumn, remarks: list[str]) -> Made:
-        at = self._find((name, "column"), channel, of_columns=True)
+    def _of_column(self, name: str, channel: ChannelColumn, at: Cells, remarks: list[str]) -> Made:
         if channel.filter:
             remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
         try:

@@ -69,9 +69,9 @@ def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
 
 
 def _once(problems: Sequence[Problem]) -> list[Problem]:
-    """What is wrong at one place with many files alike is told of the first of them."""
+    """By place; what is wrong at one with many files alike is told of the first of them."""
     alike: dict[tuple[Path, int, int, str], list[Problem]] = {}
-    for each in problems:
+    for each in sorted(problems, key=lambda each: (str(each.file), each.line, each.column)):
         tail = _FILE.sub("", each.message)
         alike.setdefault((each.file, each.line, each.column, tail), []).append(each)
     return [

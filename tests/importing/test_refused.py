@@ -277,7 +277,7 @@ file = "a.csv"
 
 
 def test_all_mistakes_of_a_mapping_are_told_at_once(tmp_path: Path):
-    """Of its layout, its entries, its files, the columns that tell trials apart, and its windows."""
+    """Of its layout, its entries, its files, the column that tells trials apart, its windows."""
     (tmp_path / "text.csv").write_text("nothing\n")
     rows = "\n".join(f"{k},{0.05 * k:.6g},1" for k in range(100))
     (tmp_path / "good.csv").write_text("t,pos,i\n" + rows)

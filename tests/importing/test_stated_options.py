@@ -1,4 +1,4 @@
-"""A ramp that another program recorded, one signal per file: what is stated of it, and what is not."""
+"""A ramp that another program recorded, one signal per file: what is stated of it, and what not."""
 
 from __future__ import annotations
 

@@ -7,15 +7,13 @@ the mapping does not ask for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.importing.cutting import restarts
-from campaign.importing.defects.clock import ticks
-from campaign.importing.defects.defect import counted
-from campaign.importing.interface import Array
+from campaign.importing.defects.clock import SHORTEST, restarts, ticks
+from campaign.importing.defects.defect import Array, Defect, Severity, counted
 
 TOLERANCE = 0.25
 """of a sample by which a time may be off an even clock: half of what would name another sample."""
@@ -91,6 +89,17 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
         raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
     clock = times(first, first + rows)
     return _repaired(clock, first, _look(clock, first), repairs)
+
+
+def of_time(time: Array) -> Iterator[Defect]:
+    """What an import would refuse of times, shape (n,), s."""
+    rows = (0, len(time) - 1)
+    try:
+        if len(time) >= SHORTEST:
+            with np.errstate(all="ignore"):
+                even_clock(lambda first, stop: time[first:stop], 0, len(time))
+    except UnevenError as error:
+        yield Defect("uneven", (), str(error), rows, 0.0, Severity.REPAIRABLE, "repair")
 
 
 def _furthest(
