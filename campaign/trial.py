@@ -213,6 +213,8 @@ class TrialRequest:
         recording: where the samples of a trial come from that was executed elsewhere; see `Trial`.
         part: of an offered recording that is this trial (s from its beginning); None: all of it.
         options: those of the test's that a recording from elsewhere shows to have been others (SI).
+        planned: whether the test's options say how it is executed; of a recording that nobody
+            planned only those that the test writes are kept: defaults were never executed.
     """
 
     task: Task
@@ -226,6 +228,7 @@ class TrialRequest:
     recording: Tree = field(default_factory=dict)
     part: tuple[float, float] | None = None
     options: Tree = field(default_factory=dict)
+    planned: bool = True
 
 
 @dataclass(frozen=True)

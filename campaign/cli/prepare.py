@@ -178,12 +178,14 @@ def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial])
 
     What it cannot know before it is connected is asked again when it is.
     """
+    told: dict[tuple[str, tuple[str, ...]], str] = {}  # of several trials alike the first
     for trial in trials:
-        if not trial.requires:
-            continue
-        known = calls.channels(backend, trial)
-        if known is not None and (names := missing(trial.requires, known)):
-            raise UsageError(_not_recorded(kind, trial, names))
+        known = calls.channels(backend, trial) if trial.requires else None
+        names = () if known is None else tuple(missing(trial.requires, known))
+        if names and (trial.test, names) not in told:
+            told[trial.test, names] = _not_recorded(kind, trial, names)
+    if told:
+        raise UsageError("\n".join(told.values()))
 
 
 def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:

@@ -79,7 +79,7 @@ class Ledger:
         self._worth = partial(worth, computed=computed)
         self._worth_left = sum(map(self._worth, waiting))
         self._worth_done = 0.0
-        self._forecast = Forecast()
+        self._forecast = Forecast(uneven=any(trial.recording for trial in waiting))
         self._display = display
         self._running: dict[int, Trial] = {}
         self._reached: dict[int, float] = {}

@@ -9,11 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from campaign.importing.defects.clock import SHORTEST
+from campaign.importing.defects.clock import restarts as restarts
 from campaign.importing.defects.defect import counted
 from campaign.importing.interface import Array
 
-SHORTEST = 10
-"""Samples that a recording has at least: fewer tell no motion."""
 NEEDED = f"a recording needs {SHORTEST}"
 
 
@@ -84,23 +84,6 @@ def by_value(
     cut = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
     cut[0] = replace(cut[0], remarks=tuple(remarks))
     return numbered(cut)
-
-
-def restarts(times: Array) -> list[int]:
-    """Rows at which times, shape (n,), begin anew: they fall back past half of what went before.
-
-    A clock that is set back, and rows that were exchanged, fall back by less.
-    """
-    steps = np.diff(times)
-    forward = steps[steps > 0]
-    if not len(forward):
-        return []
-    found, begin = [], 0
-    for fall in np.flatnonzero(steps < -SHORTEST * float(np.median(forward))):
-        if times[fall] - times[fall + 1] > 0.5 * (times[fall] - times[begin]):
-            begin = int(fall) + 1
-            found.append(begin)
-    return found
 
 
 def by_restart(times: Array, first: int) -> list[Stretch]:

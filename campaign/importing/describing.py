@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,6 @@ import numpy as np
 from campaign.importing.checked import WRAPAROUND, defects_of, remedy
 from campaign.importing.cutting import (
     NEEDED,
-    SHORTEST,
     CutError,
     Stretch,
     by_restart,
@@ -20,9 +20,10 @@ from campaign.importing.cutting import (
     by_value,
 )
 from campaign.importing.defects import Severity
+from campaign.importing.defects.clock import SHORTEST
 from campaign.importing.defects.defect import counted
+from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.described import Cells, ClockUsed, Described, FileUsed, Made, file_used
-from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.interface import Array
 from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
 from campaign.importing.mapping import (
@@ -37,6 +38,8 @@ from campaign.importing.opened import AmbiguousError, OpenedFiles
 from campaign.importing.reader import clock_times
 from campaign.unit_grammar import parse_unit
 
+Clocks = dict[tuple[int, int], ClockUsed]
+"""The clock of each table, by file and table."""
 TIMELESS = (
     "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
     'sample_rate = "1 kHz"'
@@ -76,6 +79,21 @@ def describe(
         raise
 
 
+@contextmanager
+def _collected(faults: list[MappingError]) -> Iterator[None]:
+    """What goes wrong in the block is told later, with all else that does."""
+    try:
+        yield
+    except MappingError as error:
+        faults.append(error)
+
+
+def _table(made: Made) -> tuple[int, int]:
+    """File and table of a channel that is a column."""
+    assert made.cells is not None  # noqa: S101 - asked of no other
+    return made.cells.file, made.cells.table
+
+
 @dataclass(frozen=True)
 class _Finding:
     opened: OpenedFiles
@@ -85,47 +103,86 @@ class _Finding:
     wanted: frozenset[str]
     used: tuple[FileUsed, ...]
 
-    def trials(self) -> Iterator[tuple[Described, Stretch]]:
-        cells, clocks = self._columns_and_clocks()
-        for each in (*cells.values(), *(c.cells for c in clocks.values() if c.cells)):
-            self.opened.want(each)
+    def trials(self) -> list[tuple[Described, Stretch]]:
+        """Raises MappingError with everything that is wrong."""
+        made, remarks, clocks, chosen = self._columns()
+        used: list[Made | ClockUsed] = [*made.values(), *clocks.values()]
+        for cells in (*(each.cells for each in used), *chosen):
+            if cells is not None:
+                self.opened.want(cells)
         main = self._main(clocks)
-        chosen = [self._find(key, column) for key, column in self._choosing()]
+        faults: list[MappingError] = []
         for each in chosen:
             if (each.file, each.table) != main:
-                raise MappingError(f"column {each.name!r} has another clock than the channels")
-            self.opened.want(each)
+                message = f"column {each.name!r} has another clock than the channels"
+                faults.append(MappingError(message))
+        MappingError.together(faults)
+        found = []
         for stretch in self._stretches(main, clocks[main], chosen):
-            yield self._described(main, stretch, cells, clocks), stretch
+            with _collected(faults):
+                found.append((self._described(main, stretch, made, clocks, remarks), stretch))
+        MappingError.together(faults)
+        return found
 
-    def _columns_and_clocks(self) -> tuple[dict[str, Cells], dict[tuple[int, int], ClockUsed]]:
-        """Where each channel is, and the clock of each table; all that is missing at once."""
-        cells: dict[str, Cells] = {}
-        clocks: dict[tuple[int, int], ClockUsed] = {}
+    def _columns(self) -> tuple[dict[str, Made], list[str], Clocks, list[Cells]]:
+        """What each channel is made of, what to remark, the clock of each table, and the columns
+        that tell trials apart. Raises MappingError with everything that is wrong.
+        """
+        made: dict[str, Made] = {}
+        remarks: list[str] = []
+        clocks: Clocks = {}
+        chosen: list[Cells] = []
         faults: list[MappingError] = []
-        for name, channel in self.layout.channels.items():
-            if channel.column is None:
-                continue
-            try:
-                cells[name] = self._find((name, "column"), channel, of_columns=True)
-                self._column(name, channel, cells[name], 0)
-            except MappingError as error:
-                faults.append(error)
+        cells: dict[str, Cells] = {}
+        channels = self.layout.channels
+        for name, channel in channels.items():
+            if channel.column is not None:
+                with _collected(faults):
+                    cells[name] = self._find((name, "column"), channel, of_columns=True)
         for table in sorted({(each.file, each.table) for each in cells.values()}):
-            try:
+            with _collected(faults):
                 clocks[table] = self._clock(*table)
-            except MappingError as error:
-                faults.insert(0, error)
-        if faults:
-            faults[0].others = tuple(faults[1:])
-            raise faults[0]
-        return cells, clocks
+        for name in (*cells, *(name for name in channels if channels[name].derive)):
+            channel = channels[name]
+            with _collected(faults):
+                if name in cells:
+                    made[name] = self._of_column(name, channel, cells[name], remarks)
+                elif channel.derive in made:
+                    made[name] = self._derived(name, channel, made[channel.derive], remarks)
+                elif channels[channel.derive].derive:
+                    message = f"{channel.derive} is derived itself; derive {name} from a column"
+                    raise MappingError(message, (name, "derive"), of_columns=True)
+        for key, column in self._choosing():
+            with _collected(faults):
+                chosen.append(self._find(key, column))
+        MappingError.together(faults)
+        for one, remark in following(self.wanted - made.keys(), made, self.rig):
+            made[one.name] = one
+            remarks.append(remark)
+        return made, remarks, clocks, chosen
 
     def _find(self, keys: Key, wanted: ColumnPlace, *, of_columns: bool = False) -> Cells:
         try:
             return self.opened.find(wanted, self.entry.table)
         except AmbiguousError as error:
             raise MappingError(f"{self._names()}: {error}", keys, of_columns=of_columns) from None
+
+    def _of_column(self, name: str, channel: ChannelColumn, at: Cells, remarks: list[str]) -> Made:
+        if channel.filter:
+            remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
+        try:
+            return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig)
+        except ValueError as error:
+            raise MappingError(f"{self._names()}: {error}", (name,), of_columns=True) from None
+
+    def _derived(self, name: str, channel: ChannelColumn, source: Made, remarks: list[str]) -> Made:
+        try:
+            one = made_of_channel(name, channel, source, self.rig)
+        except ValueError as error:
+            raise MappingError(str(error), (name, "derive"), of_columns=True) from None
+        if one.how == "integral":
+            remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
+        return one
 
     def _names(self, first: int = 0) -> str:
         names = " and ".join(each.name for each in self.used)
@@ -180,7 +237,7 @@ class _Finding:
     def _times(self, clock: ClockUsed) -> Callable[[int, int], Array]:
         return lambda first, stop: clock_times(clock, self.opened, first, stop)
 
-    def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
+    def _main(self, clocks: Clocks) -> tuple[int, int]:
         """The table with the fastest clock, of several alike the longest: the others are held."""
         if len(clocks) == 1:
             return next(iter(clocks))
@@ -251,8 +308,9 @@ class _Finding:
         self,
         main: tuple[int, int],
         stretch: Stretch,
-        cells: dict[str, Cells],
-        clocks: dict[tuple[int, int], ClockUsed],
+        columns: dict[str, Made],
+        clocks: Clocks,
+        told: Sequence[str],
     ) -> Described:
         clock = clocks[main]
         repairs = self.layout.time.repair if self.layout.time is not None else ()
@@ -260,8 +318,8 @@ class _Finding:
             even = even_clock(self._times(clock), stretch.first, stretch.rows, repairs)
         except UnevenError as error:
             raise MappingError(f"{self._names(stretch.first)}: {error}", ("file",)) from None
-        remarks = [*stretch.remarks, *even.remarks]
-        made = self._made(main, cells, clocks, even, remarks)
+        remarks = [*stretch.remarks, *even.remarks, *told]
+        made = list(self._placed(columns, main, clocks, even, remarks))
         shifts = [each.shift for each in made if each.clock is None]
         skip, cut = max(0, -min(shifts, default=0)), max(0, *shifts, 0)
         if (left := even.samples - skip - cut) < SHORTEST:
@@ -285,10 +343,11 @@ class _Finding:
     def _checked(self, described: Described) -> Described:
         """With what its channels show remarked, and scales that begin anew made continuous.
 
-        Raises MappingError for a defect that nobody has accepted.
+        Raises MappingError for the defects that nobody has accepted.
         """
         remarks = list(described.remarks)
         periods: dict[str, float] = {}
+        faults: list[MappingError] = []
         for defect in defects_of(described, self.opened, self.rig.ratio):
             name = next(iter(defect.channels), "")
             entry = self.layout.channels.get(name)
@@ -302,67 +361,34 @@ class _Finding:
                 continue
             what = f"{self._names(described.first)}: {defect.what}; {remedy(defect)}"
             keys = (name,) if name else ()
-            raise DefectError(what, keys, defect.kind, of_columns=bool(name))
+            faults.append(DefectError(what, keys, defect.kind, of_columns=bool(name)))
+        MappingError.together(faults)
         channels = tuple(
             each.model_copy(update={"period": periods.get(each.name)})
             for each in described.channels
         )
         return described.model_copy(update={"channels": channels, "remarks": tuple(remarks)})
 
-    def _made(
+    def _placed(
         self,
+        made: dict[str, Made],
         main: tuple[int, int],
-        cells: dict[str, Cells],
-        clocks: dict[tuple[int, int], ClockUsed],
+        clocks: Clocks,
         even: EvenClock,
         remarks: list[str],
-    ) -> list[Made]:
-        made: dict[str, Made] = {}
-        for name, channel in self.layout.channels.items():
-            if name in cells:
-                one = self._of_column(name, channel, cells[name], even, remarks)
-                table = (one.cells.file, one.cells.table) if one.cells else main
-                if table != main:
-                    one = one.model_copy(update=self._slower(clocks[table], table, even))
-                made[name] = one
-        for name, channel in self.layout.channels.items():
-            if name not in cells:
-                made |= self._derived(name, channel, made, remarks)
-        for one, remark in following(self.wanted - made.keys(), made, self.rig):
-            made[one.name] = one
-            remarks.append(remark)
-        return list(made.values())
-
-    def _of_column(
-        self, name: str, channel: ChannelColumn, at: Cells, even: EvenClock, remarks: list[str]
-    ) -> Made:
-        shift = round(channel.delay * even.rate)
-        if channel.filter:
-            remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
-        if shift:
-            remarks.append(f"{name} is put back by {shift} samples, {shift / even.rate:.6g} s")
-        return self._column(name, channel, at, shift)
-
-    def _column(self, name: str, channel: ChannelColumn, at: Cells, shift: int) -> Made:
-        try:
-            return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig, shift)
-        except ValueError as error:
-            raise MappingError(f"{self._names()}: {error}", (name,), of_columns=True) from None
-
-    def _derived(
-        self, name: str, channel: ChannelColumn, made: dict[str, Made], remarks: list[str]
-    ) -> dict[str, Made]:
-        source = made.get(channel.derive)
-        if source is None:
-            message = f"{channel.derive} is derived itself; derive {name} from a column"
-            raise MappingError(message, (name, "derive"), of_columns=True)
-        try:
-            one = made_of_channel(name, channel, source, self.rig)
-        except ValueError as error:
-            raise MappingError(str(error), (name, "derive"), of_columns=True) from None
-        if one.how == "integral":
-            remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
-        return {name: one}
+    ) -> Iterator[Made]:
+        """The channels over an even clock: late ones put back, those of slower tables held."""
+        for name, one in made.items():
+            if one.cells is not None:
+                delay = self.layout.channels[name].delay
+                if shift := round(delay * even.rate):
+                    told = f"{shift} samples, {shift / even.rate:.6g} s"
+                    remarks.append(f"{name} is put back by {told}")
+                of: dict[str, object] = {"shift": shift}
+                if (table := _table(one)) != main:
+                    of |= self._slower(clocks[table], table, even)
+                one = one.model_copy(update=of)
+            yield one
 
     def _slower(
         self, clock: ClockUsed, table: tuple[int, int], even: EvenClock

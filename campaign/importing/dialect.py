@@ -8,11 +8,14 @@ rows into numbers is the file's, and a second one that does as well is a doubt f
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from pathlib import Path
 from typing import NamedTuple
 
+from campaign.errors import Problem
 from campaign.importing.cells import is_lost, is_number, plain
 from campaign.importing.heading import heading
 
@@ -34,6 +37,7 @@ class Dialect:
         width: cells of a row as split; the last may be empty in all of them, and is then no column.
         numeric: for each column, whether its cells are numbers.
         comments: a row may go on after its cells, with words that are no column.
+        sheet: of a workbook whose rows are read as lines.
         said: what stands above the heading as `key: value`.
         doubts: other ways of reading that fit as well, in words.
     """
@@ -48,9 +52,34 @@ class Dialect:
     said: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     comments: bool = False
+    sheet: str = ""
+
+    @classmethod
+    def of_numbers(cls, separator: str, decimal: str, first: int, names: Sequence[str]) -> Dialect:
+        """Of a file that says itself how it is written: columns of numbers, then anything."""
+        count = len(names)
+        some, all_ = ("",) * count, (True,) * count
+        return cls(separator, decimal, first, count, tuple(names), some, all_, comments=True)
 
     def split(self, line: str) -> list[str]:
         return split(line, self.separator)
+
+    def problem(
+        self, path: Path, row: int, message: str, line: str = "", place: int = 0
+    ) -> Problem:
+        """What is wrong with a cell, where a person finds it."""
+        if self.sheet:
+            return Problem(path, 0, 0, f"{self.sheet}!{letters(place)}{row}: {message}")
+        if self.separator == " ":
+            word = list(re.finditer(r"\S+", line))[place : place + 1]
+            return Problem(path, row, word[0].start() + 1 if word else 1, message)
+        before = line.split(self.separator)[:place]  # of quoted cells about there
+        return Problem(path, row, sum(len(cell) + 1 for cell in before) + 1, message)
+
+
+def letters(place: int) -> str:
+    """A column as Excel names it: 0 is A, 26 is AA."""
+    return (letters(place // 26 - 1) if place >= 26 else "") + chr(ord("A") + place % 26)
 
 
 def encoding_of(head: bytes, whole: bool) -> str:
@@ -88,7 +117,7 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
         each
         for separator in SEPARATORS
         for decimal in ".,"
-        if separator != decimal and (each := _read_as(lines, separator, decimal)) is not None
+        if separator != decimal and (each := read_as(lines, separator, decimal)) is not None
     ]
     if not found:
         return None
@@ -112,7 +141,8 @@ class _Fit(NamedTuple):
     columns: int
 
 
-def _read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, Dialect] | None:
+def read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, Dialect] | None:
+    """What the lines hold when they are read in one way, and how well that fits; None: nothing."""
     rows = [(place, split(line, separator)) for place, line in enumerate(lines) if line.strip()]
     while rows and not _has_number(rows[-1][1], decimal):  # an end mark, such as EOF
         rows.pop()

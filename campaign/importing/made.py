@@ -49,13 +49,12 @@ class RigFacts:
 
 
 def made_of_column(
-    name: str, entry: ChannelColumn, cells: Cells, stated: str, rig: RigFacts, shift: int
+    name: str, entry: ChannelColumn, cells: Cells, stated: str, rig: RigFacts
 ) -> Made:
     """The channel that a column is.
 
     Args:
         stated: the unit that the file states; "" for none.
-        shift: samples by which the column is late.
 
     Raises ValueError with a message for the user where units do not go together.
     """
@@ -81,7 +80,6 @@ def made_of_column(
         cells=cells,
         factor=entry.sign * number * float(unit.factor / si.factor),
         offset=entry.offset,
-        shift=shift,
         relative_uncertainty=_relative(entry, number),
         filter=entry.filter,
     )
@@ -241,7 +239,7 @@ def _times(entry: ChannelColumn) -> tuple[float, Unit]:
 
 
 def _relative(entry: ChannelColumn, number: float) -> float | None:
-    """The uncertainty of `times` as a share of it; None where none is stated."""
+    """The uncertainty of `times`, or of the scale, as a share of it; None where none is stated."""
     if not entry.uncertainty:
         return None
     error, unit = split_quantity(entry.uncertainty)
@@ -249,6 +247,11 @@ def _relative(entry: ChannelColumn, number: float) -> float | None:
         raise ValueError(f"the uncertainty {entry.uncertainty!r} is negative")
     if unit.strip() == "%":
         return error / 100.0  # of 'times', whatever it is in
+    if not entry.times:
+        raise ValueError(
+            f"the uncertainty {entry.uncertainty!r} has no 'times' that it could be of; without "
+            "one it is a share of what the column reads, as in '5 %'"
+        )
     _, by = _times(entry)
     of = _unit(unit)
     if of.dimensions != by.dimensions:

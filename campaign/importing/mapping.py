@@ -15,8 +15,8 @@ from pydantic import Field
 from campaign.errors import Problem
 from campaign.importing.defects import CHANNEL_KINDS
 from campaign.options import Options, spelled
-from campaign.protocol.files import Origin
-from campaign.protocol.problems import allowed, nearest, shown, validate
+from campaign.protocol.files import Origin, Within
+from campaign.protocol.problems import Fault, allowed, nearest, shown, validate
 from campaign.units import Frequency, Time
 
 TIME = "time"
@@ -60,8 +60,8 @@ class ChannelColumn(ColumnPlace):
     times: str = ""
     """By what the column is multiplied, as in `35.15 N/V`, where it measures something else."""
     uncertainty: str = ""
-    """Standard uncertainty (1 sigma) of `times`, in its unit; or a share of the value, as in `5 %`,
-    which needs no `times`."""
+    """Standard uncertainty (1 sigma) of `times`, in its unit; or a share, as in `5 %`, also of a
+    column without `times`: what is not known is then the scale of the instrument."""
     offset: float = 0.0
     """What the column reads at zero, in its own unit."""
     sign: Literal[1, -1] = 1
@@ -152,38 +152,35 @@ class Layout(Options):
 def layouts(
     columns: Mapping[str, Mapping[str, Any]], origin: Origin, problems: list[Problem]
 ) -> dict[str, Layout]:
-    """The layouts that are good; what is wrong with the others goes to `problems`."""
+    """The layouts that are good; everything that is wrong with the others goes to `problems`."""
     found = {}
     for name, table in columns.items():
-        before = len(problems)
-        channels: dict[str, ChannelColumn] = {}
-        time: TimeColumn | None = None
+        valid: dict[str, TimeColumn | ChannelColumn] = {}
+        wrong: list[Problem] = []
         for key, entry in table.items():
-            at = _Below(origin, ("columns", name, key))
+            at = Within(origin, ("columns", name, key))
             if not isinstance(entry, Mapping):
                 message = f"{shown(entry)} is not a table; write [columns.{name}.{key}]"
-                problems.append(at.problem((), "value", message))
+                wrong.append(at.problem((), "value", message))
                 continue
             model: type[TimeColumn | ChannelColumn] = TimeColumn if key == TIME else ChannelColumn
-            valid = validate(model, entry, at)
-            if isinstance(valid, list):
-                problems += valid
-            elif isinstance(valid, TimeColumn):
-                time = valid
-                problems += _time_faults(valid, at)
-            else:
-                channels[key] = valid
-                problems += _channel_faults(key, valid, table, at)
-        if not channels and len(problems) == before:
-            at = _Below(origin, ("columns", name))
-            problems.append(at.problem((), "key", "no column of it is a channel"))
-        if len(problems) == before:
-            tree = {"time": time, "channels": channels}
-            layout = validate(Layout, tree, _Below(origin, ("columns", name)))
-            if isinstance(layout, list):
-                problems += layout
-            else:
-                found[name] = layout
+            one = validate(model, entry, at)
+            if isinstance(one, list):
+                wrong += one
+                continue
+            valid[key] = one
+            others = [each for each in table if each not in (TIME, key)]
+            wrong += (at.problem(*fault) for fault in _column_faults(one, others))
+        time = valid.pop(TIME, None)
+        at = Within(origin, ("columns", name))
+        if not valid and not wrong:
+            wrong.append(at.problem((), "key", "no column of it is a channel"))
+        layout = validate(Layout, {"time": time, "channels": valid}, at)
+        if isinstance(layout, list):
+            wrong += layout
+        elif not wrong:
+            found[name] = layout
+        problems += wrong
     return found
 
 
@@ -199,91 +196,58 @@ def recordings_of(
     """
     found = []
     for index, tree in enumerate(entries):
-        at = _Below(origin, ("recording", index))
+        at = Within(origin, ("recording", index))
         valid = validate(RecordingEntry, tree, at)
-        if isinstance(valid, list):
-            problems += valid
-            continue
-        faults = list(_entry_faults(valid, windows, at))
-        problems += faults
-        if not faults:
+        wrong = (
+            valid
+            if isinstance(valid, list)
+            else [at.problem(*fault) for fault in _recording_faults(valid, windows)]
+        )
+        problems += wrong
+        if not wrong and not isinstance(valid, list):
             found.append((index, valid))
     return found
 
 
-def _entry_faults(entry: RecordingEntry, windows: Sequence[str], at: Origin) -> Iterator[Problem]:
-    """What of a valid entry does not go together."""
-    if fault := _file_fault(entry.file):
-        yield at.problem(("file",), "value", fault)
+def _recording_faults(entry: RecordingEntry, windows: Sequence[str]) -> Iterator[Fault]:
+    names = [entry.file] if isinstance(entry.file, str) else entry.file
+    if not names or not all(name.strip() for name in names):
+        yield ("file",), "value", "it is empty; name the file that holds the recording"
+    if any("\0" in name for name in names):
+        yield ("file",), "value", "no file has a name with a NUL character in it"
     for unknown in (name for name in entry.windows if windows and name not in windows):
         message = f"no analysis of this test looks for a window {shown(unknown)}; "
-        message += allowed(windows) + nearest(unknown, windows)
-        yield at.problem(("windows", unknown), "key", message)
+        yield ("windows", unknown), "key", message + allowed(windows) + nearest(unknown, windows)
+    for key in ("start", "stop"):
+        if entry.restarts and getattr(entry, key) is not None:
+            message = f"{key!r} is a time, and with 'restarts' there are several of it"
+            yield (key,), "key", message
     several = [k for k in ("where", "each", "trigger") if getattr(entry, k) is not None]
     several += ["restarts"] * entry.restarts
-    bounded = [key for key in ("start", "stop") if getattr(entry, key) is not None]
-    if entry.restarts and bounded:
-        message = f"{bounded[0]!r} is a time, and with 'restarts' there are several of it"
-        yield at.problem((bounded[0],), "key", message)
     if len(several) > 1:
         message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
-        yield at.problem((several[1],), "key", message)
-    elif entry.trial is not None and several:
+        yield (several[1],), "key", message
+    if entry.trial is not None and several:
         message = f"'trial' says which trial it is, and '{several[0]}' that it may be several"
-        yield at.problem((several[0],), "key", message)
+        yield (several[0],), "key", message
 
 
-def _file_fault(file: str | tuple[str, ...]) -> str:
-    """Why that names no file; "" where it does."""
-    names = [file] if isinstance(file, str) else file
-    if not names or not all(name.strip() for name in names):
-        return "it is empty; name the file that holds the recording"
-    if any("\0" in name for name in names):
-        return "no file has a name with a NUL character in it"
-    return ""
-
-
-class _Below:
-    """The part of an origin that begins at `prefix`."""
-
-    def __init__(self, base: Origin, prefix: tuple[str | int, ...]) -> None:
-        self._base = base
-        self._prefix = prefix
-
-    def problem(self, keys: Any, aim: Any, message: str) -> Problem:
-        return self._base.problem((*self._prefix, *keys), aim, message)
-
-
-def _time_faults(time: TimeColumn, at: Origin) -> list[Problem]:
-    if time.column is not None and time.sample_rate is not None:
-        message = "'sample_rate' is for files without a column of times; remove one of the two"
-        return [at.problem(("sample_rate",), "key", message)]
-    if time.column is None and time.sample_rate is None and not time.repair:
-        return [at.problem((), "key", "say which 'column' holds the time, or the 'sample_rate'")]
-    return []
-
-
-def _channel_faults(
-    name: str, entry: ChannelColumn, table: Mapping[str, Any], at: Origin
-) -> list[Problem]:
-    found = []
+def _column_faults(entry: TimeColumn | ChannelColumn, others: Sequence[str]) -> Iterator[Fault]:
+    """What of an entry does not go together; `others`: the channels besides it."""
+    if isinstance(entry, TimeColumn):
+        if entry.column is not None and entry.sample_rate is not None:
+            message = "'sample_rate' is for files without a column of times; remove one of the two"
+            yield ("sample_rate",), "key", message
+        if entry.column is None and entry.sample_rate is None and not entry.repair:
+            yield (), "key", "say which 'column' holds the time, or the 'sample_rate'"
+        return
     if entry.column is None and not entry.derive:
-        message = "say which 'column' it is, or what to 'derive' it from"
-        found.append(at.problem((), "key", message))
+        yield (), "key", "say which 'column' it is, or what to 'derive' it from"
     if entry.column is not None and entry.derive:
-        message = "it is a 'column' or it is derived; remove one of the two"
-        found.append(at.problem(("derive",), "key", message))
-    for kind in entry.accept:
-        if kind not in CHANNEL_KINDS:
-            message = f"{shown(kind)} is nothing that is looked for; {allowed(CHANNEL_KINDS)}"
-            message += nearest(kind, CHANNEL_KINDS)
-            found.append(at.problem(("accept",), "value", message))
-    if entry.uncertainty and not entry.times and not entry.uncertainty.strip().endswith("%"):
-        message = "write it as a share, as in '2 %': only beside 'times' it has a unit of its own"
-        found.append(at.problem(("uncertainty",), "value", message))
-    others = [key for key in table if key not in (TIME, name)]
-    if entry.derive and entry.derive not in others:
+        yield ("derive",), "key", "it is a 'column' or it is derived; remove one of the two"
+    elif entry.derive and entry.derive not in others:
         message = f"there is no channel {shown(entry.derive)} here; {allowed(others)}"
-        message += nearest(entry.derive, others)
-        found.append(at.problem(("derive",), "value", message))
-    return found
+        yield ("derive",), "value", message + nearest(entry.derive, others)
+    for unknown in (kind for kind in entry.accept if kind not in CHANNEL_KINDS):
+        message = f"{shown(unknown)} is nothing that is looked for; {allowed(CHANNEL_KINDS)}"
+        yield ("accept",), "value", message + nearest(unknown, CHANNEL_KINDS)

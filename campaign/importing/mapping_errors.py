@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 Key = tuple[str | int, ...]
 
 
@@ -19,6 +21,14 @@ class MappingError(ValueError):
         self.of_columns = of_columns
         self.others: tuple[MappingError, ...] = ()
         super().__init__(message)
+
+    @classmethod
+    def together(cls, faults: Sequence[MappingError]) -> None:
+        """Raise the first with the others; nothing where there are none."""
+        if faults:
+            later = (each for one in faults[1:] for each in (one, *one.others))
+            faults[0].others = (*faults[0].others, *later)
+            raise faults[0]
 
 
 class DefectError(MappingError):

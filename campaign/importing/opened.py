@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from campaign.errors import Problem
 from campaign.importing.described import Cells
-from campaign.importing.interface import Array, Column, Table
+from campaign.importing.interface import Array, Column, RecordingError, Table
 from campaign.importing.opening import open_recordings
 from campaign.importing.spool import Spool
 
@@ -50,7 +51,16 @@ class OpenedFiles:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = tuple(paths)
-        self.tables: tuple[Sequence[Table], ...] = tuple(open_recordings(p)[1] for p in paths)
+        found: list[Sequence[Table]] = []
+        problems: list[Problem] = []
+        for path in paths:
+            try:
+                found.append(open_recordings(path)[1])
+            except RecordingError as error:
+                problems += error.problems
+        if problems:
+            raise RecordingError(problems)
+        self.tables = tuple(found)
         self._spools: dict[tuple[int, int], Spool] = {}
         self._wanted: dict[tuple[int, int], dict[int, None]] = {}
 

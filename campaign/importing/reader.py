@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from campaign.errors import Problem
+from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
-from campaign.importing.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.interface import ROWS, Array, RecordingError
 from campaign.importing.opened import OpenedFiles
 from campaign.recording import Channel, Recording

@@ -51,23 +51,27 @@ OUTSIDE = (
 def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
     """The protocol with the trials of its recordings; their files are open until it is planned.
 
-    Raises ProtocolError with everything that is wrong with mapping and files.
+    Raises ProtocolError at the end of the block, with everything that is wrong with mapping and
+    files, and with the plan of the recordings that are good.
     """
     problems: list[Problem] = []
     origin = protocol.origin
     known = layouts(protocol.columns, origin, problems) if origin is not None else {}
     with ExitStack() as stack:
-        loader = _Loader(protocol.path.parent, known, problems, stack)
+        loader = _Loader(protocol, known, problems, stack)
         tests = tuple(loader.test(test) for test in protocol.tests)
+        try:
+            yield replace(protocol, tests=tests)
+        except ProtocolError as error:
+            problems += error.problems
         if problems:
             raise ProtocolError(_once(problems))
-        yield replace(protocol, tests=tests)
 
 
 def _once(problems: Sequence[Problem]) -> list[Problem]:
-    """What is wrong at one place with many files alike is told of the first of them."""
+    """By place; what is wrong at one with many files alike is told of the first of them."""
     alike: dict[tuple[Path, int, int, str], list[Problem]] = {}
-    for each in problems:
+    for each in sorted(problems, key=lambda each: (str(each.file), each.line, each.column)):
         tail = _FILE.sub("", each.message)
         alike.setdefault((each.file, each.line, each.column, tail), []).append(each)
     return [
@@ -127,13 +131,18 @@ class Found:
 class _Loader:
     """Problems go to `problems`, open files to `stack`."""
 
-    folder: Path
+    protocol: Protocol
     layouts: Mapping[str, Layout]
     problems: list[Problem]
     stack: ExitStack
 
+    @property
+    def folder(self) -> Path:
+        """That of the mapping, from which its files are named."""
+        return self.protocol.path.parent
+
     def test(self, test: Test) -> Test:
-        origin, before = test.origin, len(self.problems)
+        origin = test.origin
         if not test.entry.recording:
             self.problems.append(
                 origin.problem((), "key", f"{shown(test.entry.name)}: {NO_RECORDING}")
@@ -149,11 +158,8 @@ class _Loader:
         entries = recordings_of(
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
-        found: list[Found] = []
-        if len(self.problems) == before or entries:
-            bench = Bench.model_validate(test.bench)
-            for index, entry in entries:
-                found += self._found(test, index, entry, rig_facts(bench))
+        rig = rig_facts(Bench.model_validate(test.bench))
+        found = [each for place in entries for each in self._found(test, *place, rig)]
         return replace(test, experiment=_kind(test.experiment, found))
 
     def _found(self, test: Test, index: int, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
@@ -162,10 +168,11 @@ class _Loader:
         wanted = {*test.experiment.requires, *test.experiment.can_use}
         found: list[Found] = []
         for written in self._files(at, below, entry):
-            if layout is None:
-                continue
             paths = [self.folder / each for each in written]
             try:
+                if layout is None:  # what can be said of its files is said all the same
+                    OpenedFiles(paths)
+                    continue
                 opened, trials = describe(entry, layout, paths, written, rig, wanted)
             except RecordingError as error:
                 self.problems += (
@@ -185,29 +192,25 @@ class _Loader:
     ) -> Problem:
         if error.of_columns:
             name = entry.columns or next(iter(self.layouts))
-            return _Main(at).problem(("columns", name, *error.keys), str(error))
+            at, below = self.protocol.origin or at, ("columns", name)
+            return at.problem((*below, *error.keys), "key", str(error))
         return at.problem((*below, *error.keys), "value", str(error))
 
     def _layout(
         self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
     ) -> Layout | None:
-        names = list(self.layouts)
-        if entry.columns in self.layouts:
-            return self.layouts[entry.columns]
-        if not entry.columns and len(names) == 1:
-            return self.layouts[names[0]]
+        names = list(self.protocol.columns)
+        name = entry.columns or (names[0] if len(names) == 1 else "")
         if not names:
-            if not self.problems:
-                message = "nothing says what its columns are; add [columns.NAME] tables"
-                self.problems.append(at.problem((*below, "file"), "key", message))
-        elif not entry.columns:
+            message = "nothing says what its columns are; add [columns.NAME] tables"
+            self.problems.append(at.problem((*below, "file"), "key", message))
+        elif not name:
             message = f"say by which 'columns' it is read; {allowed(names)}"
             self.problems.append(at.problem((*below, "file"), "key", message))
-        elif not self.problems:
-            message = f"there is no [columns.{entry.columns}]; {allowed(names)}"
-            message += nearest(entry.columns, names)
+        elif name not in names:
+            message = f"there is no [columns.{name}]; {allowed(names)}{nearest(name, names)}"
             self.problems.append(at.problem((*below, "columns"), "value", message))
-        return None
+        return self.layouts.get(name)
 
     def _files(
         self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
@@ -254,31 +257,22 @@ def _matching(folder: Path, pattern: str) -> list[str]:
     return sorted(found)
 
 
-@dataclass(frozen=True)
-class _Main:
-    """The main file that an origin within it belongs to."""
-
-    origin: Origin
-
-    def problem(self, keys: tuple[str | int, ...], message: str) -> Problem:
-        source = getattr(self.origin, "base", self.origin)
-        source = getattr(source, "source", None)
-        if source is None:
-            return self.origin.problem((), "key", message)
-        found: Problem = source.problem(keys, "key", message)
-        return found
-
-
 def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
     planned = any(each.entry.trial is not None for each in found)
 
     def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
         asked = list(experiment.trials(options, bench)) if planned else []
+        wrong = []
         for each in found:
-            if each.entry.trial is not None:
-                yield _planned(each, asked)
-            else:
-                yield from _offered(each, experiment, options, bench)
+            try:
+                if each.entry.trial is not None:
+                    yield _planned(each, asked)
+                else:
+                    yield from _offered(each, experiment, options, bench)
+            except ValueError as error:
+                wrong.append(str(error))
+        if wrong:
+            raise ValueError("; ".join(wrong))
 
     return RecordedKind(
         experiment.name,
@@ -367,6 +361,7 @@ def _offered(
             request,
             task=task,
             point={**conditions, **request.point},
+            planned=False,
             recording=part.model_dump(mode="json", exclude_defaults=True),
             note=_note(found, request.note),
         )

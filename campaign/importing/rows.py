@@ -78,14 +78,21 @@ def blocks(
     with path.open(encoding=encoding) as file:
         last = None if rows is None else dialect.first - 1 + rows
         lines = islice(lines_of(file, path), dialect.first - 1, last)
-        number = dialect.first
-        while block := _up_to(lines, ROWS, WHOLE):
-            values = _quickly(block, dialect, places)
-            if values is None:
-                values = _row_by_row(path, block, number, dialect, places, lines)
-            if len(values):
-                yield values
-            number += len(block)
+        yield from blocks_of(lines, path, dialect, places)
+
+
+def blocks_of(
+    lines: Iterator[str], path: Path, dialect: Dialect, places: Sequence[int]
+) -> Iterator[Array]:
+    """The same of lines, from the first row of the table on."""
+    number = dialect.first
+    while block := _up_to(lines, ROWS, WHOLE):
+        values = _quickly(block, dialect, places)
+        if values is None:
+            values = _row_by_row(path, block, number, dialect, places, lines)
+        if len(values):
+            yield values
+        number += len(block)
 
 
 def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> Array | None:
@@ -130,24 +137,20 @@ def _row_by_row(
         if dialect.comments:
             cells = cells[: dialect.width]
         if len(cells) != dialect.width:
-            last = not any(each.strip() for each in lines[offset + 1 :]) and not any(
-                each.strip() for each in further
-            )
-            if last and not any(not is_lost(c) and _is_value(c, dialect) for c in cells):
+            numbers = [not is_lost(c) and _value(c, dialect) is not None for c in cells]
+            after = (each.strip() for rest in (lines[offset + 1 :], further) for each in rest)
+            if not any(numbers) and not any(after):
                 break  # an end mark
             message = f"{len(cells)} cells where the rows above have {dialect.width}"
-            problems.append(Problem(path, number + offset, 1, message))
-        else:
-            row = []
-            for place in places:
-                try:
-                    row.append(value_of(cells[place], dialect.decimal))
-                except ValueError:
-                    column = _column_of(line, place, dialect)
-                    message = f"{cells[place]!r} is no number, as the rest of its column is"
-                    problems.append(Problem(path, number + offset, column, message))
-                    break
-            values.append(row)
+            problems.append(dialect.problem(path, number + offset, message))
+            continue
+        row = [_value(cells[place], dialect) for place in places]
+        for place, value in zip(places, row, strict=True):
+            if value is None:
+                message = f"{cells[place][:100]!r} is no number, as the rest of its column is"
+                problems.append(dialect.problem(path, number + offset, message, line, place))
+                break
+        values.append(row)
         if len(problems) >= FEW:
             break
     if problems:
@@ -155,22 +158,9 @@ def _row_by_row(
     return np.array(values, dtype=np.float64).reshape(-1, len(places))
 
 
-def _is_value(cell: str, dialect: Dialect) -> bool:
+def _value(cell: str, dialect: Dialect) -> float | None:
+    """The number in a cell, NaN where it says that there is none; None where it is no number."""
     try:
-        value_of(cell, dialect.decimal)
+        return value_of(cell, dialect.decimal)
     except ValueError:
-        return False
-    return True
-
-
-def _column_of(line: str, place: int, dialect: Dialect) -> int:
-    """Where in a line a cell begins, from 1; of quoted cells about there."""
-    if dialect.separator == " ":
-        rest, at = line, 0
-        for _ in range(place):
-            at += len(rest) - len(rest.lstrip())
-            rest = rest.lstrip()
-            word = rest.split(maxsplit=1)[0]
-            at, rest = at + len(word), rest[len(word) :]
-        return at + len(rest) - len(rest.lstrip()) + 1
-    return sum(len(cell) + 1 for cell in line.split(dialect.separator)[:place]) + 1
+        return None

@@ -21,9 +21,12 @@ from typing import Any
 import numpy as np
 
 from campaign.errors import Problem
-from campaign.importing.apart import PATIENCE, REFUSED
 from campaign.importing.interface import Array, Clock, Column, RecordingError, Table
 
+REFUSED = 3
+"""How the process ends that has said what is wrong; any other end is the library's."""
+PATIENCE = 600.0
+"""s; a file that is silent for longer has sent its library round in circles."""
 _LENGTH = 8
 """Bytes before a block that say how many rows it has; after the last there are none."""
 

@@ -252,6 +252,7 @@ def _trial(
     # All parts are validated; constructing without validation shares one bench tree among the
     # trials of a point, where validation would copy it for each of up to 100 000.
     request = place.request
+    options = place.point.options_tree if request.planned else place.point.written
     requires, can_use = channels_of(test.experiment, request)
     swept = {**place.point.values, **request.point}
     with speaking_of(sides_in(place.bench_tree)):
@@ -264,7 +265,7 @@ def _trial(
         role=request.role,
         point=swept,
         told={**place.point.told, **told},
-        options={**place.point.options_tree, **request.options},
+        options={**options, **request.options},
         repeat=place.repeat,
         seed=place_hash(seed, place.point.values, place.index, place.repeat),
         bench=place.bench_tree,

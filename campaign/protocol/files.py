@@ -76,9 +76,9 @@ class Origin(Protocol):
 
 @dataclass(frozen=True)
 class Within:
-    """The part of a source that begins at `prefix`."""
+    """The part of a tree that begins at `prefix`."""
 
-    source: Source
+    source: Origin
     prefix: Keys = ()
 
     def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:

@@ -59,7 +59,8 @@ class PlannedTest:
 
     Attributes:
         bench: name of the bench's source.
-        options: normalised (SI), with the first value of whatever is swept.
+        options: normalised (SI), with the first value of whatever is swept; those that no trial
+            has, such as defaults beside recordings that nobody planned, are not among them.
         matrix: swept path to its values, normalised (SI).
         numbers: of its trials, in the order of execution.
         closest: for each limit the trial that uses most of it.
@@ -311,7 +312,11 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         description=entry.description,
         reproduces=entry.reproduces,
         bench=test.bench_name,
-        options=first.options_tree,
+        options={
+            name: value
+            for name, value in first.options_tree.items()
+            if any(name in each.options and each.options[name] == value for each in expanded.trials)
+        },
         matrix={path: tuple(values.values()) for path, values in matrix.items()},
         order=entry.order,
         seed=seed_of(test, master),

@@ -54,6 +54,11 @@ class Point:
     told: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def written(self) -> Tree:
+        """The options that the test writes, without any default."""
+        return self.options.model_dump(mode="json", exclude_unset=True)
+
+    @property
     def label(self) -> str:
         told = {path: self.told.get(path, value) for path, value in self.values.items()}
         return ", ".join(f"{path} = {value}" for path, value in told.items())

@@ -38,7 +38,7 @@ def wrong(found: tuple[Defect, ...]) -> list[str]:
 @pytest.mark.parametrize("kind", MOTIONS)
 def test_nothing_is_wrong_with_a_sound_recording(kind, seed):
     motion = MOTIONS[kind](seed)
-    assert wrong(find(motion.t, channels(motion), rate=1000.0)) == []
+    assert wrong(find(motion.t, channels(motion))) == []
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -130,7 +130,7 @@ def test_anything_at_all_is_looked_at_without_falling(seed):
     time = np.arange(n) / 100 if seed % 2 else series()
     names = ("relative_angle", "relative_rate", "motor_angle", "motor_rate", "drive_torque",
              "motor_current", "command", "reference", "odd")  # fmt: skip
-    for rate, gear in ((None, None), (100.0, 50.0)):
+    for gear in (None, 50.0):
         own = {name: series() for name in names if chance.uniform() < 0.8}
-        found = find(time, own, rate=rate, gear=gear, command="drive_torque", other_clock=time)
+        found = find(time, own, gear=gear)
         assert all(0 <= each.rows[0] <= each.rows[1] < max(n, 1) for each in found)

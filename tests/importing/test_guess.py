@@ -99,8 +99,8 @@ def test_what_is_wrong_with_a_recording_is_a_doubt(tmp_path):
     (tmp_path / "a.csv").write_text("time [s],angle [rad]\n" + "".join(rows))
     (table,) = guess([tmp_path / "a.csv"]).tables
     assert table.step == pytest.approx(1e-3)
-    assert any("10 samples missing behind row 1000" in doubt for doubt in table.doubts)
-    assert "# ? 10 samples missing" in mapping_text(guess([tmp_path / "a.csv"]))
+    assert any("10 samples are missing, before row 1001" in doubt for doubt in table.doubts)
+    assert "# ? 10 samples are missing" in mapping_text(guess([tmp_path / "a.csv"]))
 
 
 def test_axes_in_one_file_are_tests_of_their_own(tmp_path):

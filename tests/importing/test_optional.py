@@ -112,7 +112,7 @@ def test_dates_and_times_are_seconds(tmp_path, workbook):
     np.testing.assert_allclose(np.diff(table.whole([0]).ravel()), 0.1, atol=2e-5)
     assert any("10 us" in doubt for doubt in table.doubts)
     sheet.append([7, 8])
-    with pytest.raises(RecordingError, match=r"Sheet!A7: '7' is no time"):
+    with pytest.raises(RecordingError, match=r"Sheet!A7: '7, no time' is no number"):
         opened(saved(workbook, tmp_path), "excel")[0].whole()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import os
 import subprocess
 import sys
@@ -275,21 +276,81 @@ file = "a.csv"
         prepare(Request(str(tmp_path / "m.toml"), backend="import")).open_backend()
 
 
-def test_an_uncertainty_without_a_factor_is_a_share(tmp_path: Path):
-    """A torque sensor that is known to 2 %; in a unit of its own it would say nothing of what."""
-    plain = COLUMNS.replace('times = "2.5 N m/A"\n', "").replace('unit = "A"', 'unit = "N m"')
-    (trial,) = planned(tmp_path, plain.replace("0.05 N m/A", "2 %") + TEST + ENTRY).trials
+def test_all_mistakes_of_a_mapping_are_told_at_once(tmp_path: Path):
+    """Of its layout, its entries, its files, the column that tells trials apart, its windows."""
+    (tmp_path / "text.csv").write_text("nothing\n")
+    rows = "\n".join(f"{k},{0.05 * k:.6g},1" for k in range(100))
+    (tmp_path / "good.csv").write_text("t,pos,i\n" + rows)
+    other = COLUMNS.replace("columns.rig", "columns.other")
+    wrong = other.replace('unit = "deg"', 'accept = ["cliping", "spikee"]\nderive = "x"')
+    unfit = COLUMNS.replace('column = "pos"', 'column = "poss"').replace('"ms"', '"deg"')
+    good = COLUMNS.replace("columns.rig", "columns.good")
+    entries = [
+        'file = ["text.csv", "none.csv"]\ncolumns = "good"',
+        'file = "good.csv"\ncolumns = "rig"\neach = "runn"',
+        'file = "good.csv"\ncolumns = "rgi"',
+        'file = "gone.csv"\ncolumns = "other"',
+        'file = "good.csv"\ncolumns = "good"\nrestarts = true\nstart = "1 s"\neach = "pos"',
+        'file = "good.csv"\ncolumns = "good"\nwindows = { a = ["0 s", "9 s"] }',
+        'file = "good.csv"\ncolumns = "good"\nwindows = { b = ["1 s", "0 s"] }',
+    ]
+    text = wrong + unfit + good + TEST
+    told = refused(tmp_path, text + "".join(f"[[test.recording]]\n{each}\n" for each in entries))
+    for what in (
+        "'cliping' is nothing that is looked for",
+        "'spikee' is nothing that is looked for",
+        "it is a 'column' or it is derived",
+        "text.csv: no table of numbers",
+        "none.csv: it cannot be opened",
+        "gone.csv: it cannot be opened",
+        "there is no column 'poss'",
+        "'deg' is no unit of time",
+        "there is no column 'runn'",
+        "there is no [columns.rgi]",
+        "'start' is a time, and with 'restarts'",
+        "'each' and 'restarts' both tell trials apart",
+        "the window 'a', 0 to 9 s, is no part",
+        "the window 'b', 1 to 0 s, is no part",
+    ):
+        assert what in told, what
+
+
+def test_all_defects_of_a_recording_are_told_at_once(tmp_path: Path):
+    """Two channels that drop out in the second stretch and one in the first: three in all."""
+    time = range(4000)
+    angle = [math.sin(0.004 * k) for k in time]
+    rows = [
+        f"{k},{angle[k]:.9g},{0 if k % 2000 in (700, 701) else 1.5 + math.cos(0.003 * k):.9g},"
+        f"{0 if k in (2900, 2901) else 1.6 + math.sin(0.002 * k):.9g},{1 + k // 2000}"
+        for k in time
+    ]
+    text = COLUMNS.replace('unit = "deg"', 'unit = "rad"\nsign = 1') + TEST + ENTRY
+    more = '[columns.rig.motor_current]\ncolumn = "i"\nunit = "A"\n'
+    more += '[columns.rig.gyro_rate]\ncolumn = "g"\nunit = "rad/s"\n'
+    told = refused(
+        tmp_path,
+        text.replace("[[test]]", more + "[[test]]") + 'each = "run"\n',
+        "t,pos,i,g,run\n" + "\n".join(rows),
+    )
+    assert "motor_current is zero in the middle of motion, rows 701 to 702" in told
+    assert "gyro_rate is zero in the middle of motion, rows 901 to 902" in told
+
+
+@pytest.mark.parametrize(("uncertainty", "share"), [("2 %", 0.02), ("", None)])
+def test_the_scale_of_a_column_without_a_constant_may_be_uncertain(
+    tmp_path: Path, uncertainty: str, share: float | None
+):
+    line = f'\nuncertainty = "{uncertainty}"' if uncertainty else ""
+    text = COLUMNS.replace('unit = "deg"', 'unit = "deg"' + line) + TEST + ENTRY
+    (trial,) = planned(tmp_path, text).trials
     known = {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
-    assert known["drive_torque"] == pytest.approx(0.02)
-    assert "write it as a share" in refused(tmp_path, plain + TEST + ENTRY)
+    assert known["relative_angle"] == share
+    assert known["relative_rate"] == share  # what is made of it has its scale
 
 
-def test_all_mistakes_of_a_column_and_of_an_entry_are_told_at_once(tmp_path: Path):
-    wrong = COLUMNS.replace('times = "2.5 N m/A"\n', 'accept = ["nothing"]\n')
-    told = refused(tmp_path, wrong + TEST + ENTRY + "where = { column = 1, equals = 2 }\n")
-    assert "'nothing' is nothing that is looked for" in told
-    assert "write it as a share" in told
-    entry = 'each = "run"\nrestarts = true\nstart = "1 s"\n'
-    told = refused(tmp_path, COLUMNS + TEST + ENTRY + entry)
-    assert "both tell trials apart" in told
-    assert "is a time, and with 'restarts'" in told
+def test_an_uncertainty_with_a_unit_needs_the_constant_that_it_is_of(tmp_path: Path):
+    text = COLUMNS.replace('unit = "deg"', 'unit = "deg"\nuncertainty = "0.1 deg"') + TEST + ENTRY
+    told = refused(tmp_path, text)
+    assert "m.toml:4:" in told
+    assert "'0.1 deg' has no 'times' that it could be of; without one it is a share" in told
+    assert "\n" not in told

@@ -40,23 +40,3 @@ def test_only_options_that_acted_are_conditions() -> None:
     assert both - one == {"torque"}
     assert "amplitude" not in labels(opened)
     assert "torque" in labels(_asked(closed, options_of_another_version=1))  # nobody can tell
-
-
-def test_what_nobody_executed_is_no_condition_of_a_recording() -> None:
-    """A recorded ramp: the share of the fit is written; the slope is a default."""
-    (ramp, *_) = trials("breakaway", bench(), {"fit_share": 0.7, "directions": ["positive"]})
-    recorded = ramp.task.model_copy(update={"mode": "recorded"})
-    for task, told in ((recorded, False), (ramp.task, True)):
-        test = SimpleNamespace(
-            kind="breakaway",
-            bench=None,
-            result=Result(),
-            source="",
-            failed=(),
-            trials=(SimpleNamespace(trial=ramp.model_copy(update={"task": task})),),
-            options=ramp.options,
-            experiment=experiments()["breakaway"],
-        )
-        found = {name for name, _ in conditions_of(test)}  # type: ignore[arg-type]
-        assert "fit share" in found
-        assert ({"peak torque", "torque rate"} <= found) is told

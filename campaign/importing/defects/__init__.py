@@ -1,7 +1,7 @@
 """What is wrong with a recording: pure functions on arrays.
 
 Nothing is repaired because it was found: what a mapping asks for is done where channels are made of
-columns (`importing.made`), times a clock (`importing.even_clock`) and samples read.
+columns (`importing.made`), times a clock (`even_clock`) and samples read.
 """
 
 from campaign.importing.defects.defect import Defect, Severity

@@ -14,60 +14,34 @@ from campaign.importing.defects.defect import (
     rows_in_words,
     runs,
     step_size,
-    usual_step,
 )
 
 SAME = 0.999
 """Share of a channel's variance that another explains when both are one signal."""
 
 
-def of_drive(name: str, values: Array, command: Array | None = None) -> Iterator[Defect]:
-    """Where a torque, a force or a current is clipped: it stands at its extreme while more was due.
-
-    Args:
-        command: what was asked of the same quantity, in the same unit; a plateau of it explains
-            one of the channel, and a command beyond it proves the clipping.
-    """
+def of_drive(name: str, values: Array) -> Iterator[Defect]:
+    """Where a torque, a force or a current is clipped: it stands at its extreme."""
     known = values[np.isfinite(values)]
     if len(known) < 100 or np.ptp(known) == 0:
         return
     peak = float(np.abs(known).max())
-    usual = usual_step(values)
     for extreme in (float(known.max()), float(known.min())):
         at = values == extreme
-        share = float(at.mean())
-        if abs(extreme) < 0.5 * peak or share < 0.005:
+        if abs(extreme) < 0.5 * peak or at.mean() < 0.005:
             continue
         long = [(first, last) for first, last in runs(at) if last - first >= 4]
-        if command is not None:
-            long = [each for each in long if not _asked(values, command, each, usual)]
-        elif _repeats(values):
+        if _repeats(values):
             long = [each for each in long if _cut(values, each)]
         rows = sum(last - first + 1 for first, last in long)
         if rows < 0.005 * len(values):
             continue
-        beyond = command is not None and any(
-            np.abs(command[first : last + 1]).max() > 1.02 * abs(extreme) + usual
-            for first, last in long
-        )
-        why = ", where the command went beyond" if beyond else ""
         what = (
             f"{name} stands at its extreme {extreme:.6g} for {100 * rows / len(values):.3g} % of "
-            f"the samples, first in {rows_in_words(*long[0])}{why}"
+            f"the samples, first in {rows_in_words(*long[0])}"
         )
-        severity = Severity.REFUSED if beyond else Severity.REPAIRABLE
         ends = (long[0][0], long[-1][1])
-        yield Defect("clipping", (name,), what, ends, extreme, severity)
-
-
-def _asked(values: Array, command: Array, stretch: tuple[int, int], usual: float) -> bool:
-    """Whether a plateau is one of the command, to which the channel has come."""
-    first, last = stretch
-    asked = command[first : last + 1]
-    level = values[first]
-    return bool(
-        np.ptp(asked) <= usual and abs(float(asked[0]) - level) <= 0.02 * abs(level) + usual
-    )
+        yield Defect("clipping", (name,), what, ends, extreme, Severity.REPAIRABLE)
 
 
 def _repeats(values: Array) -> bool:

@@ -23,9 +23,9 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.importing.defects.between import of_rate
-from campaign.importing.defects.clock import drift_between, of_time
 from campaign.importing.defects.defect import Array, Defect, Severity
 from campaign.importing.defects.drives import of_drive, of_drive_sign, of_twins
+from campaign.importing.defects.even_clock import of_time
 from campaign.importing.defects.late import of_drive_delay
 from campaign.importing.defects.rates import frozen, slower
 from campaign.importing.defects.samples import continuous, of_channel
@@ -42,23 +42,14 @@ _ORDER = {Severity.REFUSED: 0, Severity.REPAIRABLE: 1, Severity.NOTED: 2}
 
 
 def find(
-    time: Array,
-    channels: Mapping[str, Array],
-    *,
-    rate: float | None = None,
-    gear: float | None = None,
-    command: str | None = None,
-    other_clock: Array | None = None,
+    time: Array, channels: Mapping[str, Array], *, gear: float | None = None
 ) -> tuple[Defect, ...]:
     """What is wrong with a recording, the worst first.
 
     Args:
         time: shape (n,), s.
         channels: by their name in the vocabulary, each shape (n,), in one system of units.
-        rate: what the clock's is said to be, Hz.
         gear: ratio of motor to load, where it is known.
-        command: which channel the command is the target of, such as `drive_torque`.
-        other_clock: a second one that stamped the same samples, shape (n,), s.
     """
     found = [*_absurd({"time": time, **channels})]
     if any(not each.channels for each in found):
@@ -68,9 +59,7 @@ def find(
         for name, values in channels.items()
         if not any(name in each.channels for each in found)
     }
-    found += of_time(time, rate)
-    if other_clock is not None:
-        found += drift_between(time, other_clock)
+    found += of_time(time)
     sound = {}
     # What follows a command that is drawn by lines is drawn by lines, too.
     drawn = {
@@ -89,8 +78,7 @@ def find(
     found += frozen({name: v for name, v in sound.items() if name not in TOLD})
     for name in DRIVES:
         if name in sound:
-            asked = sound.get(COMMAND) if command == name else None
-            found += of_drive(name, sound[name], asked)
+            found += of_drive(name, sound[name])
     if np.isfinite(time).all() and len(time) > 1 and np.all(np.diff(time) >= 0):
         found += _between(time, sound, gear)
     return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))

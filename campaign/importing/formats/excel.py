@@ -1,4 +1,4 @@
-"""Excel workbooks (`.xlsx`): each sheet with a table of numbers; needs openpyxl.
+"""Excel workbooks (`.xlsx`): each sheet is read as lines of a text table; needs openpyxl.
 
 What is read is what Excel last computed and stored: a formula that it never computed has no value.
 Of merged cells only the first holds their text. Dates and times of day become seconds.
@@ -8,29 +8,27 @@ from __future__ import annotations
 
 import datetime as dt
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from campaign.errors import Problem
-from campaign.importing.cells import is_lost, is_number, is_unit, plain, value_of
-from campaign.importing.heading import heading
+from campaign.importing.cells import is_number, is_unit, plain, value_of
+from campaign.importing.dialect import Dialect, letters, read_as
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
-    ROWS,
     Array,
     Column,
     RecordingError,
     RecordingFormat,
     Table,
 )
+from campaign.importing.rows import blocks_of
 from campaign.importing.streaming import tables_streamed
 
 SAMPLE = 200
@@ -38,54 +36,123 @@ SAMPLE = 200
 DAY = 86400.0
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _MOMENTS = (dt.datetime, dt.date, dt.time, dt.timedelta)
+_ERRORS = frozenset({"#NULL!", "#DIV/0!", "#VALUE!", "#REF!", "#NAME?", "#NUM!", "#N/A"})
 Cells = Sequence[Any]
-
-
-@dataclass(frozen=True)
-class _Sheet:
-    """Where the table of a sheet is, and how its columns are written.
-
-    Attributes:
-        first: row of its first numbers, from 1.
-        kinds: of each column: `number`, `moment` or `text`.
-        decimals: the decimal sign of numbers that are text.
-    """
-
-    name: str
-    first: int
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    kinds: tuple[str, ...]
-    decimals: tuple[str, ...]
 
 
 def tables(path: Path) -> Sequence[Table]:
     """The tables of a workbook, in the process that asks."""
     _check_size(path)
     with _opened(path) as book:
-        found = [sheet for each in book.worksheets if (sheet := _sheet(path, each)) is not None]
+        found = [each for sheet in book.worksheets for each in _table(path, sheet)]
     if not found:
         raise _error(path, "no sheet of it has a table of numbers")
-    for sheet in found:
-        _check_formulas(path, sheet)
-    return [
-        Table(
-            sheet.name,
-            tuple(
-                Column(name, unit or ("s" if kind == "moment" else ""), place, kind != "text")
-                for name, unit, kind, place in zip(
-                    sheet.names,
-                    sheet.units,
-                    sheet.kinds,
-                    (f"column {_letters(k)}" for k in range(len(sheet.names))),
-                    strict=True,
-                )
-            ),
-            partial(_read, path, sheet),
-            doubts=_doubts(sheet),
-        )
-        for sheet in found
+    return found
+
+
+def _table(path: Path, sheet: Any) -> Iterator[Table]:
+    """The table of a sheet, if it has one."""
+    sample = list(islice(_rows(sheet), SAMPLE))
+    texts = [[_text(cell) for cell in cells] for cells in sample]
+    width = max((k + 1 for cells in texts for k, cell in enumerate(cells) if cell), default=0)
+    texts = [[*cells, *[""] * width][:width] for cells in texts]
+    start = next((k for k, cells in enumerate(texts) if _is_row(cells)), None)
+    found = None if start is None else read_as(list(_lines(_heading(texts, start))), "\t", ".")
+    if found is None:
+        return
+    dialect = replace(found[1], sheet=sheet.title)
+    body = [[*cells, *[None] * width][:width] for cells in sample[dialect.first - 1 :]]
+    moments = {k for cells in body for k, cell in enumerate(cells) if isinstance(cell, _MOMENTS)}
+    commas = {k for cells in body for k, cell in enumerate(cells) if _has_comma(cell)}
+    names = [
+        (dialect.names[k] if dialect.names else "") or f"column {letters(k)}"
+        for k in range(len(dialect.numeric))
     ]
+    doubts = []
+    if commas:
+        told = ", ".join(names[k] for k in sorted(commas))
+        doubts.append(f"numbers of {told} are text with a decimal comma")
+    if moments:
+        doubts.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
+    columns = (
+        Column(name, unit or ("s" if k in moments else ""), f"column {letters(k)}", numeric)
+        for k, (name, unit, numeric) in enumerate(
+            zip(names, dialect.units, dialect.numeric, strict=True)
+        )
+    )
+    _check_formulas(path, dialect)
+    yield Table(
+        sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=tuple(doubts)
+    )
+
+
+def _read(
+    path: Path, dialect: Dialect, moments: Container[int], places: Sequence[int]
+) -> Iterator[Array]:
+    """Columns in `places`; `moments`: those of dates and times."""
+    with _opened(path) as book:
+        rows = islice(_rows(book[dialect.sheet]), dialect.first - 1, None)
+        texts = ([_value(cell, k in moments) for k, cell in enumerate(cells)] for cells in rows)
+        padded = ([*cells, *[""] * (dialect.width - len(cells))] for cells in texts)
+        lines = (f"{line}\n" for line in _lines(padded, dialect.width))
+        yield from blocks_of(lines, path, dialect, places)
+
+
+def _lines(rows: Iterable[list[str]], width: int = 0) -> Iterator[str]:
+    """Rows as lines; one goes on behind the columns of the table only with what is no blank."""
+    for cells in rows:
+        while width and len(cells) > width and not cells[-1]:
+            cells.pop()
+        yield "\t".join(cells) if any(cells) else ""
+
+
+def _text(cell: Any) -> str:
+    """A cell as a text file would have it; numbers with a point."""
+    if cell is None or cell in _ERRORS:
+        return ""
+    if isinstance(cell, _MOMENTS):
+        from openpyxl.utils.datetime import to_excel
+
+        return repr(float(to_excel(cell)) * DAY)
+    if isinstance(cell, (int, float)):
+        return repr(float(cell))
+    text = " ".join(plain(str(cell)).split())
+    return repr(value_of(text, ",")) if _has_comma(cell) else text
+
+
+def _value(cell: Any, moment: bool) -> str:
+    """The same of a column of dates and times, or of one of numbers; what is not of it is none."""
+    if isinstance(cell, (int, float) if moment else _MOMENTS):
+        return f"{cell}, {'no' if moment else 'a'} time"
+    return _text(cell)
+
+
+def _has_comma(cell: Any) -> bool:
+    text = plain(cell) if isinstance(cell, str) else ""
+    return is_number(text, ",") and not is_number(text, ".")
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    """Whether half of what a row holds are numbers."""
+    figures = [is_number(cell, ".") for cell in cells if cell]
+    return any(figures) and 2 * sum(figures) >= len(figures)
+
+
+def _heading(rows: list[list[str]], start: int) -> list[list[str]]:
+    """The rows, those above row `start` made a heading: where cells are merged one goes on in the
+    next, and what an empty row parts from the table is none.
+    """
+    found: list[list[str]] = []
+    for cells in rows[:start]:
+        given = [cell for cell in cells if cell]
+        goes_on = 2 * len(given) >= len(cells) > len(given) and not all(map(is_unit, given))
+        if not given and start < len(rows):
+            found = [[] for _ in found]
+        elif found and goes_on and not all(found[-1]):
+            cells = [own or upper for own, upper in zip(cells, found[-1] or cells, strict=True)]
+            found[-1] = []
+        found.append(cells)
+    return [*found, *rows[start:]]
 
 
 def _check_size(path: Path) -> None:
@@ -126,145 +193,19 @@ def _rows(sheet: Any) -> Iterator[Cells]:
     return rows
 
 
-def _sheet(path: Path, sheet: Any) -> _Sheet | None:
-    """The table of a sheet; None where it has none."""
-    sample = list(islice(_rows(sheet), SAMPLE))
-    fits = [_is_row(cells) for cells in sample]
-    begins = (k for k, fit in enumerate(fits) if fit and 2 * sum(fits[k:]) > len(fits) - k)
-    start = next(begins, None)
-    if start is None:
-        return None
-    body = [cells for cells in sample[start:] if any(cell is not None for cell in cells)]
-    width = max(len(cells) for cells in body)
-    body = [[*cells, *[None] * (width - len(cells))] for cells in body]
-    used = [any(cells[k] is not None for cells in body) for k in range(width)]
-    while used and not used[-1]:
-        used.pop()
-    width = len(used)
-    above = [
-        [_text(cell) for cell in [*cells, *[None] * width][:width]] for cells in sample[:start]
-    ]
-    names, units, _ = heading(_filled(above), width)
-    columns = [[cells[k] for cells in body] for k in range(width)]
-    kinds = tuple(map(_kind, columns))
-    names = names or tuple(f"column {_letters(k)}" for k in range(width))
-    if all(kind == "text" for kind in kinds):
-        return None
-    decimals = tuple(map(_decimal, columns))
-    return _Sheet(sheet.title, start + 1, names, units, kinds, decimals)
-
-
-def _filled(above: list[list[str]]) -> list[list[str]]:
-    """The heading's rows; one with blanks goes on in the next, where cells are merged."""
-    empty = [k for k, cells in enumerate(above) if not any(cells)]
-    after = above[empty[-1] + 1 :] if empty else above
-    rows = after or [cells for cells in above if any(cells)]  # what is apart is no heading
-    found: list[list[str]] = []
-    for cells in rows:
-        given = [cell for cell in cells if cell]
-        goes_on = 2 * len(given) >= len(cells) > len(given) and not all(map(is_unit, given))
-        if found and goes_on and not all(found[-1]):
-            found[-1] = [own or upper for own, upper in zip(cells, found[-1], strict=True)]
-        else:
-            found.append(cells)
-    return found
-
-
-def _text(cell: Any) -> str:
-    return "" if cell is None else plain(str(cell))
-
-
-def _is_figure(cell: Any) -> bool:
-    return isinstance(cell, (int, float, *_MOMENTS)) or (isinstance(cell, str) and _fits(cell))
-
-
-def _fits(text: str) -> bool:
-    return is_number(plain(text), ".") or is_number(plain(text), ",")
-
-
-def _is_row(cells: Cells) -> bool:
-    given = [cell for cell in cells if cell is not None]
-    figures = sum(map(_is_figure, given))
-    return figures > 0 and 2 * figures >= len(given)
-
-
-def _kind(column: Cells) -> str:
-    given = [cell for cell in column if cell is not None and not _is_lost(cell)]
-    if given and sum(isinstance(cell, _MOMENTS) for cell in given) * 2 > len(given):
-        return "moment"
-    return "number" if not given or 2 * sum(map(_is_figure, given)) > len(given) else "text"
-
-
-def _decimal(column: Cells) -> str:
-    texts = [plain(cell) for cell in column if isinstance(cell, str) and _fits(cell)]
-    return "," if any(not is_number(text, ".") for text in texts) else "."
-
-
-def _is_lost(cell: Any) -> bool:
-    return isinstance(cell, str) and (is_lost(plain(cell)) or cell.startswith("#"))
-
-
-def _doubts(sheet: _Sheet) -> tuple[str, ...]:
-    comma = [name for name, sign in zip(sheet.names, sheet.decimals, strict=True) if sign == ","]
-    told = [f"numbers of {', '.join(comma)} are text with a decimal comma"] if comma else []
-    if "moment" in sheet.kinds:
-        told.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
-    return tuple(told)
-
-
-def _read(path: Path, sheet: _Sheet, places: Sequence[int]) -> Iterator[Array]:
-    with _opened(path) as book:
-        rows = islice(_rows(book[sheet.name]), sheet.first - 1, None)
-        number = sheet.first
-        while chunk := list(islice(rows, ROWS)):
-            values = [
-                [_value(path, sheet, number + k, place, cells) for place in places]
-                for k, cells in enumerate(chunk)
-                if any(cell is not None for cell in cells)
-            ]
-            if values:
-                yield np.array(values, dtype=np.float64).reshape(-1, len(places))
-            number += len(chunk)
-
-
-def _value(path: Path, sheet: _Sheet, row: int, place: int, cells: Cells) -> float:
-    cell = cells[place] if place < len(cells) else None
-    moment = isinstance(cell, _MOMENTS)
-    if cell is None or _is_lost(cell):
-        return float("nan")
-    if moment == (sheet.kinds[place] == "moment"):
-        if moment:
-            from openpyxl.utils.datetime import to_excel
-
-            return float(to_excel(cell)) * DAY
-        if isinstance(cell, (int, float)):
-            return float(cell)
-        if isinstance(cell, str) and is_number(plain(cell), sheet.decimals[place]):
-            return value_of(plain(cell), sheet.decimals[place])
-    where = f"{sheet.name}!{_letters(place)}{row}"
-    kind = "time" if sheet.kinds[place] == "moment" else "number"
-    raise _error(path, f"{where}: {str(cell)[:100]!r} is no {kind}, as the rest of its column is")
-
-
-def _check_formulas(path: Path, sheet: _Sheet) -> None:
+def _check_formulas(path: Path, dialect: Dialect) -> None:
     """Raises RecordingError for a formula among the first rows whose value is not in the file."""
     with _opened(path) as book, _opened(path, values=False) as asked:
         told, written = (
-            islice(_rows(each[sheet.name]), sheet.first - 1, sheet.first - 1 + SAMPLE)
+            islice(_rows(each[dialect.sheet]), dialect.first - 1, dialect.first - 1 + SAMPLE)
             for each in (book, asked)
         )
-        for row, (values, texts) in enumerate(zip(told, written, strict=False), start=sheet.first):
+        for row, (values, texts) in enumerate(zip(told, written, strict=False), dialect.first):
             for place, text in enumerate(texts):
                 value = values[place] if place < len(values) else None
                 if value is None and isinstance(text, str) and text.startswith("="):
-                    where = f"{sheet.name}!{_letters(place)}{row}"
-                    message = f"{where}: a formula whose value is not in the file; open and save it"
-                    raise _error(path, f"{message} in Excel")
-
-
-def _letters(place: int) -> str:
-    """A column as Excel names it: 0 is A, 26 is AA."""
-    return (_letters(place // 26 - 1) if place >= 26 else "") + chr(ord("A") + place % 26)
+                    message = "a formula whose value is not in the file; open and save it in Excel"
+                    raise RecordingError([dialect.problem(path, row, message, place=place)])
 
 
 def _error(path: Path, message: str) -> RecordingError:

@@ -17,7 +17,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from campaign.errors import Problem
-from campaign.importing.apart import tables_apart
 from campaign.importing.arrays import Named, named, table_of, tables_of
 from campaign.importing.interface import (
     LARGEST_PART,
@@ -26,6 +25,7 @@ from campaign.importing.interface import (
     RecordingFormat,
     Table,
 )
+from campaign.importing.streaming import tables_streamed
 
 MOST_TIMES = 100
 """How many times its own size a file may unpack to; what is measured has noise, and does not."""
@@ -241,5 +241,5 @@ FORMAT = RecordingFormat(
     "MAT file of version 4 to 7.2",
     (".mat",),
     _recognises,
-    partial(tables_apart, __name__),
+    partial(tables_streamed, __name__),
 )

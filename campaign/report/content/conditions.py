@@ -33,7 +33,6 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
         yield f"{path_words(path)} (swept)", units.words(path, values)
     told = points.keys() | _without_effect(test)
     told |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
-    told |= _not_executed(test)
     for path, value in test.options.items():
         if path not in told and value is not None and value != []:
             yield path_words(path), units.value(path, value)
@@ -73,18 +72,6 @@ def _without_effect(test: AnalysedTest) -> frozenset[str]:
     except ValueError:  # of another version of the experiment
         return frozenset()
     return frozenset.intersection(*found)
-
-
-def _not_executed(test: AnalysedTest) -> frozenset[str]:
-    """Options that a test of recordings does not write: nobody executed what their defaults say."""
-    recorded = [archived.trial.task.mode == "recorded" for archived in test.trials]
-    if not recorded or not all(recorded) or test.experiment is None:
-        return frozenset()
-    try:
-        defaults = options_of(test.experiment, {}).model_dump(mode="json")
-    except ValueError:  # it cannot be without any
-        return frozenset()
-    return frozenset(path for path, value in test.options.items() if value == defaults.get(path))
 
 
 def summary_of(test: AnalysedTest) -> str:

@@ -207,7 +207,11 @@ def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[st
         "Options of the test": tuple(
             tree_settings(trial.options)
             if options is None
-            else settings_of(options, tuple(options.without_effect()))
+            # Analyses fill in defaults that a trial from elsewhere was never executed with.
+            else settings_of(
+                options,
+                (*options.without_effect(), *(type(options).model_fields.keys() - trial.options)),
+            )
         ),
         "Bench": (("name", bench.name), *told) if bench else told,
         "Work of the backend": tuple(_flat(archived.ending.telemetry)),

@@ -7,15 +7,13 @@ the mapping does not ask for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.importing.cutting import restarts
-from campaign.importing.defects.clock import ticks
-from campaign.importing.defects.defect import counted
-from campaign.importing.interface import Array
+from campaign.importing.defects.clock import SHORTEST, restarts, ticks
+from campaign.importing.defects.defect import Array, Defect, Severity, counted
 
 TOLERANCE = 0.25
 """of a sample by which a time may be off an even clock: half of what would name another sample."""
@@ -62,7 +60,6 @@ class _Seen:
     back: tuple[int, ...]  # rows whose time is not after that of the row before
     gaps: tuple[int, ...]  # rows before which rows are missing
     undefined: tuple[int, ...]
-    missing: int
 
 
 def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ()) -> EvenClock:
@@ -91,6 +88,17 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
         raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
     clock = times(first, first + rows)
     return _repaired(clock, first, _look(clock, first), repairs)
+
+
+def of_time(time: Array) -> Iterator[Defect]:
+    """What an import would refuse of times, shape (n,), s."""
+    rows = (0, len(time) - 1)
+    try:
+        if len(time) >= SHORTEST:
+            with np.errstate(all="ignore"):
+                even_clock(lambda first, stop: time[first:stop], 0, len(time))
+    except UnevenError as error:
+        yield Defect("uneven", (), str(error), rows, 0.0, Severity.REPAIRABLE, "repair")
 
 
 def _furthest(
@@ -129,13 +137,11 @@ def _look(clock: Array, first: int) -> _Seen:
     step = told.step if told.resolution else float(np.median(forward))
     back = np.flatnonzero(steps <= 0) + 1
     gaps = np.flatnonzero(steps > GAP * step) + 1
-    # A gap among jittering times is one only if the clock is late behind it.
-    missing = int(np.sum(np.rint(steps[gaps - 1] / step) - 1)) if len(gaps) else 0
 
     def rows(found: np.ndarray) -> tuple[int, ...]:
         return tuple(int(k) + first for k in found)
 
-    return _Seen(step, rows(back), rows(gaps), rows(undefined), missing)
+    return _Seen(step, rows(back), rows(gaps), rows(undefined))
 
 
 def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> EvenClock:
