@@ -15,7 +15,7 @@ import pytest
 
 from campaign.importing.guess import Basis, ColumnGuess, guess, mapping_text
 from campaign.importing.guess.names import named
-from campaign.importing.guess.quantities import INDEX, UNKNOWN
+from campaign.importing.guess.words import INDEX, UNKNOWN
 from campaign.unit_grammar import parse_unit
 from tests.importing.listed import Listed, listed
 from tests.importing.mutilated import mutilate
