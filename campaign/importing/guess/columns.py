@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -76,7 +75,6 @@ class TableGuess:
     restarts: int
     below: bool
     doubts: tuple[str, ...]
-    said: Mapping[str, str]
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,10 @@ import numpy as np
 
 from campaign.importing.cutting import restarts
 from campaign.importing.defects.clock import ticks
+from campaign.importing.guess import numbers
 from campaign.importing.guess.axes import axes
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGuess
 from campaign.importing.guess.names import BY_UNIT, named
-from campaign.importing.guess.numbers import (
-    counts,
-    evenly,
-    increases,
-    likely,
-    stated_rate,
-    unit_by_range,
-    unit_of_time,
-)
 from campaign.importing.guess.relations import Series, with_roles, with_units
 from campaign.importing.guess.words import INDEX, TIME, UNKNOWN
 from campaign.importing.interface import Array, Column, Table
@@ -82,9 +74,9 @@ def _by_name(column: Column, values: Array | None) -> ColumnGuess:
     known = values[np.isfinite(values)]
     if len(known):
         found = replace(found, low=float(known.min()), high=float(known.max()))
-    if found.role in (TIME, INDEX) and not increases(values):
+    if found.role in (TIME, INDEX) and not numbers.increases(values):
         return replace(found, role=UNKNOWN, why=f"a name of {found.role}, but it does not increase")
-    if found.role != TIME and found.why in ("", BY_UNIT) and counts(values):
+    if found.role != TIME and found.why in ("", BY_UNIT) and numbers.counts(values):
         return replace(found, role=INDEX, why="it counts rows")
     if found.role == TIME and len(known) < len(values):
         return replace(found, doubts=(f"{len(values) - len(known)} of its cells hold no number",))
@@ -100,7 +92,7 @@ def _with_time(columns: list[ColumnGuess], series: Series) -> list[ColumnGuess]:
     for place, values in series.items():
         each = columns[place]
         matrix = each.name.endswith(("(1,:)", "(:,1)"))
-        if (matrix or (each.role == UNKNOWN and not each.why)) and evenly(values):
+        if (matrix or (each.role == UNKNOWN and not each.why)) and numbers.evenly(values):
             doubt = ("its name does not say so",)
             columns[place] = replace(each, role=TIME, why="it increases evenly", doubts=doubt)
             begin = each.name[: each.name.rindex("(")] if matrix else None
@@ -113,7 +105,9 @@ def _of_table(
 ) -> TableGuess:
     rows = len(next(iter(series.values()), ()))
     columns, time = _timed(columns, series, table, rows)
-    columns = [unit_by_range(c, series[k]) if k in series else c for k, c in enumerate(columns)]
+    columns = [
+        numbers.unit_by_range(c, series[k]) if k in series else c for k, c in enumerate(columns)
+    ]
     doubts, step, anew = table.doubts, None, []
     if time is None:
         doubts = (*doubts, "no time is known: state a rate, or which column holds times")
@@ -123,7 +117,7 @@ def _of_table(
         columns = with_units(with_roles(columns, series, time), series, time)
     return TableGuess(
         path, form, table.name, tuple(columns), rows, step, table.clock is not None, len(anew),
-        table.below, tuple(doubts), table.said,
+        table.below, tuple(doubts),
     )  # fmt: skip
 
 
@@ -138,7 +132,7 @@ def _timed(
         values = np.interp(np.arange(rows), np.flatnonzero(known), series[place][known])
         if each.basis is not Basis.STATED:
             once = np.split(values, restarts(values)[:1])[0]
-            each = likely(each, *unit_of_time(once, stated_rate(table.said)))
+            each = numbers.likely(each, *numbers.unit_of_time(once))
         if each.unit:
             columns = [*columns[:place], each, *columns[place + 1 :]]
             return columns, (values - values[0]) * float(parse_unit(each.unit).factor)

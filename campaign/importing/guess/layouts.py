@@ -114,12 +114,8 @@ def _axis_by_axis(tables: Tables) -> Iterator[Layout]:
         for number, table in enumerate(tables, start=1)
         for place, column in enumerate(table.columns, start=1)
     )
-    axes = {each.column.axis for each in columns if each.column.is_channel} - {""}
-    for axis in sorted(axes, key=_naturally) if len(axes) > 1 else [""]:
+    found = dict.fromkeys(each.column.axis for each in columns if each.column.is_channel)
+    axes = list(filter(None, found))
+    for axis in axes if len(axes) > 1 else [""]:
         own = tuple(p for p in columns if not axis or p.column.axis in ("", axis))
         yield Layout("", tables, own, axis)
-
-
-def _naturally(text: str) -> list[tuple[int, str]]:
-    """Numbers by size: axis 10 comes after axis 2."""
-    return [(int(word), "") if word.isdigit() else (-1, word) for word in text.split()]

@@ -68,6 +68,10 @@ _UNIT_BEHIND = re.compile(
     r"(?P<name>.*?)\s*(?:[\[(<](?P<unit>[^\[\]()<>]*)[\])>]|\sin\s+(?P<of>\S+)"
     r"|(?<=[^/\s])\s*/\s*(?P<per>[^/\s]+))"
 )
+_FORCE = parse_unit("N").dimensions
+_LOADED = WORDS["load"] | WORDS["neutral"]
+_CHANGES = frozenset().union(*(WORDS[k] for k in ("target", "motor", "load", "sensed", "neutral")))
+"""What a word behind a letter may say for the letter to be a quantity."""
 BY_UNIT = "its unit, and nothing else"
 
 
@@ -199,39 +203,41 @@ def _kind(said: Sequence[str], by_unit: str) -> tuple[str, str]:
     return kind, why
 
 
-_CHANGES = frozenset().union(*(WORDS[k] for k in ("target", "motor", "load", "sensed", "neutral")))
+_CHANNELS = (
+    ("warmth", "target", UNKNOWN),
+    ("warmth", "", channels.TEMPERATURE),
+    ("torque", "normal", channels.NORMAL_LOAD),
+    ("angle", "target", channels.REFERENCE),
+    ("", "target", channels.COMMAND),
+    ("target", "", channels.COMMAND),
+    ("current", "", channels.MOTOR_CURRENT),
+    ("torque", "estimate", UNKNOWN),
+    ("torque", "sensed", channels.JOINT_TORQUE),
+    ("torque", "", channels.DRIVE_TORQUE),
+    ("rate", "hull", channels.BASE_RATE),
+    ("rate", "gyro", channels.GYRO_RATE),
+    ("angle", "load", channels.RELATIVE_ANGLE),
+    ("rate", "load", channels.RELATIVE_RATE),
+    ("angle", "motor", channels.MOTOR_ANGLE),
+    ("rate", "motor", channels.MOTOR_RATE),
+    ("angle", "", channels.RELATIVE_ANGLE),
+    ("rate", "", channels.RELATIVE_RATE),
+)
+"""The channel of a quantity of which a word says that; the first that fits."""
 
 
 def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ...]]:
     """The channel of the vocabulary, and what a reader should know of it."""
-
-    def has(change: str) -> bool:
-        return not WORDS[change].isdisjoint(said)
-
     if kind in (TIME, INDEX, UNKNOWN):
         return kind, ()
-    target = kind == "target" or has("target")
-    if kind == "warmth":
-        return (UNKNOWN if target else channels.TEMPERATURE), ()
-    load = (WORDS["load"] | WORDS["neutral"]).issuperset(said) and unit
-    if kind == "torque" and (
-        has("normal") or (load and parse_unit(unit).dimensions == parse_unit("N").dimensions)
-    ):
-        return channels.NORMAL_LOAD, ()
-    if target:
-        return (channels.REFERENCE if kind == "angle" else channels.COMMAND), ()
-    estimate = ("an estimate, and not what a sensor showed",) if has("estimate") else ()
-    if kind == "current":
-        return channels.MOTOR_CURRENT, estimate
-    if kind == "torque" and estimate:
-        return UNKNOWN, ()
-    if kind == "torque" and (has("sensed") or "j" in said[1:]):
-        return channels.JOINT_TORQUE, estimate
-    if kind == "rate" and (has("hull") or has("gyro")):
-        return (channels.BASE_RATE if has("hull") else channels.GYRO_RATE), estimate
-    turning = kind == "rate" and (unit == "rpm" or not {"rpm", "drehzahl"}.isdisjoint(said))
-    if kind != "torque" and (has("motor") or turning) and not has("load"):
-        return (channels.MOTOR_ANGLE if kind == "angle" else channels.MOTOR_RATE), estimate
-    side = () if has("load") and kind != "torque" else ("which side of the gear is not said",)
-    roles = {"angle": channels.RELATIVE_ANGLE, "rate": channels.RELATIVE_RATE}
-    return roles.get(kind, channels.DRIVE_TORQUE), (*estimate, *side)
+    told = {change for change, words in WORDS.items() if not words.isdisjoint(said)} | {""}
+    if unit == "rpm":
+        told.add("motor")
+    if unit and parse_unit(unit).dimensions == _FORCE and _LOADED.issuperset(said):
+        told.add("normal")  # `Nominal load [N]`
+    of, change, role = next(r for r in _CHANNELS if r[0] in ("", kind) and r[1] in told)
+    unsaid = of in ("angle", "rate", "torque") and not change and role != UNKNOWN
+    doubts = ("which side of the gear is not said",) if unsaid else ()
+    if "estimate" in told:
+        doubts = ("an estimate, and not what a sensor showed", *doubts)
+    return role, doubts

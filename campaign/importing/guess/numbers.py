@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +17,6 @@ from campaign.importing.interface import Array
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _THIS_CENTURY = (1e9, 4e9)
 """s since 1970, of the years 2001 to 2096."""
-_RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
-_STEPS = {"ts", "dt", "sampletime", "samplingtime", "sampleinterval", "samplinginterval"}
-"""What files call their sample rate (Hz) and its inverse (s), without what is between words."""
 
 
 def increases(values: Array) -> bool:
@@ -43,27 +39,12 @@ def counts(values: Array) -> bool:
     return len(values) > 1 and values[0] in (0.0, 1.0) and bool(np.all(np.diff(values) == 1))
 
 
-def stated_rate(said: Mapping[str, str]) -> tuple[str, float] | None:
-    """The sample rate (Hz) that a file says besides its columns, and the name that says it."""
-    for key, text in said.items():
-        name = "".join(filter(str.isalpha, key.rsplit(".", 1)[-1].lower()))
-        try:
-            value = float(text)
-        except ValueError:
-            continue
-        if name in _RATES | _STEPS and 0.0 < value < math.inf:
-            return key, value if name in _RATES else 1.0 / value
-    return None
-
-
-def unit_of_time(values: Array, stated: tuple[str, float] | None) -> tuple[str, str]:
-    """A unit, and what suggests it: a rate that the file states, or size and step; or "" twice."""
+def unit_of_time(values: Array) -> tuple[str, str]:
+    """A unit, and what suggests it: size and step, as no rig samples at others; or "" twice."""
     step = ticks(values).step
     if step <= 0:
         return "", ""
     for unit, seconds in _SECONDS.items():
-        if stated and abs(step * seconds * stated[1] - 1.0) < 1e-3:
-            return unit, f"{step:.4g} apart, and the file says {stated[0]}: {stated[1]:g} Hz"
         if _THIS_CENTURY[0] <= values[0] * seconds < _THIS_CENTURY[1]:
             return unit, "they would be times since 1970"
     whole = step >= 1 and bool(np.all(values == np.round(values)))

@@ -28,37 +28,30 @@ _ANGLES = (channels.RELATIVE_ANGLE, channels.MOTOR_ANGLE)
 _RATES = (channels.RELATIVE_RATE, channels.MOTOR_RATE)
 _TORQUES = (channels.DRIVE_TORQUE, channels.JOINT_TORQUE)
 _TARGETS = (channels.REFERENCE, channels.COMMAND)
-_TIMES = (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 60.0, 1 / 60.0)
-"""By what a rate is off where times are in another unit than it is said."""
-
 Series = dict[int, Array]
 
 
 def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
     """Roles of columns whose names say nothing: what is the derivative of what."""
     found = list(columns)
-    silent = [
-        k for k, values in series.items()
-        if found[k].role == UNKNOWN and not found[k].why and np.ptp(values[:ROWS]) > 0
-    ][:MOST]  # fmt: skip
-    angles, rates = ([k for k in series if found[k].role in roles] for roles in (_ANGLES, _RATES))
-    pairs = [(k, j) for k in (*angles, *rates, *silent) for j in silent if k != j]
-    pairs += [(k, j) for k in silent for j in rates]
-    fits = [pair for pair in pairs if _is_derivative(time, *(series[k] for k in pair))]
+    part = {k: values[:ROWS] for k, values in series.items()}
+    silent = [k for k in part if found[k].role == UNKNOWN and not found[k].why][:MOST]
+    angles, rates = ([k for k in part if found[k].role in roles] for roles in (_ANGLES, _RATES))
+    pairs = [(k, j) for k in (*angles, *silent) for j in (*silent, *rates) if k != j]
+    pairs = [pair for pair in pairs if not set(silent).isdisjoint(pair)]
+    fits = [(k, j) for k, j in pairs if _is_derivative(time[:ROWS], part[k], part[j])]
     ends = {j for _, j in fits}
-    # Those with a known angle first, then along each chain from its beginning.
-    for k, j in sorted(fits, key=lambda pair: (columns[pair[0]].role == UNKNOWN, pair[0] in ends)):
-        angle, rate = found[k], found[j]
-        if angle.role in _RATES:
-            if rate.role == UNKNOWN:
-                found[j] = replace(rate, why=f"the derivative of {angle.name}: an acceleration")
-            continue
-        motor = angle.role == channels.MOTOR_ANGLE or rate.role == channels.MOTOR_RATE
+    for k, j in (pair for pair in fits if pair[0] not in ends):  # of a rate it is an acceleration
+        motor = found[k].role == channels.MOTOR_ANGLE or found[j].role == channels.MOTOR_RATE
+        whys = (f"{found[j].name} is its derivative", f"the derivative of {found[k].name}")
         new = {
-            k: _found(angle, _ANGLES[motor], f"{rate.name} is its derivative"),
-            j: _found(rate, _RATES[motor], f"the derivative of {angle.name}"),
+            place: _told(
+                replace(found[place], role=roles[motor], why=f"{why}, by its numbers"),
+                "its name does not say so",
+            )
+            for place, roles, why in zip((k, j), (_ANGLES, _RATES), whys, strict=True)
+            if found[place].role == UNKNOWN
         }
-        new = {place: column for place, column in new.items() if found[place].role == UNKNOWN}
         # What is like a rate that is there may be its target, or a copy.
         if not any(a.role == b.role and a.axis == b.axis for a in new.values() for b in found):
             found = [new.get(place, column) for place, column in enumerate(found)]
@@ -66,13 +59,9 @@ def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
 
 
 def _is_derivative(time: Array, angle: Array, rate: Array) -> bool:
-    found = _factor(time[:ROWS], angle[:ROWS], rate[:ROWS])
-    return found is not None and found.explained > _CERTAIN
-
-
-def _found(column: ColumnGuess, role: str, why: str) -> ColumnGuess:
-    doubts = (*column.doubts, "its name does not say so")
-    return replace(column, role=role, why=f"{why}, by its numbers", doubts=doubts)
+    """Whether it is, in its sign, too: of a sine the angle is the negative one of its rate."""
+    found = _factor(time, angle, rate)
+    return found is not None and found.explained > _CERTAIN and found.factor > 0
 
 
 def _factor(time: Array, angle: Array, rate: Array) -> Slope | None:
@@ -134,12 +123,10 @@ def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> N
     sides = (angle.role == channels.MOTOR_ANGLE) == (rate.role == channels.MOTOR_RATE)
     stated = {angle.basis, rate.basis} == {Basis.STATED}
     if due and sides and stated and abs(size / due - 1) > max(0.1, 3 * factor.error):
-        # One of them is wrong, or the times are, or a gear is between; nobody can tell which.
-        timely = any(abs(size / due / each - 1) < 0.03 for each in _TIMES)
-        why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due: a unit is "
-        why += "wrong, or that of the times" if timely else "wrong, or a gear is between"
+        # One of the three is wrong, or a gear is between; nobody can tell which.
+        why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due"
         for place, each in enumerate(found):
-            if place in (k, j) or (timely and each.role == TIME and each.basis is Basis.STATED):
+            if place in (k, j) or (each.role == TIME and each.basis is Basis.STATED):
                 found[place] = likely(each, each.unit, why)
 
 

@@ -16,7 +16,6 @@ from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
 from campaign.importing.guess.layouts import Layout, Placed, layouts, slug
-from campaign.importing.guess.numbers import stated_rate
 from campaign.importing.guess.words import INDEX, TIME
 from campaign.unit_grammar import parse_unit
 
@@ -37,8 +36,7 @@ _HEAD = """\
 #    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
 # 4. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
 #    `campaign import mapping.toml --report` makes run and report of it.
-# Never guessed: signs, the side of a gear, torque constants, rated torques, offsets,
-# filters of the drive.
+# Never guessed: signs, the side of a gear, torque constants, rated torques, offsets, filters.
 schema = 2
 title = {title}"""
 _LACKING = {
@@ -105,11 +103,9 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
             taken.add(role)
     yield from _lacking(layout, taken)
     if TIME not in taken and not first.clock:
-        name, rate = stated_rate(first.said) or ("", 0.0)
-        told = f'"{rate:g} Hz"  # the file says {name}' if name else '"... Hz"'
         yield ""
         yield _doubt(f"[columns.{layout.name}.time]  # no column of times was found")
-        yield _doubt(f"sample_rate = {told}")
+        yield _doubt('sample_rate = "... Hz"')
 
 
 def _block(layout: Layout, placed: Placed, again: bool) -> Iterator[str]:

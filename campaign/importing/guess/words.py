@@ -18,8 +18,8 @@ _QUANTITIES = {
     "feuchte depth wear verschleiss resistance feed hall erpm thetae omegae elec electrical "
     "uncertainty sigma std variance cov",
     "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
-    "torque": "tau torque torques trq tq tor moment momente drehmoment effort efforts force forces "
-    "kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
+    "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
+    "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
     "rate": "dq qd qdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
     "speeds spd rate drehzahl geschwindigkeit geschw winkelgeschw vitesse rpm rps wm n tacho gyro "
     "gx gy gz",
@@ -37,12 +37,13 @@ _CHANGES = {
     "target": "target targets cmd cmds command commands commanded soll sollwert demand demanded "
     "dmd setpoint stpt set desired des ref reference goal d g qg sp tgt request requested req "
     "consigne vorgabe action wanted planned traj trajectory profile star",
-    "motor": "motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor spindle spindel",
+    "motor": "rpm drehzahl motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor "
+    "spindle spindel",
     "load": "load link joint joints jnt gimbal output l j abtrieb abtriebsseite last arm",
     "hull": "base hull platform plattform ship vessel carrier",
     "gyro": "gyro gyr gyroscope imu inertial los gx gy gz",
-    "sensed": "sensor cell loadcell transducer messwelle torquemeter strain fx fy ft fr ff tz mz "
-    "friction frictional reib reibung",
+    "sensed": "tauj sensor cell loadcell transducer messwelle torquemeter strain fx fy ft fr ff tz "
+    "mz friction frictional reib reibung",
     "normal": "normal axial radial fn fz preload",
     "place": "winding wicklung bearing housing ambient amb oil coil coolant stator magnet mos fet "
     "mosfet room rotor",
