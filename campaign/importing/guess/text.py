@@ -49,7 +49,7 @@ _LACKING = {
 
 
 def mapping_text(guess: Guess, base: Path | None = None) -> str:
-    """A first MAPPING.toml for what was guessed; `base` is the folder it will lie in."""
+    """A first MAPPING.toml for what was guessed; `base` is the folder of it and of the files."""
     linear = any(_is_length(column) for table in guess.tables for column in table.columns)
     asked = "; some are in m: is the axis linear?" if linear else ""
     files = sorted({table.file.name for table in guess.tables})
@@ -57,7 +57,7 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
     lines = [_HEAD.format(kind="linear" if linear else "rotary", asked=asked, title=title)]
     found = layouts(guess.tables)
     for axis in dict.fromkeys(layout.axis for layout in found):
-        lines += ["", "[[test]]", f"name = {_quoted(f'axis_{slug(axis)}' if axis else 'recorded')}"]
+        lines += ["", "[[test]]", f"name = {_quoted(slug(f'axis {axis}') if axis else 'recorded')}"]
         lines += ['kind = "motion"', _doubt("the rig: see above"), 'bench = "rig.toml"']
         for layout in (each for each in found if each.axis == axis):
             lines += ["", *_recording(layout, base)]
@@ -68,10 +68,8 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
 
 
 def _recording(layout: Layout, base: Path | None) -> Iterator[str]:
-    paths = list(dict.fromkeys(table.file for table in layout.tables))
-    root = base.absolute() if base is not None else Path("/dev/null")
-    paths = [p.relative_to(root) if p.is_relative_to(root) else p for p in paths]
-    names = ", ".join(_quoted(path.as_posix()) for path in paths)
+    files = [t.file if base is None else t.file.relative_to(base) for t in layout.tables]
+    names = ", ".join(_quoted(file.as_posix()) for file in dict.fromkeys(files))
     yield "[[test.recording]]"
     yield f"file = [{names}]" if layout.joins_files else f"file = {names}"
     if len(layout.tables) == 1 and layout.tables[0].name:
