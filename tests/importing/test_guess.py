@@ -94,15 +94,6 @@ def test_what_is_not_stated_is_marked(tmp_path):
     assert '# ? unit = "..."  # not stated' in text
 
 
-def test_what_is_wrong_with_a_recording_is_a_doubt(tmp_path):
-    rows = [f"{k / 1000},{np.sin(k / 100)}\n" for k in range(3000) if not 1000 <= k < 1010]
-    (tmp_path / "a.csv").write_text("time [s],angle [rad]\n" + "".join(rows))
-    (table,) = guess([tmp_path / "a.csv"]).tables
-    assert table.step == pytest.approx(1e-3)
-    assert any("10 samples are missing, before row 1001" in doubt for doubt in table.doubts)
-    assert "# ? 10 samples are missing" in mapping_text(guess([tmp_path / "a.csv"]))
-
-
 def test_axes_in_one_file_are_tests_of_their_own(tmp_path):
     wild = next(each for each in wild_files() if each.name == "two_joints_15ms.csv")
     told = tomllib.loads(mapping_text(guess([made(tmp_path, wild)]), tmp_path))

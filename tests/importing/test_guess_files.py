@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -55,7 +56,6 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
         *["unknown"] * 4,
     ]
     assert all("its name does not say so" in column.doubts for column in table.columns[1:3])
-    assert "an acceleration" in table.columns[3].why
     run = imported(
         [tmp_path / "joint3.mat"],
         units={"relative_angle": "rad", "relative_rate": "rad/s"},
@@ -68,22 +68,6 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     own = found[found.quantity == "coulomb_torque"]
     assert len(own)
     assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
-
-
-def test_a_stated_rate_tells_the_unit_of_times(tmp_path: Path):
-    """Whole numbers 400 apart would be ms; a rate of 2.5 kHz makes them microseconds."""
-    time = 400.0 * np.arange(200)
-    rate = np.sin(time / 1e4)
-    scipy.io.savemat(tmp_path / "a.mat", {"time": time, "omega": rate, "fs": 2500.0})
-    scipy.io.savemat(tmp_path / "b.mat", {"omega": rate, "dt": 4e-4})
-    scipy.io.savemat(tmp_path / "c.mat", {"time": time, "omega": rate, "fs": 12.0})
-    assert guess([tmp_path / "a.mat"]).tables[0].columns[0].unit == "us"
-    assert "2500 Hz" in guess([tmp_path / "a.mat"]).tables[0].columns[0].unit_why
-    assert 'sample_rate = "2500 Hz"  # the file says dt' in mapping_text(
-        guess([tmp_path / "b.mat"])
-    )
-    # A rate that no unit of time agrees with is something else's.
-    assert guess([tmp_path / "c.mat"]).tables[0].columns[0].unit == "ms"
 
 
 def test_signals_beside_their_times_in_a_matrix_are_no_axes(tmp_path: Path):
@@ -133,48 +117,45 @@ def test_files_that_are_alike_share_their_columns(tmp_path: Path):
         "run1": "deg",
         "run3": "rad",
     }
-    highest = max(table.columns[1].high for table in found.tables[:2])
-    assert f"to {highest:.6g}; taken for relative_angle" in mapping_text(found)
+    assert "# Columns of run1.csv and of 1 more that are alike" in mapping_text(found)
+
+
+def recordings_of(folder: Path, **files: list[Any]) -> list[Any]:
+    """What `file` is in each recording of a guess at files that hold these columns."""
+    for name, columns in files.items():
+        text(together(*columns), "")(folder / f"{name}.t")
+    found = guess([folder / f"{name}.t" for name in files])
+    (test,) = tomllib.loads(mapping_text(found, folder))["test"]
+    return [each["file"] for each in test["recording"]]
 
 
 def test_files_of_one_signal_each_are_one_recording(tmp_path: Path):
-    """As guessed from names, and as the mapping says it; two of one signal are two recordings."""
-    m = rig.sines(1)
-    text(together(m.t, m.q), "time [s],pos [rad]\n")(tmp_path / "pos.csv")
-    text(together(m.t, m.tau), "time [s],torque [N m]\n")(tmp_path / "tau.csv")
-    told = mapping_text(guess([tmp_path / "pos.csv", tmp_path / "tau.csv"]), tmp_path)
-    told = told.replace('bench = "rig.toml"', 'bench = "platform"')
-    told = "\n".join(line for line in told.splitlines() if not line.startswith("# ?"))
-    (trial,) = planned(tmp_path, told).trials
+    """Of which channel is what only the files' names say; without times they need a rate."""
+    m = rig.trapezoids(3)
+    both = ["pos.t", "tau.t"]
+    assert recordings_of(tmp_path, pos=[m.t, m.q], tau=[m.t, m.tau]) == [both]
+    assert recordings_of(tmp_path, pos=[m.q], tau=[m.tau]) == [both]
+    mapping = mapping_text(guess([tmp_path / name for name in both]), tmp_path)
+    rate = '[columns.pos.time]\nsample_rate = "1 kHz"\n'
+    own = completed(mapping, {"relative_angle": "rad", "drive_torque": "N m"})
+    (trial,) = planned(
+        tmp_path, own.replace('bench = "rig.toml"', 'bench = "platform"') + rate
+    ).trials
     recording, _ = served(trial)
-    np.testing.assert_allclose(recording["drive_torque"], m.tau, rtol=1e-5)
-    text(together(m.t, m.q), "time [s],pos [rad]\n")(tmp_path / "again.csv")
-    told = mapping_text(guess([tmp_path / "pos.csv", tmp_path / "again.csv"]), tmp_path)
-    assert told.count("[[test.recording]]") == 2
-
-    text(together(m.t, m.q), "")(tmp_path / "pos.t")
-    text(together(m.t, m.tau), "")(tmp_path / "tau.t")
-    told = mapping_text(guess([tmp_path / "pos.t", tmp_path / "tau.t"]), tmp_path)
-    assert 'file = ["pos.t", "tau.t"]' in told
-    mapping = """
-        [columns.rig]
-        time = { column = 1, unit = "s" }
-        relative_angle = { column = 2, file = 1, unit = "rad" }
-        drive_torque = { column = 2, file = 2, unit = "N m" }
-        [[test]]
-        name = "any"
-        kind = "motion"
-        bench = "platform"
-        [[test.recording]]
-        file = ["pos.t", "tau.t"]
-    """
-    (trial,) = planned(tmp_path, mapping).trials
-    recording, _ = served(trial)
+    np.testing.assert_allclose(recording["relative_angle"], m.q, atol=1e-8)
     np.testing.assert_allclose(recording["drive_torque"], m.tau, rtol=1e-5)
 
-    text(together(m.t, m.q, m.tau), "")(tmp_path / "both.t")
-    told = mapping_text(guess([tmp_path / "pos.t", tmp_path / "both.t"]), tmp_path)
-    assert told.count("[[test.recording]]") == 2
+
+def test_files_of_other_tests_are_recordings_of_their_own(tmp_path: Path):
+    """The same columns; a channel twice; nothing known; several signals; rows that do not match."""
+    m = rig.trapezoids(3)
+    pos, tau = [m.t, m.q], [m.t, m.tau]
+    assert recordings_of(tmp_path, run1=[*pos, m.tau], run2=[*pos, m.tau]) == ["run1.t", "run2.t"]
+    assert recordings_of(tmp_path, pos_1=pos, pos_2=pos) == ["pos_1.t", "pos_2.t"]
+    assert recordings_of(tmp_path, run1=pos, run2=tau) == ["run1.t", "run2.t"]
+    assert recordings_of(tmp_path, pos=pos, both=[*pos, m.tau]) == ["pos.t", "both.t"]
+    assert recordings_of(tmp_path, pos=[m.q], tau=[m.tau[:-1]]) == ["pos.t", "tau.t"]
+    assert recordings_of(tmp_path, pos=pos, tau=[m.t * 1000, m.tau]) == ["pos.t", "tau.t"]
 
 
 def test_columns_that_are_not_known_have_a_block_to_fill_in(tmp_path: Path):
@@ -217,7 +198,7 @@ def axes_of(folder: Path, names: list[str]) -> list[str]:
         (["X1_ActualPosition", "Y1_ActualPosition"], ["axis_x", "axis_y"]),
         (
             [f"/js/{joint}/{what}" for what in ("position", "effort") for joint in JOINTS],
-            ["axis_elbow", "axis_shoulder"],
+            ["axis_shoulder", "axis_elbow"],
         ),
         (
             ["observations.q[1]", "observations.q[2]", "action[1]", "action[2]"],
@@ -282,7 +263,7 @@ def test_units_that_contradict_each_other_do_not_stand(tmp_path: Path):
     time, angle, rate, torque = guess([tmp_path / "a.csv"]).tables[0].columns
     assert [each.basis for each in (angle, rate)] == [Basis.LIKELY, Basis.LIKELY]
     assert "0.017453 is due" in angle.unit_why
-    assert [each.basis for each in (time, torque)] == [Basis.STATED, Basis.STATED]
+    assert [each.basis for each in (time, torque)] == [Basis.LIKELY, Basis.STATED]
     section = tomllib.loads(mapping_text(guess([tmp_path / "a.csv"])))["columns"]["a"]
     assert "unit" not in section["relative_angle"]
     assert "unit" not in section["relative_rate"]

@@ -5,6 +5,7 @@ where that is.
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,11 @@ from scipy.io import savemat
 import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
+from campaign.importing.guess import guess, mapping_text
+from tests.importing import rig
+from tests.importing.newcomer import completed
+from tests.importing.newcomer import rig as rig_of
+from tests.importing.wild import text, together
 
 DOCS = Path(__file__).parents[2] / "docs" / "import.md"
 DATA = Path(__file__).parents[3] / "shared" / "data" / "emps"
@@ -27,8 +33,8 @@ def blocks() -> list[str]:
 
 
 def imported(folder: Path) -> Any:
-    rig, mapping = blocks()
-    (folder / "emps-rig.toml").write_text(rig, encoding="utf-8")
+    _, stand, mapping = blocks()
+    (folder / "emps-rig.toml").write_text(stand, encoding="utf-8")
     (folder / "emps.toml").write_text(mapping, encoding="utf-8")
     code = import_recordings([str(folder / "emps.toml")], folder / "results", report=True)
     assert code is ExitCode.DONE
@@ -111,3 +117,22 @@ def test_the_real_one(tmp_path: Path):
         )
         middle = 0.0826  # m/s; both models are of the same data, and meet in its middle
         assert ours[0] + ours[1] * middle == pytest.approx(coulomb + viscous * middle, rel=0.02)
+
+
+def test_one_signal_per_file_as_it_stands_there(tmp_path: Path) -> None:
+    """The mapping of the docs is the guessed one, completed; friction comes out as it was made."""
+    m = rig.trapezoids(3)
+    files = [tmp_path / "pos.t", tmp_path / "tau.t"]
+    for file, values in zip(files, (m.q, m.tau), strict=True):
+        text(together(m.t, values), "")(file)
+    guessed = mapping_text(guess(files), tmp_path)
+    units = {"relative_angle": "rad", "drive_torque": "N m"}
+    mapping = blocks()[0]
+    assert tomllib.loads(completed(guessed, units)) == tomllib.loads(mapping)
+    (tmp_path / "rig.toml").write_text(rig_of(guessed), encoding="utf-8")
+    (tmp_path / "mapping.toml").write_text(mapping, encoding="utf-8")
+    code = import_recordings([str(tmp_path / "mapping.toml")], tmp_path / "results")
+    assert code is ExitCode.DONE
+    found = findings(campaign.open(next((tmp_path / "results").glob("*.nxs"))), "recorded")
+    for direction in ("positive", "negative"):
+        assert found["coulomb_torque", direction].value == pytest.approx(rig.COULOMB, rel=0.05)

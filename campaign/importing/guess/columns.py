@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
+
+from campaign.importing.guess.words import INDEX, TIME, UNKNOWN
 
 
 class Basis(StrEnum):
@@ -14,7 +16,7 @@ class Basis(StrEnum):
 
     STATED = "stated"  # the file says so
     LIKELY = "likely"  # the numbers suggest it
-    UNKNOWN = "unknown"
+    UNKNOWN = "not stated"
 
 
 @dataclass(frozen=True)
@@ -23,14 +25,12 @@ class ColumnGuess:
 
     Attributes:
         role: a channel of the vocabulary, or `time`, `index`, `unknown`.
-        why: what the role rests on.
+        why: what the role rests on; "" where the name says nothing.
         unit: as `parse_unit` has it; "" where unknown.
         doubts: what its reader should check, in sentences.
         low, high: the range of what was looked at; NaN where it holds no numbers.
-        tag: what its name says besides; see `Named.tag`.
-        group: which of several axes it is of; "" where it is of all of them.
-        spare: it gives way to another column of its role.
-        of_anything: a target whose name does not say of what.
+        tag: words and numbers of its name that say no role; of several axes they are the name.
+        axis: which of several it is of; "" where it is of all of them.
     """
 
     name: str
@@ -44,9 +44,12 @@ class ColumnGuess:
     low: float = np.nan
     high: float = np.nan
     tag: tuple[str, ...] = ()
-    group: str = ""
-    spare: bool = False
-    of_anything: bool = False
+    axis: str = ""
+
+    @property
+    def is_channel(self) -> bool:
+        """Whether it was taken for one."""
+        return self.role not in (TIME, INDEX, UNKNOWN)
 
 
 @dataclass(frozen=True)
@@ -54,9 +57,8 @@ class TableGuess:
     """A table of a file.
 
     Attributes:
-        rows: how many were looked at; `more` says that there are further ones.
-        step: s between samples, by a clock that the file states, or by times whose unit is
-            stated or likely; None where that cannot be told.
+        rows: how many were looked at.
+        step: s between samples, as far as the unit of times is known; None where it is not.
         clock: whether the file states the clock, without a column of times.
         restarts: how often its time begins anew.
         below: whether it is one of several below each other in a text file.
@@ -68,13 +70,11 @@ class TableGuess:
     name: str
     columns: tuple[ColumnGuess, ...]
     rows: int
-    more: bool = False
-    step: float | None = None
-    clock: bool = False
-    restarts: int = 0
-    below: bool = False
-    doubts: tuple[str, ...] = ()
-    said: dict[str, str] = field(default_factory=dict)
+    step: float | None
+    clock: bool
+    restarts: int
+    below: bool
+    doubts: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Which columns make a recording together: of tables that complete each other, and axis by axis.
 
-A file may hold its channels in tables of their own, by their clocks; or several axes side by side,
-told apart in the names of their columns. Files whose columns are alike are read alike.
+A file may hold its channels in tables of their own, or several axes side by side; files of one
+signal each hold a recording together. What is read alike shares its `[columns.NAME]`.
 """
 
 from __future__ import annotations
@@ -9,176 +9,113 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from campaign.importing.guess.columns import ColumnGuess, TableGuess
-from campaign.importing.guess.quantities import INDEX, TIME, UNKNOWN
+from campaign.importing.guess.words import INDEX, TIME
 
-_NO_CHANNELS = (TIME, INDEX, UNKNOWN)
+Tables = tuple[TableGuess, ...]
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A column, and where it is: its place from 1 in a table of its name, in a file from 1."""
+    """A column, and where it is: in which of the tables, at which place; both from 1."""
 
     column: ColumnGuess
-    table: str
+    table: int
     place: int
-    file: int
 
 
 @dataclass(frozen=True)
-class LayoutGuess:
+class Layout:
     """Columns that are read together.
 
     Attributes:
-        name: a key, of letters and digits, of the columns.
-        tables: where its columns are.
-        several: whether each column has to say its table, or its file where there are several.
+        name: a key, of letters and digits, of the columns; what is read alike has one.
+        tables: where its columns are; of one file, or each of its own.
         axis: which of several axes of the file it is; "" where there is one.
-        known: whether the columns of this name were told with an earlier file.
-        files: how many have columns of this name.
     """
 
     name: str
-    tables: tuple[TableGuess, ...]
+    tables: Tables
     columns: tuple[Placed, ...]
-    several: bool
-    axis: str = ""
-    known: bool = False
-    files: int = 1
+    axis: str
 
     @property
-    def paths(self) -> list[Path]:
-        """Of the files that make one recording together."""
-        return list(dict.fromkeys(table.file for table in self.tables))
+    def joins_files(self) -> bool:
+        """Whether each of its tables is a file of its own."""
+        return self.tables[0].file != self.tables[-1].file
 
 
-def layouts(tables: Sequence[TableGuess]) -> list[LayoutGuess]:
+def layouts(tables: Sequence[TableGuess]) -> list[Layout]:
     """How tables are read, in the order of their files."""
-    found: list[LayoutGuess] = []
-    for together in _together(tables):
-        bare = _slug(together[0].file.stem) or "recording"
-        placed = [
-            Placed(column, table.name, place, number)
-            for number, table in enumerate(together, start=1)
-            for place, column in enumerate(table.columns, start=1)
-        ]
-        for axis, columns in _axis_by_axis(placed):
-            layout = LayoutGuess("", together, tuple(columns), len(together) > 1, axis)
-            alike = next((k for k, each in enumerate(found) if _alike(each, layout)), None)
-            if alike is not None:
-                found[alike] = _with_ranges(found[alike], layout)
-                found.append(replace(layout, name=found[alike].name, known=True))
-                continue
-            name = f"{bare}_{_slug(axis)}" if axis and _slug(axis) else bare
-            taken = {each.name for each in found}
-            numbers = (f"{name}_{number}" for number in range(2, len(taken) + 3))
-            free = name if name not in taken else next(n for n in numbers if n not in taken)
-            found.append(replace(layout, name=free))
+    names: dict[object, str] = {}
+    found = []
+    for layout in (each for together in _together(tables) for each in _axis_by_axis(together)):
+        read = _what_is_read(layout)
+        if read not in names:
+            bare = slug(f"{layout.tables[0].file.stem} {layout.axis}") or "recording"
+            numbered = (f"{bare}_{number}" for number in range(2, len(names) + 3))
+            names[read] = next(n for n in (bare, *numbered) if n not in names.values())
+        found.append(replace(layout, name=names[read]))
     return found
 
 
-def _slug(text: str) -> str:
+def slug(text: str) -> str:
+    """As a key of letters and digits."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
-def _alike(one: LayoutGuess, other: LayoutGuess) -> bool:
-    """Whether the same columns are read in the same way.
-
-    Within a file each table is its own, but for those of a text file that lie below each other.
-    """
-    below = one.tables[0].below and other.tables[0].below
-    return (
-        not one.known
-        and (below or one.tables[0].file != other.tables[0].file)
-        and _what_is_read(one) == _what_is_read(other)
-    )
+def _what_is_read(layout: Layout) -> object:
+    """What two layouts that are read alike agree in."""
+    tables = [(table.clock, table.below or table.name) for table in layout.tables]
+    columns = [
+        (p.column.name, p.column.role, p.column.unit, p.column.basis) for p in layout.columns
+    ]
+    return layout.axis, *tables, *columns
 
 
-def _what_is_read(layout: LayoutGuess) -> list[object]:
-    found: list[object] = [layout.axis, *(table.clock for table in layout.tables)]
-    for each in layout.columns:
-        column = each.column
-        found += [
-            "" if layout.tables[0].below else each.table,
-            each.place,
-            column.name,
-            column.role,
-            column.unit,
-            column.basis,
-        ]
-    return found
-
-
-def _with_ranges(one: LayoutGuess, other: LayoutGuess) -> LayoutGuess:
-    """The first, with the ranges of both."""
-    columns = tuple(
-        replace(
-            first,
-            column=replace(
-                first.column,
-                low=min(first.column.low, second.column.low),
-                high=max(first.column.high, second.column.high),
-            ),
-        )
-        for first, second in zip(one.columns, other.columns, strict=True)
-    )
-    return replace(one, columns=columns, files=one.files + 1)
-
-
-def _together(tables: Sequence[TableGuess]) -> Iterator[tuple[TableGuess, ...]]:
-    """Tables of one file that hold different channels, beside each other; others by themselves.
-
-    Files of one signal each, of one length and one clock, are one recording.
-    """
-    if _one_signal_each(tables):
+def _together(tables: Sequence[TableGuess]) -> Iterator[Tables]:
+    """Tables that complete each other: of files of one signal each, or of one file."""
+    files = [tuple(t for t in tables if t.file == f) for f in dict.fromkeys(t.file for t in tables)]
+    signals = [[c for c in own[0].columns if c.role not in (TIME, INDEX)] for own in files]
+    single = len(files) == len(tables) and all(len(each) == 1 for each in signals)
+    if single and _complete(tables) and sum(c.is_channel for (c,) in signals) > 1:
         yield tuple(tables)
         return
-    for file in dict.fromkeys(table.file for table in tables):
-        own = tuple(table for table in tables if table.file == file)
-        channels = [_channels(table) for table in own]
-        clocks = {_clock(table) for table in own}
-        used = [role for roles in channels for role in roles]
-        if len(own) > 1 and len(used) == len(set(used)) and len(clocks) == 1:
+    for own in files:
+        if _complete(own):
             # What holds no channel is not needed; if none does, all is shown.
-            yield tuple(t for t, roles in zip(own, channels, strict=True) if roles) or own
+            yield tuple(table for table in own if _channels(table)) or own
         else:
             yield from ((table,) for table in own)
 
 
-def _one_signal_each(tables: Sequence[TableGuess]) -> bool:
-    signals = [[c for c in table.columns if c.role not in (TIME, INDEX)] for table in tables]
-    known = [(c.role, c.group) for own in signals for c in own if c.role != UNKNOWN]
-    clocks = {(*_clock(table), table.rows, table.step) for table in tables}
-    return (
-        1 < len(tables) == len({table.file for table in tables})
-        and all(len(own) == 1 for own in signals)
-        and len(known) == len(set(known))
-        and len(clocks) == 1
-    )
+def _complete(tables: Sequence[TableGuess]) -> bool:
+    """Whether they hold no channel twice, on clocks that are told alike."""
+    channels = [each for table in tables for each in _channels(table)]
+    clocks = {_clock(table) for table in tables}
+    return len(tables) > 1 and len(clocks) == 1 and len(set(channels)) == len(channels)
 
 
 def _channels(table: TableGuess) -> set[tuple[str, str]]:
-    return {(each.role, each.group) for each in table.columns if each.role not in _NO_CHANNELS}
+    return {(each.role, each.axis) for each in table.columns if each.is_channel}
 
 
-def _clock(table: TableGuess) -> tuple[bool, str, str]:
-    """How times are found: tables that are read together have columns of one name for them."""
-    time = next((each for each in table.columns if each.role == TIME), None)
-    return (table.clock, time.name if time else "", time.unit if time else "")
+def _clock(table: TableGuess) -> tuple[object, ...]:
+    """How times are found: in columns of one name, or by the rows alone."""
+    time = next(((c.name, c.unit) for c in table.columns if c.role == TIME), None)
+    return table.clock, time or table.rows
 
 
-def _axis_by_axis(columns: list[Placed]) -> Iterator[tuple[str, list[Placed]]]:
+def _axis_by_axis(tables: Tables) -> Iterator[Layout]:
     """Columns of each axis with those of all; together where there is but one."""
-    groups = {each.column.group for each in columns if each.column.role not in _NO_CHANNELS} - {""}
-    if len(groups) < 2:
-        yield "", columns
-        return
-    for axis in sorted(groups, key=_naturally):
-        yield axis, [each for each in columns if each.column.group in ("", axis)]
-
-
-def _naturally(text: str) -> list[tuple[int, str]]:
-    """Numbers by size: axis 10 comes after axis 2."""
-    return [(int(word), "") if word.isdigit() else (-1, word) for word in text.split()]
+    columns = tuple(
+        Placed(column, number, place)
+        for number, table in enumerate(tables, start=1)
+        for place, column in enumerate(table.columns, start=1)
+    )
+    found = dict.fromkeys(each.column.axis for each in columns if each.column.is_channel)
+    axes = list(filter(None, found))
+    for axis in axes if len(axes) > 1 else [""]:
+        own = tuple(p for p in columns if not axis or p.column.axis in ("", axis))
+        yield Layout("", tables, own, axis)

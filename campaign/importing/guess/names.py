@@ -1,224 +1,243 @@
-"""What a column's name says: its role in the vocabulary of channels, and a unit at its end.
-
-Names are taken apart into words. A word may say the quantity, that it is a target, which side of
-the gear it is of, or that it is no channel at all; the last outweighs the others.
-"""
+"""What a column's name says: its role in the vocabulary of channels, and a unit at its end."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
-from campaign.channels import (
-    COMMAND,
-    DRIVE_TORQUE,
-    MOTOR_CURRENT,
-    MOTOR_RATE,
-    REFERENCE,
-    RELATIVE_ANGLE,
-    RELATIVE_RATE,
-)
-from campaign.importing.guess.pieces import Ending, Pieces, pieces
-from campaign.importing.guess.quantities import (
-    FORCES,
+from campaign import channels
+from campaign.importing.cells import UNIT_WORDS
+from campaign.importing.guess.columns import Basis, ColumnGuess
+from campaign.importing.guess.words import (
     INDEX,
+    KNOWN,
+    MOVING,
+    QUANTITIES,
     TIME,
     UNKNOWN,
-    has,
-    is_load,
-    kind_of,
-    kind_of_unit,
+    WORDS,
+    taken_apart,
 )
-from campaign.importing.guess.roles import role_of
-from campaign.importing.guess.words import CHANGES, KNOWN, WORDS
+from campaign.unit_grammar import parse_unit
 
-_THERMOMETER = re.compile(r"T_?\d{1,2}")
-_MOTOR_TORQUE = re.compile(r"T_?[mM]")
-_JOINT = frozenset(("joint", "j", "jnt", "axis", "achse", "axe"))
-"""Words that say of which axis a column is, and nothing else."""
-_ALSO_A_PLACE = frozenset(
-    ["set", "tar", "traj", "trajectory", "profile", "action", "limited", "required"]
-)
-_BELONGS = CHANGES["hull"] | {
-    *(word for word in CHANGES["target"] - _ALSO_A_PLACE if len(word) > 2),
-    *("motor", "imu", "gyro"),
-}
-"""What a part of a path adds to its last one; `set 1/position` is rather one of several."""
-_NOWHERE = frozenset(
-    ["xyz", "tcp", "pose", "wrench", "twist", "orientation", "quaternion", "cartesian"]
-)
-"""Parts of a path whose channels are of no axis."""
-
-_KNOWN = {
-    # CANopen drive profile; Siemens drives; the public set of a positioning system.
-    "0x6062": REFERENCE,
-    "0x6063": RELATIVE_ANGLE,
-    "0x6064": RELATIVE_ANGLE,
-    "0x606b": COMMAND,
-    "0x606c": RELATIVE_RATE,
-    "0x6074": COMMAND,
-    "0x6077": DRIVE_TORQUE,
-    "0x6078": MOTOR_CURRENT,
-    "0x607a": REFERENCE,
-    "0x60ff": COMMAND,
-    "0x6071": COMMAND,
-    "r0060": COMMAND,
-    "r0062": COMMAND,
-    "r0077": COMMAND,
-    "r0079": COMMAND,
-    "r0080": DRIVE_TORQUE,
-    "r0031": DRIVE_TORQUE,
-    "r0061": MOTOR_RATE,
-    "r0063": MOTOR_RATE,
-    "r0068": MOTOR_CURRENT,
-    "r0078": MOTOR_CURRENT,
-    "r0482": RELATIVE_ANGLE,
-    "qm": RELATIVE_ANGLE,
-    "qg": REFERENCE,
-    "vir": DRIVE_TORQUE,
-    "x-axis": TIME,
-}
-"""Names that are what they are by a convention of their own."""
-_OBJECT = re.compile(r"\b(0x60[0-9a-f]{2}|r\d{4})(?![0-9a-z])")
-
-
-OF_ANYTHING = "of what it is the target its name does not say"
-
-
-@dataclass(frozen=True)
-class Named:
-    """What a name says.
-
-    Attributes:
-        role: of the vocabulary, or `time`, `index`, `unknown`.
-        why: which word says so; "" where none does.
-        unit: at the end of the name; "" where there is none.
-        sure: whether that unit can be nothing else.
-        tag: words and numbers that say neither; of several axes they are the name.
-        side: whether the name says on which side of the gear it was measured.
-        spare: it gives way to another column of its role: raw counts, a filtered copy.
-        doubt: what a reader should know besides; "" for nothing.
-    """
-
-    role: str
-    why: str = ""
-    unit: str = ""
-    sure: bool = False
-    tag: tuple[str, ...] = ()
-    side: bool = False
-    spare: bool = False
-    doubt: str = ""
-
-
-def named(name: str, unit: str = "") -> Named:
-    """What a name says; `unit`, as its file states it, tells names apart that are one letter."""
-    plain = unicodedata.normalize("NFKC", name).strip(" \"'").lower()
-    found = pieces(name)
-    tag = _tag(found)
-    convention = _OBJECT.search(plain)
-    known = convention[1] if convention else plain
-    if known in _KNOWN:
-        ending = found.ending
-        return Named(_KNOWN[known], f"{known} is so by convention", ending.unit, ending.sure, tag)
-    said = _said(found)
-    if not said and not found.ending.unit:
-        return Named(UNKNOWN, tag=tag)
-    in_path = [word for part in found.parts[:-1] for word in part]
-    if nowhere := next((word for word in (*in_path, *said) if word in _NOWHERE), ""):
-        return Named(UNKNOWN, nowhere, tag=tag)
-    kind, why, ending, said = _kind_and_unit(said, found, unit)
-    doubt = ""
-    if _MOTOR_TORQUE.fullmatch(name.strip()) and kind == TIME:
-        kind, why = "torque", "a T of the motor"
-    elif _THERMOMETER.fullmatch(name.strip()) and not unit:
-        kind, why = "warmth", "a T with a number"
-    elif kind == UNKNOWN and not why and not unit and tag and _JOINT.issuperset(said):
-        kind, why, doubt = "angle", " ".join(said), "its name says which joint, and not what of it"
-    elif kind == "rate" and "angular" in said and found.parts[-1] in (("x",), ("y",), ("z",)):
-        said = ["gyro", *said]
-    # `cmd.tau`, `motor.speed`: what a part belongs to changes its meaning, and never gives it one.
-    said = [*(word for word in in_path if word in _BELONGS), *said]
-    fitting = ending if kind_of_unit(ending.unit) == kind else Ending()
-    if kind in (TIME, INDEX, UNKNOWN):
-        return Named(kind, why, fitting.unit, fitting.sure, tag)
-    role, side = role_of(kind, said, found.ending.unit or unit)
-    if role == UNKNOWN:
-        return Named(role, why, tag=tag)
-    spare = not {"raw", "filt", "filtered", "filter", "lpf", "smooth", "smoothed"}.isdisjoint(said)
-    if has(said, "estimate"):
-        doubt = "an estimate of the drive or of an observer, not what a sensor showed"
-    elif kind == "target":
-        doubt = OF_ANYTHING
-    return Named(role, why, fitting.unit, fitting.sure, tag, side, spare, doubt)
-
-
-def _tag(found: Pieces) -> tuple[str, ...]:
-    """What tells axes apart: short numbers, and words that mean nothing here."""
-    all_words = [word for part in found.parts for word in part]
-    return tuple(
-        word
-        for word in all_words
-        if (len(word) <= 2 if word.isdigit() else word not in KNOWN) and word not in FORCES
+_KINDS = {
+    parse_unit(unit).dimensions: kind
+    for unit, kind in (
+        *(("rad", "angle"), ("m", "angle"), ("count", "angle")),
+        *(("rad/s", "rate"), ("m/s", "rate"), ("count/s", "rate")),
+        *(("N m", "torque"), ("N", "torque"), ("A", "current"), ("degC", "warmth"), ("s", TIME)),
     )
+}
+_SPELLED = {
+    word: unit
+    for unit, *words in map(
+        str.split,
+        """deg degs degree degrees
+        rad rads radians
+        rev revs turns
+        count counts ticks inc
+        deg/s degps dps
+        rad/s radps
+        mm/s mmps
+        N·m nm
+        mN·m mnm
+        kN kn
+        s sec secs second seconds
+        ms msec millis milliseconds millisec
+        us usec micros microseconds microsec
+        ns nsec nanos nanoseconds nanosec
+        mA ma
+        degC degc celsius""".splitlines(),
+    )
+    for word in words
+}
+"""Words at the end of a name that are a unit, in lower case."""
+_LETTERS = {"N": "N", "A": "A", "a": "A", "s": "s", "m": "m", "C": "degC"}
+"""Letters that may be a unit; `q_m` is measured, and `current_a` of phase a as well."""
+_OF_LETTERS = {"t": "torque", "m": "torque", "f": "torque", "v": "rate", "p": "angle", "s": "angle"}
+"""Letters that are a quantity where a word says of what: `T_motor`, `v_soll`."""
+_WHOLE = re.compile(r"m?Nm|mA|kN|deg[CK]|(?:m|u)?rad|[un]s|ms|rpm|RPM")
+"""What would fall apart at its capital letters."""
+_PIECE = re.compile(r"[A-Z]{2,}(?=[xyz](?![a-zß-ÿ]))|[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+")
+_SYMBOLS = {"θ": "theta", "ω": "omega", "τ": "tau", "φ": "phi", "ϕ": "phi", "μ": "mu"}
+_STARRED = re.compile(r"(?<=[^\W_])\*(?=$|[\s_.:/\[(])")
+"""Drives mark targets so: `iq*`."""
+_UNIT_BEHIND = re.compile(
+    r"(?P<name>.*?)\s*(?:[\[(<](?P<unit>[^\[\]()<>]*)[\])>]|\sin\s+(?P<of>\S+)"
+    r"|(?<=[^/\s])\s*/\s*(?P<per>[^/\s]+))"
+)
+_FORCE = parse_unit("N").dimensions
+_LOADED = WORDS["load"] | WORDS["neutral"]
+_CHANGES = frozenset().union(*(WORDS[k] for k in ("target", "motor", "load", "sensed", "neutral")))
+"""What a word behind a letter may say for the letter to be a quantity."""
+BY_UNIT = "its unit, and nothing else"
 
 
-def _said(found: Pieces) -> list[str]:
-    """The words of the last part that says more than `data` or `x`; numbers are no words."""
-    for part in reversed(found.parts):
-        words = [word for word in part if not word.isdigit()]
-        if any(word not in CHANGES["neutral"] and word not in ("x", "y", "z") for word in words):
-            return _derived(words)
-    return [word for word in (found.parts[-1] if found.parts else ()) if not word.isdigit()]
+def usable_unit(text: str) -> str:
+    """A unit in the spelling of the program's grammar; "" where it is none."""
+    spelled = UNIT_WORDS.get(text.strip().lower(), text.strip())
+    try:
+        parse_unit(spelled)
+    except ValueError:
+        return ""
+    return "rpm" if spelled == "1/min" else spelled
 
 
-def _derived(words: list[str]) -> list[str]:
-    """`d theta` is a rate, as `theta dot` is, and `q dot dot` an acceleration."""
-    angles = WORDS["angle"] | {"x", "y", "s", "alpha"}
-    if len(words) > 1 and words[0] in ("d", "dd") and words[1] in angles:
-        return ["omega" if words[0] == "d" else "acceleration", *words[2:]]
-    if "dot" in words:
-        rest = [word for word in words if word != "dot"]
-        return [*rest, "acceleration" if words.count("dot") > 1 else "dot"]
-    # `current_position`: the present one.
-    if words and words[0] in ("current", "curr", "cur", "present") and len(words) > 1:
-        moving = WORDS["angle"] | WORDS["rate"] | WORDS["torque"] | WORDS["warmth"] | WORDS["time"]
-        if any(len(word) > 2 and word in moving for word in words[1:]):
-            return words[1:]
-    return words
+def kind_of_unit(unit: str) -> str:
+    """The quantity that a unit is of; "" for those that say nothing here."""
+    return _KINDS.get(parse_unit(unit).dimensions, "") if unit else ""
 
 
-def _kind_and_unit(
-    said: list[str], found: Pieces, stated: str
-) -> tuple[str, str, Ending, list[str]]:
-    """The quantity, what says so, the unit at the end where it is one, and the words without it.
+def named(name: str, stated: str = "", place: str = "") -> ColumnGuess:
+    """What a name says; the unit that its file states tells names apart that are one letter."""
+    text = unicodedata.normalize("NFKC", name).strip(" \"'#%")
+    behind = _UNIT_BEHIND.fullmatch(text)
+    unit = usable_unit(next(filter(None, behind.groups()[1:]), "")) if behind else ""
+    sure = len(unit) > 1 or not (behind and behind["per"])  # `x/s` may be a path
+    pieces = _pieces(behind["name"] if behind and unit else text)
+    if not unit:
+        pieces, unit, sure = _unit_apart(pieces)
+    words = _words(pieces)
+    tag = tuple(w for w in words if (len(w) < 3 if w.isdigit() else w not in KNOWN))
+    said = [word for word in words if not word.isdigit()]
+    usable = usable_unit(stated)
+    kind, why = _kind(said, kind_of_unit(usable or unit))
+    if re.fullmatch(r"T_?\d{1,2}", text) and not stated:
+        kind, why = "warmth", "a T with a number"
+    role, doubts = _role(kind, said, usable or unit)
+    if stated and not usable:
+        doubts += (f"{stated!r}, as the file has it, is no unit that is known here",)
+    found = ColumnGuess(name, place, role, why, doubts=doubts, tag=tag)
+    if usable:
+        return replace(found, unit=usable, basis=Basis.STATED, unit_why="the file states it")
+    if not unit or kind_of_unit(unit) != kind:
+        return found
+    basis = Basis.STATED if sure else Basis.LIKELY
+    return replace(found, unit=unit, basis=basis, unit_why="its name ends with it")
 
-    A letter at the end may be a word (`F_n` is a normal force): it is a unit where the rest says a
-    quantity that has it.
+
+def _pieces(text: str) -> list[str]:
+    """Of a name, in the letters of the file."""
+    text = _STARRED.sub("_target", text)
+    for letter, word in _SYMBOLS.items():
+        text = text.replace(letter, word)
+    chunks = re.findall(r"[0-9A-Za-zÀ-ÿ]+", text)
+    apart = [[each] if _WHOLE.fullmatch(each) else _PIECE.findall(each) for each in chunks]
+    return [piece for each in apart for piece in each]
+
+
+def _words(pieces: Sequence[str]) -> list[str]:
+    """The words of pieces: compounds as several, and as one what is written apart: `i_q`."""
+    found: list[str] = []
+    for piece in pieces:
+        words = taken_apart(piece.lower())
+        last, word = "".join(found[-1:]), words[0]
+        if len(words) > 1:
+            found += words
+        elif (
+            last
+            and last + word in KNOWN
+            and (min(len(last), len(word)) == 1 or len(last + word) > 5)
+        ):
+            found[-1] = last + word
+        else:
+            # Behind what moves the motor's, along an axis; elsewhere `mx` is a moment.
+            found += word if last in MOVING and word in ("mx", "my", "mz") else words
+    return found
+
+
+def _unit_apart(pieces: list[str]) -> tuple[list[str], str, bool]:
+    """Pieces without the unit at the end, that unit, and whether it can be nothing else.
+
+    Numbers and words like `raw` may stand behind it.
     """
-    ending = found.ending
-    if ending.squared:
-        return UNKNOWN, "an acceleration", Ending(), said
-    kind, why = kind_of(said)
-    by_unit = kind_of_unit(stated or ending.unit)
-    letter = ending.unit and not ending.sure and not ending.clear
-    if letter and not stated and kind not in (by_unit, "target", "normal"):
-        whole = [word for word in found.whole if not word.isdigit()]
-        whole = _derived(whole)
-        of_whole, its_why = kind_of(whole)
-        if of_whole != UNKNOWN or kind != UNKNOWN:
-            return of_whole, its_why, Ending(), whole
-    if kind == UNKNOWN and not why and is_load(said, stated or ending.unit):
-        return "normal", "a load in N", ending, said
-    if by_unit and kind == TIME and by_unit != TIME:
-        # A `T` in degrees, or in N m: the unit says more.
-        return by_unit, f"its unit {stated or ending.unit}, and nothing else", ending, said
-    if by_unit and kind in (UNKNOWN, "target") and (not why or kind == "target"):
-        strange = [w for w in said if len(w) > 2 and w not in KNOWN]
-        if by_unit in ("angle", TIME, "current") and strange and kind != "target":
-            return UNKNOWN, "", ending, said  # some length, duration or current
-        if said == ["z"]:
-            return UNKNOWN, "", ending, said
-        told = f"its unit {stated or ending.unit}, and nothing else"
-        return by_unit, f"{why}, in {stated or ending.unit}" if why else told, ending, said
-    return kind, why, ending, said
+    end = len(pieces)
+    while end > 1 and (pieces[end - 1].isdigit() or pieces[end - 1].lower() in WORDS["neutral"]):
+        end -= 1
+    low = [piece.lower() for piece in pieces]
+    for first in range(max(1, end - 3), end):
+        tail = [_SPELLED.get(word, word) for word in low[first:end] if word != "per"]
+        unit = usable_unit("/".join(tail)) or _SPELLED.get("".join(tail), "")
+        if len(unit) > 1 and kind_of_unit(unit):
+            if low[end : end + 1] == ["2"]:
+                return [*pieces, "acceleration"], "", False
+            return pieces[:first] + pieces[end:], unit.replace("·", " "), True
+    *rest, letter = pieces or [""]
+    unit = _LETTERS.get(letter, "")
+    kind, why = _kind(_words(rest), "")
+    if unit and kind_of_unit(unit) == kind and len(rest[-1]) >= (6 if unit == "m" else 3):
+        return rest, unit, letter == "s"
+    if letter == "N" and len(why) < 2 and not all(map(str.isupper, pieces)):
+        return rest, unit, False  # `tether_N`
+    return pieces, "", False
+
+
+def _kind(said: Sequence[str], by_unit: str) -> tuple[str, str]:
+    """The quantity that words say, and which of them do; a unit outweighs a single letter."""
+    found = (
+        (len(word) < 2, place, word)
+        for place, kind in enumerate(QUANTITIES)
+        for word in said
+        if word in WORDS[kind]
+    )
+    letter, place, why = min(found, default=(True, 0, ""))
+    kind = QUANTITIES[place]
+    told = " ".join(said)
+    if not letter:
+        return kind, why
+    if kind in (UNKNOWN, TIME) and not WORDS["place"].isdisjoint(said):
+        return "warmth", told
+    if said and said[0] in _OF_LETTERS and said[1:] and _CHANGES.issuperset(said[1:]):
+        return _OF_LETTERS[said[0]], told
+    if by_unit and by_unit != kind and (why != "u"):
+        if by_unit not in ("angle", TIME, "current") or all(len(w) < 3 or w in KNOWN for w in said):
+            return by_unit, f"{told}, in its unit" if told else BY_UNIT
+        return UNKNOWN, ""  # some length, duration or current
+    marks = [w for w in said if w in WORDS["target"] and len(w) > 1 and w != "set"]
+    if not why and marks:
+        return "target", marks[0]
+    if not why and {"normal", "load"} <= set(said):
+        return "torque", told
+    return kind, why
+
+
+_CHANNELS = (
+    ("warmth", "target", UNKNOWN),
+    ("warmth", "", channels.TEMPERATURE),
+    ("torque", "normal", channels.NORMAL_LOAD),
+    ("angle", "target", channels.REFERENCE),
+    ("", "target", channels.COMMAND),
+    ("target", "", channels.COMMAND),
+    ("current", "", channels.MOTOR_CURRENT),
+    ("torque", "estimate", UNKNOWN),
+    ("torque", "sensed", channels.JOINT_TORQUE),
+    ("torque", "", channels.DRIVE_TORQUE),
+    ("rate", "hull", channels.BASE_RATE),
+    ("rate", "gyro", channels.GYRO_RATE),
+    ("angle", "load", channels.RELATIVE_ANGLE),
+    ("rate", "load", channels.RELATIVE_RATE),
+    ("angle", "motor", channels.MOTOR_ANGLE),
+    ("rate", "motor", channels.MOTOR_RATE),
+    ("angle", "", channels.RELATIVE_ANGLE),
+    ("rate", "", channels.RELATIVE_RATE),
+)
+"""The channel of a quantity of which a word says that; the first that fits."""
+
+
+def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ...]]:
+    """The channel of the vocabulary, and what a reader should know of it."""
+    if kind in (TIME, INDEX, UNKNOWN):
+        return kind, ()
+    told = {change for change, words in WORDS.items() if not words.isdisjoint(said)} | {""}
+    if unit == "rpm":
+        told.add("motor")
+    if unit and parse_unit(unit).dimensions == _FORCE and _LOADED.issuperset(said):
+        told.add("normal")  # `Nominal load [N]`
+    of, change, role = next(r for r in _CHANNELS if r[0] in ("", kind) and r[1] in told)
+    unsaid = of in ("angle", "rate", "torque") and not change and role != UNKNOWN
+    doubts = ("which side of the gear is not said",) if unsaid else ()
+    if "estimate" in told:
+        doubts = ("an estimate, and not what a sensor showed", *doubts)
+    return role, doubts

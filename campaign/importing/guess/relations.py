@@ -5,33 +5,16 @@ A factor proves no unit. What is found here is likely, or takes away what a file
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from campaign.channels import (
-    COMMAND,
-    DRIVE_TORQUE,
-    JOINT_TORQUE,
-    MOTOR_ANGLE,
-    MOTOR_CURRENT,
-    MOTOR_RATE,
-    REFERENCE,
-    RELATIVE_ANGLE,
-    RELATIVE_RATE,
-    TEMPERATURE,
-)
+from campaign import channels
+from campaign.importing.defects.between import Slope, slope
 from campaign.importing.guess.columns import Basis, ColumnGuess
-from campaign.importing.guess.evidence import (
-    Likely,
-    factor,
-    unit_of_angle,
-    unit_of_joint,
-    unit_of_rate,
-    unit_of_temperature,
-)
-from campaign.importing.guess.quantities import TIME, UNKNOWN
+from campaign.importing.guess.numbers import likely
+from campaign.importing.guess.words import TIME, UNKNOWN
 from campaign.importing.interface import Array
 from campaign.unit_grammar import parse_unit
 
@@ -41,213 +24,124 @@ MOST = 24
 """Such columns that are looked at; each is held against each."""
 _CERTAIN = 0.995
 """Share explained from which on a column counts as the derivative of another."""
-_SAME = 0.98
-_OF_UNITS = "as the file has it; a unit is wrong, or a gear is between"
-_OF_TIMES = "as the file has it; a unit is wrong, or that of the times"
-_TIMES = (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 60.0, 1 / 60.0)
-"""By what a rate is off where times are in another unit than it is said."""
-_PAIRS = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE), (RELATIVE_ANGLE, MOTOR_RATE))
-_FOLLOWED = {
-    REFERENCE: (RELATIVE_ANGLE, MOTOR_ANGLE),
-    COMMAND: (RELATIVE_RATE, MOTOR_RATE, DRIVE_TORQUE, JOINT_TORQUE, MOTOR_CURRENT),
-}
-"""What a target may be one of."""
-
-_LENGTHS = ("distance", "displacement", "travel", "stroke", "weg", "hub", "deplacement", "abstand")
-"""Words for an angle that are those of a length, too."""
-
+_ANGLES = (channels.RELATIVE_ANGLE, channels.MOTOR_ANGLE)
+_RATES = (channels.RELATIVE_RATE, channels.MOTOR_RATE)
+_TORQUES = (channels.DRIVE_TORQUE, channels.JOINT_TORQUE)
+_TARGETS = (channels.REFERENCE, channels.COMMAND)
 Series = dict[int, Array]
 
 
-def by_numbers(columns: list[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
+def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
     """Roles of columns whose names say nothing: what is the derivative of what."""
-    columns = list(columns)
-    part = {place: values[:ROWS] for place, values in series.items()}
-    time = time[:ROWS]
-    silent = [
-        place
-        for place, each in enumerate(columns)
-        if place in part and each.role == UNKNOWN and not each.why and np.ptp(part[place]) > 0
-    ][:MOST]
-    for k, j in _derivatives(silent, columns, part, time):
-        angle, rate = columns[k], columns[j]
-        if angle.role in (RELATIVE_RATE, MOTOR_RATE):
-            columns[j] = replace(rate, why=f"the derivative of {angle.name}: an acceleration")
-        elif rate.role == UNKNOWN:
-            role = MOTOR_RATE if angle.role == MOTOR_ANGLE else RELATIVE_RATE
-            if _is_there(columns, role, rate.group):
-                continue  # what is like a rate that is there may be its target, or a copy
-            columns[j] = _found(rate, role, f"the derivative of {angle.name}, by its numbers")
-        if angle.role == UNKNOWN:
-            role = MOTOR_ANGLE if columns[j].role == MOTOR_RATE else RELATIVE_ANGLE
-            if _is_there(columns, role, angle.group):
-                continue
-            columns[k] = _found(angle, role, f"{rate.name} is its derivative, by its numbers")
-    return columns
-
-
-def _is_there(columns: Sequence[ColumnGuess], role: str, group: str) -> bool:
-    return any(each.role == role and (not group or each.group in ("", group)) for each in columns)
-
-
-def _found(column: ColumnGuess, role: str, why: str) -> ColumnGuess:
-    return replace(column, role=role, why=why, doubts=(*column.doubts, "its name does not say so"))
-
-
-def _derivatives(
-    silent: Sequence[int], columns: Sequence[ColumnGuess], part: Series, time: Array
-) -> Iterator[tuple[int, int]]:
-    """Pairs of places, the second the derivative of the first, one of them without a name.
-
-    Those with a known one first, then along each chain from its beginning.
-    """
-    angles = [k for k, each in enumerate(columns) if each.role in (RELATIVE_ANGLE, MOTOR_ANGLE)]
-    rates = [k for k, each in enumerate(columns) if each.role in (RELATIVE_RATE, MOTOR_RATE)]
-    pairs = [(k, j) for k in [*angles, *rates] for j in silent]
-    pairs += [(k, j) for k in silent for j in rates]
-    pairs += [(k, j) for k in silent for j in silent if k != j]
-    found = []
-    for k, j in pairs[: MOST * MOST]:
-        each = factor(time, part[k], part[j])
-        if each is not None and each.explained > _CERTAIN:
-            found.append((k, j))
-    ends = {j for _, j in found}
-    # An angle is no derivative of another column; what begins a chain is taken first.
-    found.sort(key=lambda pair: (columns[pair[0]].role == UNKNOWN, pair[0] in ends))
-    used: set[int] = set()
-    for k, j in found:
-        if j not in used:
-            used.add(j)
-            yield k, j
-
-
-def with_units(columns: list[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
-    """Units that the numbers suggest, where the file states none; and what contradicts it."""
-    columns = list(columns)
-    for place, each in enumerate(columns):
-        if each.basis is Basis.UNKNOWN and place in series:
-            columns[place] = _likely(each, _by_range(each, series[place]))
-    for angle_role, rate_role in _PAIRS:
-        for k, j in _alike(columns, angle_role, rate_role):
-            two = _pair(columns[k], columns[j], time, series[k], series[j])
-            if two[1].unit_why.startswith(_OF_TIMES):
-                columns = _with_times(columns, two[1].unit_why)
-            columns[k], columns[j] = two
-    for k, j in _alike(columns, COMMAND, RELATIVE_ANGLE):
-        columns[k] = _of_an_angle(columns[k], columns[j], series[k], series[j])
-    for target, measured in _FOLLOWED.items():
-        for role in measured:
-            for k, j in _alike(columns, target, role):
-                columns[k] = _follows(columns[k], columns[j], series[k], series[j])
-    for role in (DRIVE_TORQUE, JOINT_TORQUE):
-        for k, j in _alike(columns, role, MOTOR_CURRENT):
-            columns[k] = _multiple(columns[k], columns[j], series[k], series[j])
-    return columns
-
-
-def _by_range(column: ColumnGuess, values: Array) -> Likely | None:
-    """A unit that a column's own numbers suggest."""
-    if column.role == TEMPERATURE:
-        return unit_of_temperature(values)
-    if column.role not in (RELATIVE_ANGLE, MOTOR_ANGLE):
-        return None
-    found = unit_of_angle(values)
-    if found is None and column.role == RELATIVE_ANGLE and column.why not in _LENGTHS:
-        found = unit_of_joint(values)
+    found = list(columns)
+    part = {k: values[:ROWS] for k, values in series.items()}
+    silent = [k for k in part if found[k].role == UNKNOWN and not found[k].why][:MOST]
+    angles, rates = ([k for k in part if found[k].role in roles] for roles in (_ANGLES, _RATES))
+    pairs = [(k, j) for k in (*angles, *silent) for j in (*silent, *rates) if k != j]
+    pairs = [pair for pair in pairs if not set(silent).isdisjoint(pair)]
+    fits = [(k, j) for k, j in pairs if _is_derivative(time[:ROWS], part[k], part[j])]
+    ends = {j for _, j in fits}
+    for k, j in (pair for pair in fits if pair[0] not in ends):  # of a rate it is an acceleration
+        motor = found[k].role == channels.MOTOR_ANGLE or found[j].role == channels.MOTOR_RATE
+        whys = (f"{found[j].name} is its derivative", f"the derivative of {found[k].name}")
+        new = {
+            place: _told(
+                replace(found[place], role=roles[motor], why=f"{why}, by its numbers"),
+                "its name does not say so",
+            )
+            for place, roles, why in zip((k, j), (_ANGLES, _RATES), whys, strict=True)
+            if found[place].role == UNKNOWN
+        }
+        # What is like a rate that is there may be its target, or a copy.
+        if not any(a.role == b.role and a.axis == b.axis for a in new.values() for b in found):
+            found = [new.get(place, column) for place, column in enumerate(found)]
     return found
 
 
-def _alike(columns: Sequence[ColumnGuess], one: str, other: str) -> Iterator[tuple[int, int]]:
-    """Places of columns of two roles, of one axis."""
-    for k, first in enumerate(columns):
-        for j, second in enumerate(columns):
-            if first.role == one and second.role == other and first.group == second.group:
-                yield k, j
+def _is_derivative(time: Array, angle: Array, rate: Array) -> bool:
+    """Whether it is, in its sign, too: of a sine the angle is the negative one of its rate."""
+    found = _factor(time, angle, rate)
+    return found is not None and found.explained > _CERTAIN and found.factor > 0
 
 
-def _likely(column: ColumnGuess, likely: Likely | None) -> ColumnGuess:
-    if likely is None:
-        return column
-    return replace(column, unit=likely.unit, basis=Basis.LIKELY, unit_why=likely.why)
+def _factor(time: Array, angle: Array, rate: Array) -> Slope | None:
+    """The factor between a rate and the derivative of its angle, where it is one."""
+    found = slope(time, angle, rate)
+    return found if found is not None and found.explained > 0.9 and found.travel > 30 else None
 
 
-def _pair(
-    angle: ColumnGuess, rate: ColumnGuess, time: Array, q: Array, v: Array
-) -> tuple[ColumnGuess, ColumnGuess]:
-    """A rate beside its angle: the unit of the one from that of the other, and what is odd."""
-    found = factor(time, q, v)
-    if found is None:
-        return angle, rate
-    told = f"{found.factor:.5g} times the derivative of {angle.name}, R² {found.explained:.4f}"
-    if rate.basis is Basis.UNKNOWN and angle.unit:
-        rate = _likely(rate, unit_of_rate(found, angle.unit))
-    elif {angle.basis, rate.basis} == {Basis.STATED}:
-        due = _due(angle.unit, rate.unit)
-        close = max(0.1, 3 * found.error)
-        sides = (angle.role == MOTOR_ANGLE) == (rate.role == MOTOR_RATE)
-        if due is not None and sides and abs(abs(found.factor) / due - 1) > close:
-            # One of them is wrong, or the times are, or a gear is between; nobody can tell which.
-            ratio = abs(found.factor) / due
-            timely = any(abs(ratio / each - 1) < 0.03 for each in _TIMES)
-            against = f"{_OF_TIMES if timely else _OF_UNITS}: {rate.name} is {told}, "
-            against += f"and {due:.5g} is due"
-            angle, rate = (_doubtful(each, against) for each in (angle, rate))
-    return angle, replace(rate, doubts=(*rate.doubts, told))
+def with_units(columns: Sequence[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
+    """Units that columns suggest of each other; and what contradicts those that a file states."""
+    found = list(columns)
+    for k, j in _pairs(found, _ANGLES, _RATES):
+        factor = _factor(time, series[k], series[j])
+        if factor is not None:
+            _rate_of_angle(found, k, j, factor)
+    for k, j in _pairs(found, _TARGETS, (*_ANGLES, *_RATES, *_TORQUES, channels.MOTOR_CURRENT)):
+        size, fit = _beside(series[k], series[j])
+        if fit > 0.98 and abs(size - 1) < 0.1:
+            # A target is one of what follows it.
+            role = channels.REFERENCE if found[j].role in _ANGLES else channels.COMMAND
+            found[k] = _told(found[k], f"it goes with {found[j].name}, R² {fit:.4f}")
+            found[k] = _with_unit(replace(found[k], role=role), found[j].unit)
+    for k, j in _pairs(found, _TORQUES, (channels.MOTOR_CURRENT,)):
+        size, fit = _beside(series[k], series[j])
+        if fit > 0.9999:
+            made = f"it is {size:.5g} times {found[j].name}: made of it, and not measured by itself"
+            found[k] = _told(found[k], made)
+    return found
 
 
-def _with_times(columns: list[ColumnGuess], why: str) -> list[ColumnGuess]:
-    """Times do not stand either where it may be they that contradict a rate."""
-    return [
-        _doubtful(each, why) if each.role == TIME and each.basis is Basis.STATED else each
-        for each in columns
-    ]
+def _pairs(
+    columns: Sequence[ColumnGuess], ones: Sequence[str], others: Sequence[str]
+) -> list[tuple[int, int]]:
+    """Places of columns of such roles, of one axis."""
+    both = [(k, j) for k in range(len(columns)) for j in range(len(columns))]
+    roles = [(k, j) for k, j in both if columns[k].role in ones and columns[j].role in others]
+    return [(k, j) for k, j in roles if columns[k].axis == columns[j].axis]
+
+
+def _told(column: ColumnGuess, doubt: str) -> ColumnGuess:
+    return replace(column, doubts=(*column.doubts, doubt))
+
+
+def _with_unit(column: ColumnGuess, unit: str) -> ColumnGuess:
+    """With a unit that the last of its doubts suggests, where it has none."""
+    return likely(column, unit, column.doubts[-1]) if column.basis is Basis.UNKNOWN else column
+
+
+def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> None:
+    """The unit of a rate from that of its angle; where both are stated, whether they agree."""
+    angle, rate, size = found[k], found[j], abs(factor.factor)
+    told = f"{factor.factor:.5g} times the derivative of {angle.name}, R² {factor.explained:.4f}"
+    found[j] = _told(rate, told)
+    for unit in ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s", "count/s"):
+        due = _due(angle.unit, unit)
+        if due and abs(size / due - 1) < max(0.02, 3 * factor.error):
+            found[j] = _with_unit(found[j], unit)
+    due = _due(angle.unit, rate.unit)
+    sides = (angle.role == channels.MOTOR_ANGLE) == (rate.role == channels.MOTOR_RATE)
+    stated = {angle.basis, rate.basis} == {Basis.STATED}
+    if due and sides and stated and abs(size / due - 1) > max(0.1, 3 * factor.error):
+        # One of the three is wrong, or a gear is between; nobody can tell which.
+        why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due"
+        for place, each in enumerate(found):
+            if place in (k, j) or (each.role == TIME and each.basis is Basis.STATED):
+                found[place] = likely(each, each.unit, why)
 
 
 def _due(angle: str, rate: str) -> float | None:
     """What a rate in its unit is times the derivative of an angle in its own; None: no factor."""
-    one, two = parse_unit(angle), parse_unit(rate)
-    if (one * parse_unit("1/s")).dimensions != two.dimensions:
+    if not angle or not rate:
         return None
-    return float(one.factor / two.factor)
+    one, two = parse_unit(angle) * parse_unit("1/s"), parse_unit(rate)
+    return float(one.factor / two.factor) if one.dimensions == two.dimensions else None
 
 
-def _doubtful(column: ColumnGuess, why: str) -> ColumnGuess:
-    return replace(column, basis=Basis.LIKELY, unit_why=why)
-
-
-def _slope(one: Array, other: Array) -> tuple[float, float] | None:
-    """The factor of `one` over `other`, and how well it fits; None where they do not move."""
+def _beside(one: Array, other: Array) -> tuple[float, float]:
+    """How large one is beside the other, and how well that fits (R²); 0 where one stands still."""
     known = np.isfinite(one) & np.isfinite(other)
     x, y = other[known], one[known]
     if len(x) < 20 or np.ptp(x) == 0 or np.ptp(y) == 0:
-        return None
-    fits = float(np.corrcoef(x, y)[0, 1]) ** 2
-    return float(np.ptp(y) / np.ptp(x)), fits
-
-
-def _follows(target: ColumnGuess, measured: ColumnGuess, w: Array, y: Array) -> ColumnGuess:
-    """A target has the unit of what follows it."""
-    found = _slope(w, y)
-    if found is None or found[1] < _SAME or abs(found[0] - 1) > 0.1:
-        return target
-    told = f"it goes with {measured.name}, R² {found[1]:.4f}"
-    if target.basis is Basis.UNKNOWN and measured.unit:
-        return _likely(target, Likely(measured.unit, told))
-    return replace(target, doubts=(*target.doubts, told)) if target.role == COMMAND else target
-
-
-def _of_an_angle(target: ColumnGuess, angle: ColumnGuess, w: Array, q: Array) -> ColumnGuess:
-    """A target of which nothing but its numbers says that it is one of an angle."""
-    found = _slope(w, q) if target.basis is Basis.UNKNOWN and target.of_anything else None
-    if found is None or found[1] < _SAME or abs(found[0] - 1) > 0.1:
-        return target
-    return replace(target, role=REFERENCE, why=f"{target.why}, and it goes with {angle.name}")
-
-
-def _multiple(torque: ColumnGuess, current: ColumnGuess, tau: Array, i: Array) -> ColumnGuess:
-    """A torque that is the current, times a constant."""
-    found = _slope(tau, i)
-    if found is None or found[1] < 0.9999:
-        return torque
-    told = f"it is {found[0]:.5g} times {current.name}: made of it, and not measured by itself"
-    return replace(torque, doubts=(*torque.doubts, told))
+        return 0.0, 0.0
+    return float(np.ptp(y) / np.ptp(x)), float(np.corrcoef(x, y)[0, 1]) ** 2
