@@ -14,9 +14,9 @@ _QUANTITIES = {
     "power leistung pressure druck model sim simulated predicted residual tcp pose wrench "
     "cartesian quaternion twist mag jerk energy duty fault controlword statusword stiffness "
     "damping inertia gain kp ki kd init initial home offset bias limit limits threshold diff "
-    "deviation following schleppfehler abweichung pulse pulses battery supply latency jitter dt delta "
-    "humidity feuchte depth wear verschleiss resistance feed hall erpm thetae omegae elec electrical "
-    "uncertainty sigma std variance cov",
+    "deviation following schleppfehler abweichung pulse pulses battery supply latency jitter dt "
+    "delta humidity feuchte depth wear verschleiss resistance feed hall erpm thetae omegae elec "
+    "electrical uncertainty sigma std variance cov",
     "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
     "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
     "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
