@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
 from campaign.identification.gate import refused
-from campaign.identification.intervals import with_error
+from campaign.identification.intervals import shifted_by, with_error
 from campaign.identification.least_squares import Array
 from campaign.identification.stribeck import PARAMETERS
-from campaign.identification.velocity_map import DirectionFit, Model, fitted_estimates
+from campaign.identification.velocity_map import (
+    FORM,
+    DirectionFit,
+    Model,
+    fitted_estimates,
+    is_bent,
+)
 from campaign.reason import Cause
 
+TOGETHER = "mean of both directions, their errors taken for the same"
 ONE_DIRECTION = Cause("one direction", "one direction is {origin}")
 
 
@@ -40,6 +48,20 @@ def _mean(
                 return each
             reason = each.reason or ONE_DIRECTION(origin=each.origin)
             return refused(Estimate(name, value, unit), reason)
+    if is_bent(positive, model, name) or is_bent(negative, model, name):
+        ends = np.array([[one.low, one.high], [other.low, other.high]], dtype=float)
+        low, high = np.mean(ends, axis=0).tolist()
+        told = replace(one, value=value, low=low, high=high, method=TOGETHER, systematic=())
+    else:
+        told = _by_covariance(positive, negative, model, one, other)
+    parts = (positive.form_part(model, name), negative.form_part(model, name))
+    return shifted_by(told, FORM, 0.5 * sum(parts)) if any(parts) else told
+
+
+def _by_covariance(
+    positive: DirectionFit, negative: DirectionFit, model: Model, one: Estimate, other: Estimate
+) -> Estimate:
+    name, value = one.name, 0.5 * (one.value + other.value)
     found = positive.fits[model], negative.fits[model]
     cross = cross_covariance(positive, negative, model)
     i, j = found[0].free.index(name), found[1].free.index(name)
@@ -49,7 +71,8 @@ def _mean(
     freedom = min(positive.freedom, negative.freedom)
     method = f"mean of both directions, with the covariance of their points, t({freedom})"
     error = math.sqrt(max(float(variance), 0.0))
-    return with_error(name, value, unit, error, freedom, method, reason=one.reason or other.reason)
+    reason = one.reason or other.reason
+    return with_error(name, value, one.unit, error, freedom, method, reason=reason)
 
 
 def correlation(positive: DirectionFit, negative: DirectionFit) -> float:

@@ -26,7 +26,7 @@ import numpy as np
 from campaign.estimate import Estimate, Origin
 from campaign.identification.extrapolated import extrapolated
 from campaign.identification.gate import USELESS, admitted, mattering, refused
-from campaign.identification.intervals import student, with_error
+from campaign.identification.intervals import shifted_by, student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
     LEAST,
@@ -56,6 +56,11 @@ SETTLED = 1e-3
 """relative change of the deviation between points below which the rounds end."""
 DOUBTED = 0.2
 """p-value below which the points contradict a model that holds a parameter."""
+EFFECT = 1e-3
+"""p-value of a line below which a Stribeck effect shows. A line has neither vs nor delta, so that
+the F distribution is none of it (Davies, Biometrika 74 (1987) 33); and an effect that just shows is
+told too large. Of 600 lines two passed 0.01 and none 0.001."""
+FORM = "form of the curve"
 BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_exponent")
 STRAIGHT = 0.2
 """Half-width of vs over it up to which intervals follow from the slopes of the curve."""
@@ -64,7 +69,7 @@ LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
 HELD_EXPONENT = Cause("held", "held at {value:g}")
 LEFT_OPEN = Cause("left open by points", "these points leave it open")
-NO_EFFECT = Cause("no Stribeck effect", "Ts and Tc are the same within their interval")
+NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effect")
 SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
 NEGATIVE = Cause("negative by the data", "the data would have it negative")
 LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
@@ -108,8 +113,8 @@ class DirectionFit:
 
     @property
     def shows_stribeck_effect(self) -> bool:
-        """Whether Ts and Tc are apart by more than the interval of their difference."""
-        return differs(self.fits["free"], self.freedom)
+        """Whether the points contradict a line beyond doubt."""
+        return self._p_value("none") < EFFECT
 
     @property
     def preferred(self) -> Model:
@@ -117,20 +122,21 @@ class DirectionFit:
         return min(MODELS, key=lambda model: self.fits[model].bic)
 
     def contradiction(self, model: Model) -> Reason:
-        """Why the points contradict a model: what it holds fixed; `NONE` where they do not.
+        """Why the points contradict a model: what it holds fixed; `NONE` where they do not."""
+        p = self._p_value(model)
+        return CONTRADICTED[model](p=p) if p < DOUBTED else NONE
 
-        F test of the model against the free fit, whose weights it has.
-        """
+    def _p_value(self, model: Model) -> float:
+        """F test of a model against the free fit, whose weights it has."""
         held, free = self.fits[model], self.fits["free"]
         more = len(free.free) - len(held.free)
-        if more <= 0 or not free.chi_square > 0:
-            return NONE
+        if more <= 0:
+            return 1.0
         excess = (held.chi_square - free.chi_square) / more
-        ratio = excess / (free.chi_square / self.freedom)
+        ratio = excess / max(free.chi_square / self.freedom, TINY)
         from scipy.special import fdtrc
 
-        p = float(fdtrc(more, self.freedom, max(ratio, 0.0)))
-        return CONTRADICTED[model](p=p) if p < DOUBTED else NONE
+        return float(fdtrc(more, self.freedom, max(ratio, 0.0)))
 
     @property
     def misfit(self) -> float:
@@ -141,6 +147,17 @@ class DirectionFit:
         """Why a parameter is extrapolated; none where it is not, or no Stribeck effect shows."""
         velocity = self.fits["free"].values["stribeck_velocity"]
         return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else NONE
+
+    def form_part(self, model: Model, name: str) -> float:
+        """What the form of the curve leaves open of a parameter (1 sigma, in its unit).
+
+        Where no Stribeck effect shows, a line describes the points as well: the truth is anywhere
+        between the two (rectangular distribution; GUM, 4.3.7).
+        """
+        line = self.fits["none"]
+        if model == "none" or self.shows_stribeck_effect or name not in line.free:
+            return 0.0
+        return abs(self.fits[model].values[name] - line.values[name]) / math.sqrt(3.0)
 
 
 def fit_direction(
@@ -214,13 +231,6 @@ def _deviation(torque: Array, window: Array, between: float) -> Array:
     return np.sqrt(window**2 + (between**2 + LEAST**2) * torque**2)
 
 
-def differs(found: StribeckFit, freedom: float) -> bool:
-    """Whether Ts and Tc are apart by more than the t interval of their difference."""
-    drop = found.values["static_torque"] - found.values["coulomb_torque"]
-    between = {"static_torque": 1.0, "coulomb_torque": -1.0}
-    return abs(drop) > student(freedom) * math.sqrt(max(found.variance(between), 0.0))
-
-
 def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
     """The parameters of one direction with their intervals, by name, as they may be reported."""
     return {name: passed(one, model, fit) for name, one in fitted_estimates(fit, model).items()}
@@ -236,8 +246,7 @@ def passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
     """A parameter of one direction, or of the mean of both, as it may be reported."""
     shape = told.name in ("stribeck_velocity", "stribeck_exponent")
     of_effect = shape or told.name == "static_torque"  # which may lie below the slowest speed
-    freedom = min(fit.freedom for fit in fits)
-    effect = all(differs(fit.fits[model], freedom) for fit in fits)
+    effect = all(fit.shows_stribeck_effect for fit in fits)
     if of_effect and not effect and told.origin is Origin.MEASURED:
         return refused(told, NO_EFFECT())
     force = max(float(fit.torque.max()) for fit in fits)
@@ -262,22 +271,26 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
         return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
     told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
-    bent = told.reason or (name in BENT and _is_bent(found, fit.freedom))
-    effect = model != "none" and differs(found, fit.freedom)
-    return _by_profile(fit, model, told) if effect and bent else told
+    if is_bent(fit, model, name):
+        return _by_profile(fit, model, told)
+    form = fit.form_part(model, name)
+    return shifted_by(told, FORM, form) if form else told
 
 
-def _is_bent(found: StribeckFit, freedom: float) -> bool:
-    """Whether vs is known so badly that the curve is not straight within its error."""
-    error = math.sqrt(max(found.variance({"stribeck_velocity": 1.0}), 0.0))
-    return student(freedom) * error > STRAIGHT * found.values["stribeck_velocity"]
+def is_bent(fit: DirectionFit, model: Model, name: str) -> bool:
+    """Whether the curve is not straight within the error of a parameter: it is extrapolated, or vs
+    is known badly. Its interval is by profile likelihood then.
+    """
+    if model == "none" or not fit.shows_stribeck_effect:
+        return False
+    found = fit.fits[model]
+    error = student(fit.freedom) * math.sqrt(max(found.variance({"stribeck_velocity": 1.0}), 0.0))
+    badly = error > STRAIGHT * found.values["stribeck_velocity"]
+    return bool(fit.beyond(name)) or (name in BENT and badly)
 
 
 def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
-    """What is extrapolated, by profile likelihood: the curve is not straight within its errors.
-
-    Refused where the points give no limit on a side.
-    """
+    """By profile likelihood; refused where the points give no limit on a side."""
     found, rise = fit.fits[model], student(fit.freedom) ** 2
     step = 0.5 * (told.standard_error or 0.0)
 
@@ -364,10 +377,7 @@ def doubts(fit: DirectionFit) -> Iterator[str]:
     for name, side in found.bounds.items():
         yield f"{name} ended at its {side} bound {found.values[name]:.4g}"
     if not fit.shows_stribeck_effect:
-        yield (
-            "static_torque and coulomb_torque are the same within their interval: no Stribeck "
-            "effect shows, and stribeck_velocity is not determined"
-        )
+        yield ("no Stribeck effect shows: static_torque and stribeck_velocity are not determined")
     for name, which in (("static_torque", "slower"), ("coulomb_torque", "faster")):
         if why := fit.beyond(name):
             yield f"{why}; add {which} ones"

@@ -168,5 +168,5 @@ def test_too_short_a_settling_is_told_in_the_plan_and_behind_the_run() -> None:
     assert advice in slow.note
     assert "settle" not in fast.note
     result = analyse("velocity_map", execute([slow, fast]))
-    assert f"At 1 to 1 deg/s: {advice}." in result.notes
+    assert f"At 1 deg/s: {advice}." in result.notes
     assert not any("settle for" in t.note for t in trials("velocity_map", bench(), options))

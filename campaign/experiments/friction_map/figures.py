@@ -97,8 +97,7 @@ def _law(curve: Curve, direction: str) -> Curve:
 def falls(fit: DirectionFit) -> bool:
     """Whether friction falls as sliding becomes faster, beyond what scatter leaves open."""
     values = fit.fits["free"].values
-    bends = fit.shows_stribeck_effect or bool(fit.contradiction("none"))
-    return bends and values["static_torque"] > values["coulomb_torque"]
+    return fit.shows_stribeck_effect and values["static_torque"] > values["coulomb_torque"]
 
 
 def _least(fit: DirectionFit) -> tuple[float, float] | None:
