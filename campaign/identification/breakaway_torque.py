@@ -131,21 +131,27 @@ def breakaway_torque(
         reach /= WIDER
     peak_time = middle if noisy else found.peak_time
     wider = fit(peak_time, WIDER * reach).friction(peak_time)
-    told = _told(found, peak_time, end.friction(slid), end.friction(slid - pace))
+    told = _told(found, peak_time, end.friction(slid), end.friction(slid - pace), peak_time < slid)
     return Breakaway(_with_shift(told, wider), peak_time, found.acceleration(peak_time))
 
 
 def _told(
-    found: _Fit, peak_time: float, late: tuple[float, float], before: tuple[float, float]
+    found: _Fit,
+    peak_time: float,
+    late: tuple[float, float],
+    before: tuple[float, float],
+    passed: bool,
 ) -> Estimate:
     """The estimate, by friction and its error (N m) as the load slides and a pace before.
 
-    Errors add up: those of two fits that share samples are not independent.
+    `passed`: the maximum lies before the load slides; one behind it is where the recording ends, as
+    of friction that grows with speed. Errors add up: those of two fits that share samples are not
+    independent.
     """
     (value, error), freedom = found.friction(peak_time), found.errors.freedom
     more = {"standard_error": error, "freedom": freedom, "method": METHOD}
     times = student(freedom)
-    if value - late[0] <= times * (error + late[1]):
+    if not passed or value - late[0] <= times * (error + late[1]):
         rises = late[0] - before[0] > times * (late[1] + before[1])
         reason, low = STILL_RISING() if rises else NO_FALL(), value - times * error
         return Estimate.without_interval(NAME, low, "N m", reason, kind="at least", **more)

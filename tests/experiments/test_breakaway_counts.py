@@ -151,3 +151,19 @@ def test_the_zero_of_a_torque_sensor_is_in_no_number_of_a_ramp() -> None:
     assert "bristle_stiffness" in exact
     for name in ("breakaway_torque", "bristle_stiffness"):
         assert off[name] == pytest.approx(exact[name], rel=1e-9), name
+
+
+def test_friction_that_grows_with_speed_has_no_breakaway() -> None:
+    """Its largest value is where the recording ends, and no number of the rig."""
+    tree = by_counts().model_dump(mode="json")
+    tree["sensors"]["encoder"]["resolution"] = COUNT / 10.0
+    tree["sensors"]["gyro"]["resolution"] = 100.0 * COUNT
+    name, load = next(iter(tree["friction"].items()))
+    load |= {"static_torque": 0.85 * load["coulomb_torque"], "stribeck_velocity": 0.03}
+    tree["friction"] = {name: load}
+    growing = Bench.model_validate(tree, context={"si": True})
+    options = {"positions": ["0 rad"], "directions": ["positive"], "torque_rate": "2 N m/s"}
+    (done,) = execute(trials("breakaway", growing, options))
+    found = torque_of(done)
+    assert found.kind == "at least"
+    assert found.value < float(np.max(done.samples["friction_torque"]))
