@@ -10,12 +10,13 @@ trend is reported.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from campaign.identification.intervals import BATCHES, student
-from campaign.identification.relative_rate import resolved_rate
+from campaign.identification.relative_rate import RelativeRate, resolved_rate
 from campaign.identification.time_stuck import SIGMAS, count_of
 from campaign.reason import NONE, Cause, Reason
 
@@ -61,7 +62,6 @@ def unsteady(
     time: Array,
     rate: Array,
     angle: Array | None,
-    modelled: Array | None = None,
     *,
     own_sensor: bool = True,
 ) -> Reason:
@@ -70,7 +70,6 @@ def unsteady(
     Args:
         time, rate: s, rad/s; shape (n,), n at least 3, lost samples left out.
         angle: by an encoder (rad), shape (n,); None where nobody recorded it.
-        modelled: what is known to vary over position, as columns of a regression, shape (n, m).
         own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
     """
     mean = abs(float(np.mean(rate)))
@@ -81,20 +80,10 @@ def unsteady(
     counts = _counts(rate, None if own_sensor else angle, mean * duration, step)
     if counts < FEWEST_COUNTS:
         return TOO_FEW_COUNTS(counts=counts, needs=FEWEST_COUNTS)
-    # Evenly, and NaN where samples were lost: smoothing goes by their number.
-    place = np.round((time - time[0]) / step).astype(int)
-    seen = resolved_rate(
-        _spread_out(rate, place),
-        None if angle is None else _spread_out(angle, place),
-        step,
-        RESOLVED * mean,
-        0.1 * duration,
-        own_sensor=own_sensor,
-    )
-    values = seen.values[place]
+    seen = seen_rate(time, rate, angle, own_sensor=own_sensor)
+    values = seen.values
     there = np.isfinite(values)
-    parts = [np.ones_like(time), time - time.mean()]
-    columns = np.column_stack(parts if modelled is None else [*parts, modelled])[there]
+    columns = np.column_stack([np.ones_like(time), time - time.mean()])[there]
     if there.sum() <= columns.shape[1]:
         return NONE
     values = values[there]
@@ -107,6 +96,27 @@ def unsteady(
     return cause(
         spread_percent=100.0 * math.sqrt(square - explained) / mean, least_percent=100.0 * least
     )
+
+
+def seen_rate(
+    time: Array, rate: Array, angle: Array | None, *, own_sensor: bool = True
+) -> RelativeRate:
+    """The rate, smoothed until its sensor tells a twentieth of its mean; arguments as above.
+
+    Its values are at the samples, shape (n,), NaN where smoothing has none.
+    """
+    step = float(np.median(np.diff(time)))
+    # Evenly, and NaN where samples were lost: smoothing goes by their number.
+    place = np.round((time - time[0]) / step).astype(int)
+    seen = resolved_rate(
+        _spread_out(rate, place),
+        None if angle is None else _spread_out(angle, place),
+        step,
+        RESOLVED * abs(float(np.mean(rate))),
+        0.1 * (step + float(np.ptp(time))),
+        own_sensor=own_sensor,
+    )
+    return replace(seen, values=seen.values[place])
 
 
 def drifting(
@@ -129,8 +139,8 @@ def drifting(
 def torque_drift(torque: Array, modelled: Array | None = None) -> Reason:
     """Whether a torque, shape (n,), changes across its window by more than it scatters; by batches.
 
-    Running-in does that, warming, and a ripple that is longer than the window. `modelled`, as for
-    `unsteady`, is fitted beside the change.
+    Running-in does that, warming, and a ripple that is longer than the window. `modelled`, shape
+    (n, m), is fitted beside the change: what is known to vary over position.
     """
     size = len(torque) // BATCHES
     if size == 0:

@@ -71,6 +71,9 @@ HELD_EXPONENT = Cause("held", "held at {value:g}")
 LEFT_OPEN = Cause("left open by points", "these points leave it open")
 NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effect")
 SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
+EXPONENT_ENDED = Cause(
+    "exponent at search limit", "the exponent ended at {value:.3g}, its {side} limit, and moves it"
+)
 NEGATIVE = Cause("negative by the data", "the data would have it negative")
 LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
 CONTRADICTED: Mapping[Model, Cause] = {
@@ -267,6 +270,10 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
         )
     if name in found.bounds:
         return _at_bound(fit, model, name, method)
+    ended = found.bounds.get("stribeck_exponent")
+    if name in ("static_torque", "stribeck_velocity") and ended:
+        reason = EXPONENT_ENDED(value=found.values["stribeck_exponent"], side=ended)
+        return refused(Estimate(name, value, unit, method=method), reason)
     if name in found.open:
         return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))

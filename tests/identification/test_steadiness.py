@@ -79,13 +79,6 @@ def test_the_mean_over_a_rate_that_varies_little_is_that_of_its_mean() -> None:
             assert abs(fall.mean() - np.exp(-(mean**exponent))) < 0.01
 
 
-def test_a_known_ripple_of_the_rate_is_no_variation() -> None:
-    wave = 2 * np.pi * PHASE
-    rate = SPEED * (1.0 + 0.5 * np.sin(wave + 0.3))
-    assert unsteady(TIME, rate, None) in RATE_VARIES
-    assert not unsteady(TIME, rate, None, np.column_stack([np.cos(wave), np.sin(wave)]))
-
-
 def test_counts_of_a_steady_motion_are_no_stick_slip() -> None:
     """One count per millisecond is 0.4 rad/s, twenty times the mean: zeros and spikes."""
     angle = counted(SPEED * TIME, 4e-4)
