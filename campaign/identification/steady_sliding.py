@@ -102,11 +102,7 @@ def steady_sliding(
     short = periods is not None and columns is None
     judged = trouble, NONE if short else torque_drift(torque, columns)
     of_torque = of_series("friction_torque", noise, "N m")
-    seen = seen_rate(time, rate, angle, own_sensor=own_sensor).values
-    weight = np.where(np.isfinite(seen), seen, rate.mean())
-    moves = abs(weight.sum()) > 0.0
-    mean = float(weight @ torque / weight.sum() if moves else torque.mean())
-    mean -= (inertia or 0.0) * slope
+    mean = _over_the_way(time, rate, torque, angle, own_sensor) - (inertia or 0.0) * slope
     spread = float(np.std(torque))
     about = rate - rate.mean() - slope * clock
     of_slope = float(np.sqrt(about @ about / max(len(time) - 2, 1) / (clock @ clock)))
@@ -130,3 +126,14 @@ def steady_sliding(
     )
     effective = (float(np.std(noise)) / both) ** 2 if both > 0 else float(len(time))
     return SteadySliding(of_rate, told, spread, slope, effective, first, last, *judged)
+
+
+def _over_the_way(
+    time: Array, rate: Array, torque: Array, angle: Array | None, own_sensor: bool
+) -> float:
+    """Mean torque by the smoothed rate; over time where the load went nowhere."""
+    if not abs(float(rate.mean())) > np.finfo(float).tiny:
+        return float(torque.mean())
+    seen = seen_rate(time, rate, angle, own_sensor=own_sensor).values
+    weight = np.where(np.isfinite(seen), seen, rate.mean())
+    return float(weight @ torque / weight.sum())
