@@ -30,6 +30,7 @@ from campaign.units import split_quantity
 PLAIN = ("", "1", "-")
 """How people write that a number has no unit."""
 AT_REST = "the hull is taken to be at rest, so the load's rate in space is that to the hull"
+GEARED = "divided by the ratio of the gear; without `[gear]` in the bench that is 1, a direct drive"
 
 
 @dataclass(frozen=True)
@@ -134,14 +135,14 @@ def _one(rig: RigFacts) -> float:
     return 1.0
 
 
-def _by_gear(rig: RigFacts) -> float | None:
-    return None if rig.ratio is None else 1.0 / rig.ratio
+def _by_gear(rig: RigFacts) -> float:
+    return 1.0 / (rig.ratio or 1.0)  # without a gear the motor drives directly
 
 
 _WAYS = (
-    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear),
+    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear, GEARED),
     _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, _one),
-    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear),
+    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear, GEARED),
     _Way(RELATIVE_RATE, GYRO_RATE, False, _one, AT_REST),
     _Way(GYRO_RATE, RELATIVE_RATE, False, _one, AT_REST),
     _Way(DRIVE_TORQUE, MOTOR_CURRENT, False, lambda rig: rig.torque_per_current),

@@ -82,8 +82,10 @@ def with_units(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
         if fit > 0.98 and abs(size - 1) < 0.1:
             # A target is one of what follows it.
             role = channels.REFERENCE if found[j].role in _ANGLES else channels.COMMAND
-            found[k] = _told(found[k], f"it goes with {found[j].name}, R² {fit:.4f}")
-            found[k] = _with_unit(replace(found[k], role=role), found[j].unit)
+            why = f"it goes with {found[j].name}, R² {fit:.4f}"
+            found[k] = replace(found[k], role=role, why=f"{found[k].why}; {why}")
+            if found[k].basis is Basis.UNKNOWN:
+                found[k] = likely(found[k], found[j].unit, why)
     for k, j in _pairs(found, _TORQUES, (channels.MOTOR_CURRENT,)):
         size, fit = _beside(series[k], series[j])
         if fit > 0.9999:
@@ -105,24 +107,28 @@ def _told(column: ColumnGuess, doubt: str) -> ColumnGuess:
     return replace(column, doubts=(*column.doubts, doubt))
 
 
-def _with_unit(column: ColumnGuess, unit: str) -> ColumnGuess:
-    """With a unit that the last of its doubts suggests, where it has none."""
-    return likely(column, unit, column.doubts[-1]) if column.basis is Basis.UNKNOWN else column
-
-
 def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> None:
-    """The unit of a rate from that of its angle; where both are stated, whether they agree."""
+    """The unit of a rate, and its side, from its angle; whether those that are stated agree."""
     angle, rate, size = found[k], found[j], abs(factor.factor)
-    told = f"{factor.factor:.5g} times the derivative of {angle.name}, R² {factor.explained:.4f}"
-    found[j] = _told(rate, told)
+    of, fit = f"times the derivative of {angle.name}", f"R² {factor.explained:.4f}"
+    told = f"{factor.factor:.5g} {of}, {fit}"
     for unit in ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s", "count/s"):
         due = _due(angle.unit, unit)
-        if due and abs(size / due - 1) < max(0.02, 3 * factor.error):
-            found[j] = _with_unit(found[j], unit)
+        alike = due and abs(size / due - 1) < max(0.02, 3 * factor.error)
+        if alike and rate.basis is Basis.UNKNOWN:
+            rate = likely(rate, unit, told)
     due = _due(angle.unit, rate.unit)
+    if due and abs(factor.factor / due - 1) <= max(0.1, 3 * factor.error):
+        own = _RATES[_ANGLES.index(angle.role)]
+        if not rate.sided and all((own, rate.axis) != (each.role, each.axis) for each in found):
+            rate = replace(rate, role=own, why=f"{rate.why}; the derivative of {angle.name}")
+        found[j] = rate
+        return
+    in_one = f"{factor.factor / due:.5g} {of} in the same unit, {fit}" if due else told
+    found[j] = _told(rate, in_one)
     sides = (angle.role == channels.MOTOR_ANGLE) == (rate.role == channels.MOTOR_RATE)
     stated = {angle.basis, rate.basis} == {Basis.STATED}
-    if due and sides and stated and abs(size / due - 1) > max(0.1, 3 * factor.error):
+    if due and sides and stated:
         # One of the three is wrong, or a gear is between; nobody can tell which.
         why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due"
         for place, each in enumerate(found):

@@ -34,14 +34,19 @@ _HEAD = """\
 #    with its whole block.
 # 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
 #    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
-# 4. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
+# 4. A rig without `[gear]` is a direct drive: motor and load move as one. With a gear write `[gear]`
+#    and `ratio = ...` into rig.toml, make columns of the motor's side motor_angle and motor_rate,
+#    and give a torque at the motor `times = "RATIO"`.
+# 5. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
 #    `campaign import mapping.toml --report` makes run and report of it.
 # Never guessed: signs, the side of a gear, torque constants, rated torques, offsets, filters.
 schema = 2
 title = {title}"""
 _LACKING = {
-    (channels.RELATIVE_RATE, channels.RELATIVE_ANGLE): "no column was taken for the motion, which "
-    "`motion` needs: relative_rate, or relative_angle; for those of a motor the rig needs a gear",
+    (
+        *(channels.RELATIVE_RATE, channels.RELATIVE_ANGLE),
+        *(channels.MOTOR_RATE, channels.MOTOR_ANGLE),
+    ): "no column was taken for the motion, which `motion` needs: an angle or a rate",
     (channels.DRIVE_TORQUE, channels.JOINT_TORQUE): "no column was taken for what drives it, which "
     "`motion` needs: drive_torque or joint_torque; of a current it is made with `times`:",
 }
@@ -60,7 +65,9 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
         lines += ["", "[[test]]", f"name = {_quoted(slug(f'axis {axis}') if axis else 'recorded')}"]
         lines += ['kind = "motion"', _doubt("the rig: see above"), 'bench = "rig.toml"']
         for layout in (each for each in found if each.axis == axis):
-            lines += ["", *_recording(layout, base)]
+            own = _recording(layout, base)
+            # What files are read as stands once for all that are alike.
+            lines += ["", *(x for x in own if x not in lines or not x.startswith("# read as"))]
     alike = Counter(layout.name for layout in found)
     for name, layout in {each.name: each for each in reversed(found)}.items():
         lines += ["", *_columns(layout, alike[name])]
@@ -92,6 +99,10 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
     yield _comment(f"Columns of {first.file.name} {first.name} {layout.axis}".rstrip() + others)
     if first.clock:
         yield _comment(f"Time: the file states a step of {first.step:.9g} s.")
+    unsaid = [p.column.role for p in layout.columns if not p.column.sided]
+    if unsaid:
+        told = ", ".join(dict.fromkeys(unsaid))
+        yield _doubt(f"which side of the gear (4 above) is not said: {told}")
     taken: set[str] = set()
     for placed in layout.columns:
         role = placed.column.role
@@ -149,7 +160,9 @@ def _unit(column: ColumnGuess) -> Iterator[str]:
         yield _doubt(f"{unit}  # {column.basis}: {why}")
     if column.unit and due and not any(_same(column.unit, each) for each in due):
         kinds = " or ".join(f'"... {each}/{column.unit}"' for each in due)
-        yield _doubt(f"times = {kinds}  # nobody knows it but you")
+        counts = any(base == "count" for base, _ in parse_unit(column.unit).dimensions)
+        of_turn = ', as "1/4096 rev/count" is' if counts else ""
+        yield _doubt(f"times = {kinds}  # a constant of the rig{of_turn}")
 
 
 def _due(column: ColumnGuess) -> list[str]:
