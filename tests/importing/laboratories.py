@@ -90,7 +90,7 @@ class Laboratory:
     times: Mapping[str, str] = field(default_factory=dict)
 
 
-def staircase(rig: Rig, seconds: float, rate: float, levels: int = 6) -> Array:
+def staircase(rig: Rig, seconds: float, rate: float, levels: int = 4) -> Array:
     """Wanted rates: to and fro at several speeds, with ramps, shape (n,)."""
     t = np.arange(round(seconds * rate)) / rate
     stroke = seconds / (2 * levels)
@@ -183,7 +183,7 @@ SPINDLE_CONSTANT = 0.0235  # N m/A
 
 def spindle(folder: Path) -> None:
     """A small DC motor on a data logger: ms, rpm and A."""
-    m = moved(SPINDLE, 1000, 1, staircase(SPINDLE, 10, 1000))
+    m = moved(SPINDLE, 500, 1, staircase(SPINDLE, 8, 500))
     columns = {"time_ms": m.t * 1e3, "speed_rpm": m.v * RPM, "current_A": m.tau / SPINDLE_CONSTANT}
     table(folder / "spindle.csv", columns, form="%.7g")
 
@@ -193,7 +193,7 @@ TABLE = Rig(2.0, (9.0, 10.0), (4.0, 5.0), fastest=3.0, step=2e-6)
 
 def direct_drive(folder: Path) -> None:
     """A torque motor from Simulink's To Workspace block: a structure with time."""
-    m = moved(TABLE, 1000, 2, sines(TABLE, 10, 1000, 2))
+    m = moved(TABLE, 1000, 2, sines(TABLE, 8, 1000, 2))
     names = {"ref_pos": m.wanted, "pos": m.q, "torque": m.tau}
     signals = [
         {"values": values[:, None], "dimensions": 1.0, "label": name, "blockName": f"rig/{name}"}
@@ -208,7 +208,7 @@ SLIDE = Rig(12.0, (14.0, 12.0), (40.0, 48.0), fastest=0.5, step=1e-6)
 
 def linear_motor(folder: Path) -> None:
     """An ironless linear motor, recorded by dSPACE ControlDesk."""
-    m = moved(SLIDE, 2000, 3, staircase(SLIDE, 10, 2000))
+    m = moved(SLIDE, 1000, 3, staircase(SLIDE, 8, 1000))
     names = {"x_meas": ("m", m.q), "x_ref": ("m", m.wanted), "F_mot": ("N", m.tau)}
     signals = [
         {"Name": f'"{n}"', "Path": f"Model Root/{n}", "Unit": unit, "Data": data, "XIndex": 1.0}
@@ -225,7 +225,7 @@ JOINT = Rig(0.05, (0.6, 0.66), (0.03, 0.035), fastest=6.0, step=1e-5)
 
 def joint(folder: Path) -> None:
     """A robot's joint, one signal a file, without headings."""
-    m = moved(JOINT, 1000, 4, sines(JOINT, 10, 1000, 4))
+    m = moved(JOINT, 1000, 4, sines(JOINT, 8, 1000, 4))
     for name, values in {"position_rad": m.q, "torque_Nm": m.tau, "position_ref_rad": m.wanted}.items():
         table(folder / f"{name}.txt", {"t": m.t, name: values}, separator="\t")
 
@@ -235,7 +235,7 @@ SCREW = Rig(80.0, (110.0, 120.0), (600.0, 700.0), fastest=0.12, static=1.3, stri
 
 def ball_screw(folder: Path) -> None:
     """A screw-driven carriage from LabVIEW: mm and N, a header of its own."""
-    m = moved(SCREW, 1000, 5, staircase(SCREW, 10, 1000, 8))
+    m = moved(SCREW, 1000, 5, staircase(SCREW, 8, 1000))
     n = len(m.t)
     head = (
         "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
@@ -254,7 +254,7 @@ RATED = 80.0  # N m
 
 def indexer(folder: Path) -> None:
     """A rotary indexer from TwinCAT Scope: a time column for each channel, torque in % of rated."""
-    m = moved(INDEXER, 1000, 6, staircase(INDEXER, 10, 1000))
+    m = moved(INDEXER, 1000, 6, staircase(INDEXER, 8, 1000))
     head = (
         "Name\tScope Project\nFile\tC:\\scope\\indexer.tcscopex\n"
         "Starttime of export\t133500000000000000\tThursday, 2. May 2024\n\n\n"
@@ -294,7 +294,7 @@ def feeder(folder: Path) -> None:
     """A servo that somebody kept in a workbook: an encoder in counts, the motor's current."""
     import openpyxl
 
-    m = moved(FEEDER, 500, 8, staircase(FEEDER, 10, 500), bandwidth=6)
+    m = moved(FEEDER, 500, 8, staircase(FEEDER, 8, 500), bandwidth=6)
     book = openpyxl.Workbook(write_only=True)
     sheet = book.create_sheet("Recording")
     sheet.append(["Time (s)", "Encoder (counts)", "Motor current (A)"])
@@ -309,7 +309,7 @@ GANTRY = Rig(400.0, (250.0, 250.0), (900.0, 900.0), fastest=1.0, step=1e-6)
 
 def gantry(folder: Path) -> None:
     """A gantry: HDF5 with attributes of units."""
-    m = moved(GANTRY, 1000, 9, sines(GANTRY, 10, 1000, 9, most=1.5), bandwidth=5)
+    m = moved(GANTRY, 1000, 9, sines(GANTRY, 8, 1000, 9, most=1.5), bandwidth=5)
     with h5py.File(folder / "gantry.h5", "w") as file:
         for name, (values, unit) in {
             "time": (m.t, "s"),
@@ -324,7 +324,7 @@ def gantry(folder: Path) -> None:
 GIMBAL = Rig(
     0.3, (2.0, 2.2), (0.5, 0.6), fastest=1.5, static=1.25, stribeck=0.02, step=1e-6
 )
-SPEEDS = (0.1, 0.4, 1.0)
+SPEEDS = (0.2, 0.8)
 SWEEP = tuple(
     f"const_{'p' if sign > 0 else 'm'}{speed:g}.csv" for speed in SPEEDS for sign in (1, -1)
 )
