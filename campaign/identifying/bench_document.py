@@ -98,11 +98,12 @@ def _filled(section: Section) -> dict[str, Parameter]:
 
 
 def _of_sliding(sections: Sequence[Section]) -> Section | None:
-    """Whose friction of sliding a bench gets: the last with a Stribeck curve, or else with any."""
-    told = [each for each in sections if _tells_sliding(_filled(each))]
-    curves = [each for each in told if _tells_sliding(_filled(each), "static_torque")]
-    best = curves or told
-    return best[-1] if best else None
+    """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
+    directions apart, as for what one number leaves to an offset a bench has no key; then the last.
+    """
+    told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
+    keys = ("static_torque", "negative.coulomb_torque")
+    return max(told, key=lambda s: [_tells_sliding(_filled(s), k) for k in keys], default=None)
 
 
 def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:

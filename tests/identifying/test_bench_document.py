@@ -134,6 +134,17 @@ def test_a_bench_gets_no_friction_of_which_nothing_is_told(write) -> None:  # ty
     assert not bench.friction
 
 
+def test_directions_are_not_lost_to_one_number_and_an_offset(write) -> None:  # type: ignore[no-untyped-def]
+    """Which of the two comes last does not matter."""
+    coulomb = {"friction.load.model": ("coulomb", "", "fitted")}
+    apart = (CURVE[0], measured("negative.coulomb_torque", 14.0, "N m"))
+    one = (measured("coulomb_torque", 12.0, "N m"),)
+    for each in ((apart, one), (one, apart)):
+        first, last = (Identified(found, Result(), settings=coulomb) for found in each)
+        load = write(HEAD, inverse_dynamics=first, whole_model=last).friction["load"]
+        assert (load.coulomb_torque, load.negative.coulomb_torque) == (10.0, 14.0)
+
+
 def test_what_another_model_does_not_have_goes(write) -> None:  # type: ignore[no-untyped-def]
     settings = {
         "friction.load.model": ("lugre", "", "fitted"),

@@ -226,11 +226,17 @@ JOINT = Rig(0.05, (0.6, 0.66), (0.03, 0.035), fastest=6.0, step=1e-5)
 def joint(folder: Path) -> None:
     """A robot's joint, one signal a file, without headings."""
     m = moved(JOINT, 1000, 4, sines(JOINT, 8, 1000, 4))
-    for name, values in {"position_rad": m.q, "torque_Nm": m.tau, "position_ref_rad": m.wanted}.items():
+    for name, values in {
+        "position_rad": m.q,
+        "torque_Nm": m.tau,
+        "position_ref_rad": m.wanted,
+    }.items():
         table(folder / f"{name}.txt", {"t": m.t, name: values}, separator="\t")
 
 
-SCREW = Rig(80.0, (110.0, 120.0), (600.0, 700.0), fastest=0.12, static=1.3, stribeck=0.006, step=1e-7)
+SCREW = Rig(
+    80.0, (110.0, 120.0), (600.0, 700.0), fastest=0.12, static=1.3, stribeck=0.006, step=1e-7
+)
 
 
 def ball_screw(folder: Path) -> None:
@@ -321,17 +327,15 @@ def gantry(folder: Path) -> None:
             file[f"run1/{name}"].attrs["units"] = unit
 
 
-GIMBAL = Rig(
-    0.3, (2.0, 2.2), (0.5, 0.6), fastest=1.5, static=1.25, stribeck=0.02, step=1e-6
-)
-SPEEDS = (0.2, 0.8)
+GIMBAL = Rig(0.3, (2.0, 2.2), (0.5, 0.6), fastest=1.5, static=1.25, stribeck=0.02, step=1e-6)
+SPEEDS = (0.4,)
 SWEEP = tuple(
     f"const_{'p' if sign > 0 else 'm'}{speed:g}.csv" for speed in SPEEDS for sign in (1, -1)
 )
 
 
 def gimbal(folder: Path) -> None:
-    """A gimbal's campaign in several files: constant speeds and a chirp."""
+    """A gimbal in several files: constant speeds, and a chirp."""
     t = np.arange(2000) / 1000
     for k, name in enumerate(SWEEP):
         speed = SPEEDS[k // 2] * (1, -1)[k % 2]
@@ -363,9 +367,17 @@ LABORATORIES = (
         units={"relative_angle": "rad", "reference": "rad", "drive_torque": "N m", "time": "s"},
     ),
     Laboratory("linear motor", ("slide_003.mat",), linear_motor, SLIDE, linear=True),
-    Laboratory("joint", ("position_rad.txt", "torque_Nm.txt", "position_ref_rad.txt"), joint, JOINT),
+    Laboratory(
+        "joint", ("position_rad.txt", "torque_Nm.txt", "position_ref_rad.txt"), joint, JOINT
+    ),
     Laboratory("ball screw", ("carriage.lvm",), ball_screw, SCREW, linear=True),
-    Laboratory("indexer", ("indexer.csv",), indexer, INDEXER, times={"drive_torque": f"{RATED / 100} N m/%"}),
+    Laboratory(
+        "indexer",
+        ("indexer.csv",),
+        indexer,
+        INDEXER,
+        times={"drive_torque": f"{RATED / 100} N m/%"},
+    ),
     Laboratory("turret", ("turm.csv",), turret, TURRET),
     Laboratory(
         "feeder",

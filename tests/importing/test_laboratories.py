@@ -53,9 +53,7 @@ def test_a_bench_from_files(
     """Truth lies within twice the 95 % interval, as there is one seed for each of 50 numbers."""
     monkeypatch.chdir(tmp_path)
     bench = bench_of(tmp_path, laboratory, capsys)
-    own = bench.known.values
-    # A bench without numbers of the negative direction has those of the positive in both.
-    known = {name: own.get(at) or own[at.replace(".negative", "")] for name, at in PLACES.items()}
+    known = {name: bench.known.values[path] for name, path in PLACES.items()}
     assert bench.axis.kind == ("linear" if laboratory.linear else "rotary")
     measured = {name for name, each in known.items() if each.origin == "measured"}
     assert measured >= EXCITED

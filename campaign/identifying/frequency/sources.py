@@ -121,7 +121,9 @@ def sources(
                 found.append(make(name, part, how))
             except ValueError as error:
                 remarks.append(f"{name}: {error}.")
-    remarks += [f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()]
+    remarks += [
+        f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
+    ]
     return found, remarks
 
 
