@@ -131,20 +131,16 @@ class _Way:
     remark: str = ""
 
 
-def _one(rig: RigFacts) -> float:
-    return 1.0
-
-
 def _by_gear(rig: RigFacts) -> float:
     return 1.0 / (rig.ratio or 1.0)  # without a gear the motor drives directly
 
 
 _WAYS = (
     _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear, GEARED),
-    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, _one),
+    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, lambda rig: 1.0),
     _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear, GEARED),
-    _Way(RELATIVE_RATE, GYRO_RATE, False, _one, AT_REST),
-    _Way(GYRO_RATE, RELATIVE_RATE, False, _one, AT_REST),
+    _Way(RELATIVE_RATE, GYRO_RATE, False, lambda rig: 1.0, AT_REST),
+    _Way(GYRO_RATE, RELATIVE_RATE, False, lambda rig: 1.0, AT_REST),
     _Way(DRIVE_TORQUE, MOTOR_CURRENT, False, lambda rig: rig.torque_per_current),
 )
 """What suffices for a channel that nobody recorded, the best first."""

@@ -115,25 +115,22 @@ def moved(
     rig: Rig,
     rate: float,
     seed: int,
-    wanted: Array | None = None,
-    torque: Array | None = None,
+    wanted: Array,
     bandwidth: float = 8.0,
 ) -> Moved:
-    """The rig in a position loop along a wanted rate, or driven by a torque; sampled at `rate`."""
+    """The rig in a position loop along a wanted rate, shape (n,); sampled at `rate`."""
     draw = np.random.default_rng(seed)
-    given = wanted if wanted is not None else torque
-    assert given is not None
-    n, h = len(given), 1 / rate / FINE
+    n, h = len(wanted), 1 / rate / FINE
     omega = 2 * math.pi * bandwidth
     stiff, damped = rig.inertia * omega**2, 1.6 * rig.inertia * omega
-    path = np.cumsum(given) / rate if wanted is not None else np.zeros(n)
+    path = np.cumsum(wanted) / rate
     hiss = rig.hiss * rig.coulomb[0]
     shaking = draw.normal(0, hiss, n).tolist()
     q = v = 0.0
     seen = np.zeros((n, 3))
-    for k, (goal, at) in enumerate(zip(given.tolist(), path.tolist(), strict=True)):
+    for k, (goal, at) in enumerate(zip(wanted.tolist(), path.tolist(), strict=True)):
         measured = round(q / rig.step) * rig.step if rig.step else q
-        push = stiff * (at - measured) + damped * (goal - v) if wanted is not None else goal
+        push = stiff * (at - measured) + damped * (goal - v)
         seen[k] = measured, v, push
         for _ in range(FINE):
             fall = 1 + (rig.static - 1) * math.exp(-((v / rig.stribeck) ** 2))
@@ -273,7 +270,7 @@ def indexer(folder: Path) -> None:
     )
     t = m.t * 1e3
     rows = np.column_stack([t, m.q * DEG, t, m.v * DEG, t, m.tau / RATED * 100])
-    lines = ["\t".join("%.9g" % value for value in row) for row in rows]
+    lines = ["\t".join(f"{value:.9g}" for value in row) for row in rows]
     (folder / "indexer.csv").write_text(head + "\n".join(lines) + "\nEOF\n")
 
 

@@ -28,7 +28,7 @@ def campaign(*words: str) -> None:
 
 
 def bench_of(folder: Path, laboratory: Laboratory, capsys: pytest.CaptureFixture[str]) -> Bench:
-    """As docs/import.md and docs/identification.md have it, with what the mapping asks filled in."""
+    """By docs/import.md and docs/identification.md, with what the mapping asks for filled in."""
     laboratory.write(folder)
     capsys.readouterr()
     campaign("import", "--guess", *laboratory.files)

@@ -71,8 +71,7 @@ def _by_names(path: Path, table: Table, series: Series) -> list[ColumnGuess]:
 def _by_name(column: Column, values: Array | None, before: str = "") -> ColumnGuess:
     if values is None:
         return ColumnGuess(column.name, column.place, UNKNOWN, "it holds no numbers")
-    found = named(column.name.removeprefix(before), column.unit, column.place)
-    found = replace(found, name=column.name)
+    found = named(column.name, column.unit, column.place, before)
     known = values[np.isfinite(values)]
     if len(known):
         found = replace(found, low=float(known.min()), high=float(known.max()))
@@ -95,8 +94,8 @@ def _with_time(columns: list[ColumnGuess], series: Series) -> list[ColumnGuess]:
         each = columns[place]
         matrix = each.name.endswith(("(1,:)", "(:,1)"))
         if (matrix or (each.role == UNKNOWN and not each.why)) and numbers.evenly(values):
-            doubt = ("its name does not say so",)
-            columns[place] = replace(each, role=TIME, why="it increases evenly", doubts=doubt)
+            why = "it increases evenly, by its numbers alone"
+            columns[place] = replace(each, role=TIME, why=why)
             begin = each.name[: each.name.rindex("(")] if matrix else None
             return [replace(c, tag=()) if c.name.split("(")[0] == begin else c for c in columns]
     return columns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -91,9 +90,9 @@ def kind_of_unit(unit: str) -> str:
     return _KINDS.get(parse_unit(unit).dimensions, "") if unit else ""
 
 
-def named(name: str, stated: str = "", place: str = "") -> ColumnGuess:
-    """What a name says; the unit that its file states tells names apart that are one letter."""
-    text = unicodedata.normalize("NFKC", name).strip(" \"'#%")
+def named(name: str, stated: str = "", place: str = "", before: str = "") -> ColumnGuess:
+    """What a name says behind `before`; a unit that the file states tells single letters apart."""
+    text = unicodedata.normalize("NFKC", name.removeprefix(before)).strip(" \"'#%")
     behind = _UNIT_BEHIND.fullmatch(text)
     unit = usable_unit(next(filter(None, behind.groups()[1:]), "")) if behind else ""
     sure = len(unit) > 1 or not (behind and behind["per"])  # `x/s` may be a path
@@ -121,9 +120,9 @@ def named(name: str, stated: str = "", place: str = "") -> ColumnGuess:
 
 def common_path(names: Sequence[str]) -> str:
     """What stands before all names and says nothing, as a group of a file does: `run1.`."""
-    common = os.path.commonprefix(list(names)) if len(names) > 1 else ""
-    path = common[: max(common.rfind("."), common.rfind("/")) + 1]
-    return path if KNOWN.isdisjoint(_words(_pieces(path))) else ""
+    path = re.split(r"[^./]*$", names[0])[0] if len(names) > 1 else ""
+    common = all(name.startswith(path) for name in names)
+    return path if common and KNOWN.isdisjoint(_words(_pieces(path))) else ""
 
 
 def _pieces(text: str) -> list[str]:
@@ -232,10 +231,7 @@ _CHANNELS = (
     ("rate", "", channels.RELATIVE_RATE),
 )
 """The channel of a quantity of which a word says that; the first that fits."""
-_OF_A_SIDE = (
-    *(channels.MOTOR_ANGLE, channels.MOTOR_RATE, channels.DRIVE_TORQUE),
-    *(channels.RELATIVE_ANGLE, channels.RELATIVE_RATE),
-)
+_OF_A_SIDE = {row[-1] for row in _CHANNELS[-6:]} | {channels.DRIVE_TORQUE}
 _TURNS = frozenset(("rpm", "drehzahl"))
 """A rate in turns is likely the motor's, and that is all that says so."""
 

@@ -16,6 +16,7 @@ from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
 from campaign.importing.guess.layouts import Layout, Placed, layouts, slug
+from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
 from campaign.importing.guess.words import INDEX, TIME
 from campaign.unit_grammar import parse_unit
 
@@ -34,21 +35,17 @@ _HEAD = """\
 #    with its whole block.
 # 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
 #    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
-# 4. A rig without `[gear]` is a direct drive: motor and load move as one. With a gear write `[gear]`
-#    and `ratio = ...` into rig.toml, make columns of the motor's side motor_angle and motor_rate,
-#    and give a torque at the motor `times = "RATIO"`.
+# 4. Without `[gear]` in rig.toml motor and load move as one. With it (`ratio = ...`) columns at the
+#    motor are motor_angle or motor_rate, and a torque there has `times = "RATIO"`.
 # 5. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
 #    `campaign import mapping.toml --report` makes run and report of it.
 # Never guessed: signs, the side of a gear, torque constants, rated torques, offsets, filters.
 schema = 2
 title = {title}"""
 _LACKING = {
-    (
-        *(channels.RELATIVE_RATE, channels.RELATIVE_ANGLE),
-        *(channels.MOTOR_RATE, channels.MOTOR_ANGLE),
-    ): "no column was taken for the motion, which `motion` needs: an angle or a rate",
-    (channels.DRIVE_TORQUE, channels.JOINT_TORQUE): "no column was taken for what drives it, which "
-    "`motion` needs: drive_torque or joint_torque; of a current it is made with `times`:",
+    (*ANGLES, *RATES): "no column was taken for the motion, which `motion` needs: angle or rate",
+    TORQUES: "no column was taken for what drives it, which `motion` needs: drive_torque or "
+    "joint_torque; of a current it is made with `times`:",
 }
 """What an experiment needs, one of each."""
 
@@ -101,8 +98,7 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
         yield _comment(f"Time: the file states a step of {first.step:.9g} s.")
     unsaid = [p.column.role for p in layout.columns if not p.column.sided]
     if unsaid:
-        told = ", ".join(dict.fromkeys(unsaid))
-        yield _doubt(f"which side of the gear (4 above) is not said: {told}")
+        yield _doubt(f"side of the gear not said (4 above): {', '.join(dict.fromkeys(unsaid))}")
     taken: set[str] = set()
     for placed in layout.columns:
         role = placed.column.role
@@ -160,9 +156,7 @@ def _unit(column: ColumnGuess) -> Iterator[str]:
         yield _doubt(f"{unit}  # {column.basis}: {why}")
     if column.unit and due and not any(_same(column.unit, each) for each in due):
         kinds = " or ".join(f'"... {each}/{column.unit}"' for each in due)
-        counts = any(base == "count" for base, _ in parse_unit(column.unit).dimensions)
-        of_turn = ', as "1/4096 rev/count" is' if counts else ""
-        yield _doubt(f"times = {kinds}  # a constant of the rig{of_turn}")
+        yield _doubt(f'times = {kinds}  # of the rig, such as "0.3 N m/A", "1/4096 rev/count"')
 
 
 def _due(column: ColumnGuess) -> list[str]:
@@ -191,7 +185,7 @@ def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
             yield ""
             yield _doubt(told)
     current = next((p for p in layout.columns if p.column.role == channels.MOTOR_CURRENT), None)
-    if current is not None and taken.isdisjoint((channels.DRIVE_TORQUE, channels.JOINT_TORQUE)):
+    if current is not None and taken.isdisjoint(TORQUES):
         unit = current.column.unit
         yield from map(_doubt, _which(layout, current, channels.DRIVE_TORQUE))
         yield _doubt(f"unit = {_quoted(unit or '...')}")

@@ -20,7 +20,7 @@ _QUANTITIES = {
     "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
     "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
     "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
-    "rate": "dq qd qdot xdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
+    "rate": "dq qd qdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
     "speeds spd rate drehzahl geschwindigkeit geschw winkelgeschw vitesse rpm rps wm n tacho gyro "
     "gx gy gz",
     "angle": "q qm qg qpos pos posn position positions angle angles angular ang theta phi winkel "
