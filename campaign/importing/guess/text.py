@@ -29,10 +29,10 @@ _HEAD = """\
 #        [axis]
 #        name = "..."
 #        kind = "{kind}"  # rotary: rad and N m; linear: m and N{asked}
-# 2. Lines that begin with `# ?` are to be checked. Those of the form `key = ...`: put right what is
-#    not, and remove the `# ?`. The others are remarks: think of them, and strike them out. Every
-#    channel needs a unit (and `times`, where that is asked); one that is not wanted is struck out
-#    with its whole block.
+# 2. Check lines that begin with `# ?`. Those of the form `key = ...` or `[...]`: correct what is not
+#    right, and remove the `# ?`. The others are remarks: consider them, and delete them. Every
+#    channel needs a unit (and `times`, where that is asked); delete the whole block of one that is
+#    not wanted.
 # 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
 #    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
 # 4. Without `[gear]` in rig.toml motor and load move as one. With it (`ratio = ...`) columns at the
@@ -155,7 +155,7 @@ def _unit(column: ColumnGuess) -> Iterator[str]:
         why = column.unit_why or f"such as {' or '.join(due) or 's'}"
         yield _doubt(f"{unit}  # {column.basis}: {why}")
     if column.unit and due and not any(_same(column.unit, each) for each in due):
-        kinds = " or ".join(f'"... {each}/{column.unit}"' for each in due)
+        kinds = "  # or ".join(f'"... {each}/{column.unit}"' for each in due)
         yield _doubt(f'times = {kinds}  # of the rig, such as "0.3 N m/A", "1/4096 rev/count"')
 
 
@@ -189,7 +189,7 @@ def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
         unit = current.column.unit
         yield from map(_doubt, _which(layout, current, channels.DRIVE_TORQUE))
         yield _doubt(f"unit = {_quoted(unit or '...')}")
-        times = f'"... N m/{unit or "A"}" or "... N/{unit or "A"}"'
+        times = f'"... N m/{unit or "A"}"  # or "... N/{unit or "A"}"'
         yield _doubt(f"times = {times}  # at the load: torque constant times gear")
 
 
