@@ -29,8 +29,8 @@ _HEAD = """\
 #        [axis]
 #        name = "..."
 #        kind = "{kind}"  # rotary: rad and N m; linear: m and N{asked}
-# 2. Check lines that begin with `# ?`. Those of the form `key = ...` or `[...]`: correct what is not
-#    right, and remove the `# ?`. The others are remarks: consider them, and delete them. Every
+# 2. Check lines that begin with `# ?`. Those of the form `key = ...` or `[...]`: correct what is
+#    wrong, and remove the `# ?`. The others are remarks: consider them, and delete them. Every
 #    channel needs a unit (and `times`, where that is asked); delete the whole block of one that is
 #    not wanted.
 # 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
