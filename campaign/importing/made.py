@@ -39,13 +39,13 @@ class RigFacts:
 
     Attributes:
         axis: how the axis moves; `motor` how its motor does.
-        ratio: N, motor rate over load rate.
+        ratio: N, motor rate over load rate; 1 without a gear, where the motor drives directly.
         torque_per_current: drive torque at the load per ampere (N m/A).
     """
 
     axis: AxisKind = AxisKind.ROTARY
     motor: AxisKind = AxisKind.ROTARY
-    ratio: float | None = None
+    ratio: float = 1.0
     torque_per_current: float | None = None
 
 
@@ -132,7 +132,7 @@ class _Way:
 
 
 def _by_gear(rig: RigFacts) -> float:
-    return 1.0 / (rig.ratio or 1.0)  # without a gear the motor drives directly
+    return 1.0 / rig.ratio
 
 
 _WAYS = (

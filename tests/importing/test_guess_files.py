@@ -321,6 +321,27 @@ def test_which_side_of_the_gear(tmp_path: Path, angle: str, rate: str, roles: li
     assert mapping_text(found).count("side of the gear not said") == ("motor angle" not in angle)
 
 
+def test_a_rig_without_a_gear_is_a_direct_drive(tmp_path: Path):
+    """The motor's rate is the load's; where both sides were recorded and differ it is told."""
+    m = rig.sines(17)
+    own = "schema = 3\nname = 'a'\n[axis]\nname = 'a'\n"
+    heads = "time [s],motor speed [rad/s],torque [Nm]\n"
+    text(together(m.t, m.v, m.tau), heads)(tmp_path / "motor.csv")
+    mapping = mapping_text(guess([tmp_path / "motor.csv"]), tmp_path)
+    for gear, ratio in (("", 1.0), ("[gear]\nratio = 50\n", 50.0)):
+        (tmp_path / "rig.toml").write_text(own + gear, encoding="utf-8")
+        (trial,) = planned(tmp_path, mapping).trials
+        recording, _ = served(trial)
+        np.testing.assert_allclose(recording["relative_rate"], m.v / ratio, atol=1e-6)
+    heads = "time [s],load position [rad],motor speed [rad/s],torque [Nm]\n"
+    text(together(m.t, m.q, 50 * m.v, m.tau), heads)(tmp_path / "both.csv")
+    mapping = mapping_text(guess([tmp_path / "both.csv"]), tmp_path)
+    assert len(planned(tmp_path, mapping).trials) == 1
+    (tmp_path / "rig.toml").write_text(own, encoding="utf-8")
+    with pytest.raises(ProtocolError, match="two sides of a gear of 50"):
+        planned(tmp_path, mapping)
+
+
 def test_a_group_of_all_columns_says_nothing(tmp_path: Path):
     m = rig.sines(15)
     for group, names, roles in (
