@@ -154,7 +154,7 @@ class Quantity:
 
 _NUMBER = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?(?:nan|inf(?:inity)?)\b)"
-    r"\s*(.*?)\s*\Z",
+    r"(?:/([1-9][0-9]*)(?![0-9.eE]))?\s*(.*?)\s*\Z",
     re.I | re.S,
 )
 LONGEST = 100
@@ -162,7 +162,10 @@ LONGEST = 100
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit text of ``"0.05 deg/s"``; ValueError when it does not begin with a number."""
+    """Number and unit text of ``"0.05 deg/s"``; ValueError when it does not begin with a number.
+
+    The number may be a fraction: ``"1/65536 rev/count"``.
+    """
     if len(text) > LONGEST:
         raise ValueError(
             f"a quantity is a number and a unit, not a text of over {LONGEST} characters"
@@ -170,11 +173,12 @@ def split_quantity(text: str) -> tuple[float, str]:
     match = _NUMBER.match(text)
     if match is None:
         raise ValueError(f"{text!r} does not begin with a number")
-    if match[2].startswith(","):
+    number, of, unit = match.groups()
+    if unit.startswith(","):
         raise ValueError(f"{text!r}: the decimal sign is a point, as in {text.replace(',', '.')!r}")
-    if match[2].startswith("_"):
+    if unit.startswith("_"):
         raise ValueError(f"{text!r}: digits are not grouped, as in {text.replace('_', '')!r}")
-    return float(match[1]), match[2]
+    return float(number) / float(of or 1), unit
 
 
 def convert(value: Any, unit: str, to: str) -> Any:

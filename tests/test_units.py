@@ -252,6 +252,15 @@ def test_every_quantity_that_is_shipped_or_documented_has_its_value_to_the_bit()
     assert {"deg/s^2", "N m", "A s/rad", "mrad/s", "Hz"} <= seen
 
 
+def test_a_number_may_be_a_fraction() -> None:
+    assert split_quantity("1/65536 rev/count") == (1 / 65536, "rev/count")
+    assert split_quantity("-3/4 s") == (-0.75, "s")
+    assert split_quantity("5 1/s") == (5.0, "1/s")
+    for wrong in ("1/0 s", "1/s", "1/4e3 s", "1/2.5 s"):
+        with pytest.raises(ValueError, match=r"unit|missing"):
+            parse_unit(split_quantity(wrong)[1])
+
+
 unit_texts = st.one_of(
     st.text(max_size=LONGEST + 5),
     st.text(alphabet="()^*/ 0123456789-⁻²mNsAV°'.·", max_size=LONGEST + 5),

@@ -14,7 +14,7 @@ from campaign.identifying.identification import Identification, Section
 from campaign.identifying.method import Identified, Parameter
 from campaign.identifying.written import amount, known_of
 from campaign.physics.bench import Bench
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import coulomb, friction_models
 from campaign.protocol.bench_edit import with_known
 
 LEAST_CORRELATION = 0.1
@@ -52,9 +52,9 @@ def bench_text(found: Identification, command: str) -> str:
                 known[parameter.bench] = known_of(parameter.estimate)
             correlations += _correlations(section, filled)
             if filled and section.identified is not None:
-                settings = _settings(section.identified, found.bench)
+                settings = _settings(section.identified, filled, found.bench)
                 for path, (value, unit, _) in settings.items():
-                    if _is_friction(path) and sliding is not None and section is not sliding:
+                    if _is_friction(path) and section is not sliding:
                         continue
                     values[path] = _value(value, unit)
                     if isinstance(value, float):
@@ -98,11 +98,12 @@ def _filled(section: Section) -> dict[str, Parameter]:
 
 
 def _of_sliding(sections: Sequence[Section]) -> Section | None:
-    """Whose friction of sliding a bench gets: the last with a Stribeck curve, or else with any."""
-    told = [each for each in sections if _tells_sliding(_filled(each))]
-    curves = [each for each in told if _tells_sliding(_filled(each), "static_torque")]
-    best = curves or told
-    return best[-1] if best else None
+    """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
+    directions apart, as for what one number leaves to an offset a bench has no key; then the last.
+    """
+    told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
+    keys = ("static_torque", "negative.coulomb_torque")
+    return max(told, key=lambda s: [_tells_sliding(_filled(s), k) for k in keys], default=None)
 
 
 def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
@@ -113,13 +114,30 @@ def _is_friction(path: str) -> bool:
     return path.startswith(FRICTION)
 
 
-def _settings(identified: Identified, bench: Bench) -> dict[str, tuple[Any, str, str]]:
-    """Its settings; bristles of the bench stay where the curve that slides over them is told."""
+def _settings(
+    identified: Identified, filled: Mapping[str, Parameter], bench: Bench
+) -> dict[str, tuple[Any, str, str]]:
+    """Its settings; bristles of the bench stay where the curve that slides over them is told.
+
+    Where no number of what bends friction is told and the bench has no bristles, friction is
+    Coulomb and viscous friction: what the motion leaves open is no fact of the rig.
+    """
     settings = dict(identified.settings)
     model, load = f"{FRICTION}model", bench.friction.get("load")
-    if model in settings and settings[model][0] == "stribeck" and load and load.model == "lugre":
-        settings[model] = ("lugre", *settings[model][1:])
+    if model not in settings:
+        return settings
+    if load is not None and load.model == "lugre":
+        if settings[model][0] == "stribeck":
+            settings[model] = ("lugre", *settings[model][1:])
+    elif not any(_is_friction(each.bench) and _bends(each.bench) for each in filled.values()):
+        settings = {path: each for path, each in settings.items() if not _bends(path)}
+        settings[model] = ("coulomb", "", "nothing else of the curve is told")
     return settings
+
+
+def _bends(path: str) -> bool:
+    """Whether it is of a curve that Coulomb and viscous friction have not."""
+    return _is_friction(path) and path.rpartition(".")[2] not in {"model", *coulomb.CURVE}
 
 
 def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:

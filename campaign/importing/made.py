@@ -30,6 +30,7 @@ from campaign.units import split_quantity
 PLAIN = ("", "1", "-")
 """How people write that a number has no unit."""
 AT_REST = "the hull is taken to be at rest, so the load's rate in space is that to the hull"
+GEARED = "divided by the ratio of the gear; without `[gear]` in the bench that is 1, a direct drive"
 
 
 @dataclass(frozen=True)
@@ -38,13 +39,13 @@ class RigFacts:
 
     Attributes:
         axis: how the axis moves; `motor` how its motor does.
-        ratio: N, motor rate over load rate.
+        ratio: N, motor rate over load rate; 1 without a gear, where the motor drives directly.
         torque_per_current: drive torque at the load per ampere (N m/A).
     """
 
     axis: AxisKind = AxisKind.ROTARY
     motor: AxisKind = AxisKind.ROTARY
-    ratio: float | None = None
+    ratio: float = 1.0
     torque_per_current: float | None = None
 
 
@@ -130,20 +131,16 @@ class _Way:
     remark: str = ""
 
 
-def _one(rig: RigFacts) -> float:
-    return 1.0
-
-
-def _by_gear(rig: RigFacts) -> float | None:
-    return None if rig.ratio is None else 1.0 / rig.ratio
+def _by_gear(rig: RigFacts) -> float:
+    return 1.0 / rig.ratio
 
 
 _WAYS = (
-    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear),
-    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, _one),
-    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear),
-    _Way(RELATIVE_RATE, GYRO_RATE, False, _one, AT_REST),
-    _Way(GYRO_RATE, RELATIVE_RATE, False, _one, AT_REST),
+    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear, GEARED),
+    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, lambda rig: 1.0),
+    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear, GEARED),
+    _Way(RELATIVE_RATE, GYRO_RATE, False, lambda rig: 1.0, AT_REST),
+    _Way(GYRO_RATE, RELATIVE_RATE, False, lambda rig: 1.0, AT_REST),
     _Way(DRIVE_TORQUE, MOTOR_CURRENT, False, lambda rig: rig.torque_per_current),
 )
 """What suffices for a channel that nobody recorded, the best first."""

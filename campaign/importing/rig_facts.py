@@ -11,6 +11,6 @@ def rig_facts(bench: Bench) -> RigFacts:
     return RigFacts(
         axis=bench.sides.load,
         motor=bench.sides.motor,
-        ratio=bench.ratio,
+        ratio=bench.ratio or 1.0,
         torque_per_current=bench.torque_per_current,
     )

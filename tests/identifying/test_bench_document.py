@@ -97,6 +97,54 @@ def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # t
     assert load.negative.static_torque is None
 
 
+OPEN = {
+    "friction.load.model": ("lugre", "", "fitted"),
+    "friction.load.static_torque": (30.0, "N m", "the motion leaves it open"),
+    "friction.load.negative.static_torque": (9.0, "N m", "the motion leaves it open"),
+    "friction.load.stribeck_velocity": (0.01, "rad/s", "the motion leaves it open"),
+    "friction.load.bristle_stiffness": (1e7, "N m/rad", "the motion leaves it open"),
+    "friction.load.bristle_damping": (1e4, "N m s/rad", "the motion leaves it open"),
+    "friction.load.viscous_friction": (2.0, "N m s/rad", "the motion leaves it open"),
+}
+"""What a whole model fits and does not determine."""
+
+
+@pytest.mark.parametrize("before", ["", SMOOTH])
+def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(write, before: str) -> None:  # type: ignore[no-untyped-def]
+    bench = write(HEAD + before, whole_model=Identified(CURVE[:1], Result(), settings=OPEN))
+    load = bench.friction["load"]
+    assert load.model == "coulomb"
+    assert (load.coulomb_torque, load.viscous_friction) == (10.0, 2.0)
+    assert set(bench.known.values) == {
+        "friction.load.coulomb_torque",
+        "friction.load.viscous_friction",
+    }
+
+
+def test_what_a_curve_needs_beside_a_number_of_it_is_assumed(write) -> None:  # type: ignore[no-untyped-def]
+    bench = write(HEAD, whole_model=Identified(CURVE[:2], Result(), settings=OPEN))
+    assert bench.friction["load"].model == "lugre"
+    assert bench.known.values["friction.load.stribeck_velocity"].origin == "assumed"
+
+
+def test_a_bench_gets_no_friction_of_which_nothing_is_told(write) -> None:  # type: ignore[no-untyped-def]
+    inertia = replace(measured("inertia", 3.0, "kg m^2"), bench="axis.inertia")
+    bench = write(HEAD, whole_model=Identified((inertia,), Result(), settings=OPEN))
+    assert bench.axis.inertia == 3.0
+    assert not bench.friction
+
+
+def test_directions_are_not_lost_to_one_number_and_an_offset(write) -> None:  # type: ignore[no-untyped-def]
+    """Which of the two comes last does not matter."""
+    coulomb = {"friction.load.model": ("coulomb", "", "fitted")}
+    apart = (CURVE[0], measured("negative.coulomb_torque", 14.0, "N m"))
+    one = (measured("coulomb_torque", 12.0, "N m"),)
+    for each in ((apart, one), (one, apart)):
+        first, last = (Identified(found, Result(), settings=coulomb) for found in each)
+        load = write(HEAD, inverse_dynamics=first, whole_model=last).friction["load"]
+        assert (load.coulomb_torque, load.negative.coulomb_torque) == (10.0, 14.0)
+
+
 def test_what_another_model_does_not_have_goes(write) -> None:  # type: ignore[no-untyped-def]
     settings = {
         "friction.load.model": ("lugre", "", "fitted"),

@@ -50,7 +50,7 @@ def test_nothing_is_said_where_they_do_not_differ_or_one_is_no_number(
 
 
 def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> None:
-    """Static friction of each direction is its Coulomb friction; a refused number is as fitted."""
+    """No static friction was looked for, and none is told; a refused number is as fitted."""
     refused = number("viscous_negative", 80.0, 60.0, origin=Origin.NOT_DETERMINED)
     bound = Estimate("viscous_positive", 4.0, "N m s/rad", level=0.95, kind="at most")
     found = [
@@ -62,8 +62,8 @@ def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> 
     parameters = [Parameter(one, "", bench=BENCH[one.name]) for one in found]
     bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
     told = _settings(parameters, Material(bench, cast("Any", (SimpleNamespace(),))))
-    assert told["friction.load.static_torque"][0] == 2.95
-    assert told["friction.load.negative.static_torque"][0] == 3.76
+    assert told["friction.load.model"][0] == "coulomb"
+    assert not any("static" in path or "stribeck" in path for path in told)
     assert told["friction.load.viscous_friction"][0] == 0.0
     assert told["friction.load.negative.viscous_friction"][0] == 80.0
 

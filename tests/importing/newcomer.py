@@ -26,15 +26,17 @@ def completed(
     text: str,
     units: Mapping[str, str],
     channels: Mapping[str, tuple[str, str]] | None = None,
-    times: str = "",
+    times: str | Mapping[str, str] = "",
 ) -> str:
     """A guessed mapping, completed.
 
     Args:
         units: by channel, where the file and the guess have none.
         channels: of columns that were taken for nothing: which channel each is, and its unit.
-        times: what the drive's torque is of what makes it; "" where it has a column.
+        times: the constant of each channel that measures something else; alone that of the
+            drive's torque, "" where it has a column.
     """
+    constants = {"drive_torque": times} if isinstance(times, str) else times
     found: list[str] = []
     at = ""
     lines = iter(text.splitlines())
@@ -54,15 +56,16 @@ def completed(
             found += [] if line.startswith("# ?") else [line]
         line = asked[1] if asked else line
         at = found_head[1] if (found_head := _HEAD.match(line)) else at
-        if asked is None or (line.startswith("[") and not times):
+        constant = constants.get(at, "")
+        if asked is None or (line.startswith("[") and not constant):
             continue
         if line.startswith(("times", "[", "column")):
-            line = f'times = "{times}"' if line.startswith("times") else line
-            found += [line] if times else []
+            line = f'times = "{constant}"' if line.startswith("times") else line
+            found += [line] if constant else []
         elif '"..."' in line:
             unit = units.get(at, "")
             found += [f'unit = "{unit}"'] if unit else []
-        elif at != "drive_torque" or times:
+        elif at != "drive_torque" or constant:
             found.append(line.split("  #")[0])
     return "\n".join(found) + "\n"
 

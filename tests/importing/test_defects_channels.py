@@ -100,7 +100,7 @@ def test_a_rate_is_held_against_the_angle_across_the_gear(motion):
 
 def test_candidates_are_words():
     assert candidates(1.0) == []
-    assert candidates(57.0) == ["they are on the two sides of a gear of 57"]
+    assert candidates(57.0) == ["they are on the two sides of a gear of 57 (`[gear] ratio`)"]
     assert len(candidates(57.2, error=0.002)) == 2
 
 

@@ -55,7 +55,7 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
         "relative_rate",
         *["unknown"] * 4,
     ]
-    assert all("its name does not say so" in column.doubts for column in table.columns[1:3])
+    assert all("by its numbers alone" in column.why for column in table.columns[:3])
     run = imported(
         [tmp_path / "joint3.mat"],
         units={"relative_angle": "rad", "relative_rate": "rad/s"},
@@ -294,6 +294,75 @@ def test_what_follows_has_the_unit_of_what_it_follows(tmp_path: Path):
     assert (reference.role, reference.unit, reference.basis) == ("reference", "deg", Basis.LIKELY)
     assert (setpoint.role, setpoint.unit, setpoint.basis) == ("reference", "deg", Basis.LIKELY)
     assert any("1.7 times current" in doubt for doubt in torque.doubts)
+
+
+@pytest.mark.parametrize(
+    ("angle", "rate", "roles"),
+    [
+        # A rate is on the side of its angle; what a name says of it stands.
+        ("Winkel [deg]", "Drehzahl [1/min]", ["relative_angle", "relative_rate"]),
+        ("motor angle [deg]", "Drehzahl [1/min]", ["motor_angle", "motor_rate"]),
+        ("motor angle [deg]", "speed", ["motor_angle", "motor_rate"]),
+        ("Winkel [deg]", "motor speed [1/min]", ["relative_angle", "motor_rate"]),
+        # Of another size it is behind a gear, or its unit is wrong.
+        ("Winkel [rad]", "Drehzahl [1/min]", ["relative_angle", "motor_rate"]),
+    ],
+)
+def test_which_side_of_the_gear(tmp_path: Path, angle: str, rate: str, roles: list[str]):
+    m = rig.sines(14)
+    text(together(m.t, m.q * DEG, m.v * 30 / np.pi), f"time [s],{angle},{rate}\n")(
+        tmp_path / "a.csv"
+    )
+    found = guess([tmp_path / "a.csv"])
+    assert [column.role for column in found.tables[0].columns[1:]] == roles
+    agree = "rad" not in angle
+    assert agree == (not any(column.doubts for column in found.tables[0].columns))
+    assert agree or "; 0.017453 in its unit" in found.tables[0].columns[2].doubts[0]
+    assert mapping_text(found).count("side of the gear not said") == ("motor angle" not in angle)
+
+
+def test_a_rig_without_a_gear_is_a_direct_drive(tmp_path: Path):
+    """The motor's rate is the load's; where both sides were recorded and differ it is told."""
+    m = rig.sines(17)
+    own = "schema = 3\nname = 'a'\n[axis]\nname = 'a'\n"
+    heads = "time [s],motor speed [rad/s],torque [Nm]\n"
+    text(together(m.t, m.v, m.tau), heads)(tmp_path / "motor.csv")
+    mapping = mapping_text(guess([tmp_path / "motor.csv"]), tmp_path)
+    for gear, ratio in (("", 1.0), ("[gear]\nratio = 50\n", 50.0)):
+        (tmp_path / "rig.toml").write_text(own + gear, encoding="utf-8")
+        (trial,) = planned(tmp_path, mapping).trials
+        recording, _ = served(trial)
+        np.testing.assert_allclose(recording["relative_rate"], m.v / ratio, atol=1e-6)
+    heads = "time [s],load position [rad],motor speed [rad/s],torque [Nm]\n"
+    text(together(m.t, m.q, 50 * m.v, m.tau), heads)(tmp_path / "both.csv")
+    mapping = mapping_text(guess([tmp_path / "both.csv"]), tmp_path)
+    assert len(planned(tmp_path, mapping).trials) == 1
+    (tmp_path / "rig.toml").write_text(own, encoding="utf-8")
+    with pytest.raises(ProtocolError, match="two sides of a gear of 50"):
+        planned(tmp_path, mapping)
+
+
+def test_a_group_of_all_columns_says_nothing(tmp_path: Path):
+    m = rig.sines(15)
+    for group, names, roles in (
+        ("run1", ("t [s]", "x [m]", "dx [m/s]"), ["time", "relative_angle", "relative_rate"]),
+        ("motor", ("t [s]", "pos [m]", "vel [m/s]"), ["time", "motor_angle", "motor_rate"]),
+    ):
+        heads = ",".join(f"{group}/{name}" for name in names)
+        text(together(m.t, m.q, m.v), f"{heads}\n")(tmp_path / f"{group}.csv")
+        (table,) = guess([tmp_path / f"{group}.csv"]).tables
+        assert [column.role for column in table.columns] == roles
+
+
+def test_files_that_are_alike_have_one_remark(tmp_path: Path):
+    m = rig.sines(16)
+    for number in (1, 2, 3):
+        text(together(m.t, m.q, m.tau), "time,angle [rad],torque [Nm]\n")(
+            tmp_path / f"{number}.csv"
+        )
+    mapping = mapping_text(guess([tmp_path / f"{number}.csv" for number in (1, 2, 3)]), tmp_path)
+    assert mapping.count("[[test.recording]]") == 3
+    assert mapping.count("read as text") == 1
 
 
 def test_all_that_a_mapping_lacks_is_told_at_once(tmp_path: Path):

@@ -40,7 +40,8 @@ def unused(trials: Sequence[ArchivedTrial], bench: Bench) -> Iterator[str]:
         return
     there = {name for trial in trials for name in trial.channel_names()}
     if names := [name for name in SENSORS["motor"] if name in there]:
+        verb = "is" if len(names) == 1 else "are"
         yield (
-            f"{' and '.join(names)} are not used: the bench states no gear. Write `[gear] ratio` "
-            "into it; 1 where the motor drives directly."
+            f"{' and '.join(names)} {verb} not used: the bench states no gear. Write "
+            "`[gear] ratio` into it; 1 where the motor drives directly."
         )

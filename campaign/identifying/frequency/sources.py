@@ -97,13 +97,14 @@ def sources(
     for trial in trials:
         groups.setdefault(_key(trial, how), []).append(trial)
     found, remarks = [], list(unused(trials, bench))
+    refused: dict[str, list[str]] = {}
     for (kind, *_, period), group in groups.items():
         make = {"sines": _of_sines, "multisine": _of_multisine, "records": _of_records}[kind]
         label = _label(group)
         try:
             told, lost = _all_signals(group, bench, how)
         except ValueError as error:
-            remarks.append(f"{label}: {error}.")
+            refused.setdefault(str(error), []).append(label)
             continue
         remarks += lost
         parts = {label: told}
@@ -120,6 +121,9 @@ def sources(
                 found.append(make(name, part, how))
             except ValueError as error:
                 remarks.append(f"{name}: {error}.")
+    remarks += [
+        f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
+    ]
     return found, remarks
 
 
@@ -154,7 +158,9 @@ def _period(command: MultiSine, duration: float) -> float | None:
 
 def _label(group: Sequence[ArchivedTrial]) -> str:
     first = group[0].trial
-    told = [first.test, first.task.mode]
+    told = [first.test]
+    if first.task.mode != "recorded":
+        told.append(first.task.mode)
     if first.task.compensation != "none":
         told.append(first.task.compensation)
     return ", ".join(told)

@@ -317,7 +317,7 @@ def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
 def _settings(
     parameters: Sequence[Parameter], material: Material
 ) -> dict[str, tuple[object, str, str]]:
-    """What a friction model needs besides: no Stribeck part was looked for, so it has none."""
+    """What a bench's friction needs besides: no Stribeck part was looked for, so it has none."""
     if "load" in material.bench.friction:
         return {}
     by_name = {each.estimate.name: each for each in parameters}
@@ -325,15 +325,11 @@ def _settings(
     if coulomb is None or not coulomb.bench:
         return {}
     told: dict[str, tuple[object, str, str]] = {
-        f"{FRICTION}.model": ("stribeck", "", "the plain friction of steady sliding"),
-        f"{FRICTION}.stribeck_velocity": (1e-3, "rad/s", "without static friction it is nothing"),
+        f"{FRICTION}.model": ("coulomb", "", "the plain friction of steady sliding"),
     }
     for name, each in by_name.items():
         one = each.estimate
-        if name in BENCH and name.startswith("coulomb"):
-            static = BENCH[name].replace("coulomb", "static")
-            told[static] = (one.value, "N m", "no static friction was looked for")
-        elif name in BENCH and name.startswith("viscous") and not each.bench:
+        if name in BENCH and name.startswith("viscous") and not each.bench:
             fitted = 0.0 if one.kind == "at most" else max(one.value, 0.0)
             told[BENCH[name]] = (fitted, "N m s/rad", "as fitted, and not determined")
     return told

@@ -155,7 +155,7 @@ def candidates(factor: float, error: float = 0.0, gear: float | None = None) -> 
         if gear is not None and abs(ratio / gear - 1) <= tolerance:
             means.append(f"they are on the two sides of the gear of {gear:g}")
         elif round(ratio) >= 2 and abs(ratio / round(ratio) - 1) <= tolerance:
-            means.append(f"they are on the two sides of a gear of {round(ratio)}")
+            means.append(f"they are on the two sides of a gear of {round(ratio)} (`[gear] ratio`)")
     return means
 
 

@@ -125,7 +125,7 @@ def _across_the_gear(time: Array, channels: Mapping[str, Array], gear: float) ->
     for angle, own_rate, own_angle, rate, ratio in across:
         alone = own_rate not in channels and own_angle not in channels
         if alone and angle in channels and rate in channels:
-            names = (f"{ratio:g} times {angle}", rate)
+            names = (angle if ratio == 1 else f"{ratio:g} times {angle}", rate)
             for each in of_rate(time, ratio * channels[angle], channels[rate], names):
                 yield replace(each, channels=(rate, angle))
 

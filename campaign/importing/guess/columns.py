@@ -31,6 +31,7 @@ class ColumnGuess:
         low, high: the range of what was looked at; NaN where it holds no numbers.
         tag: words and numbers of its name that say no role; of several axes they are the name.
         axis: which of several it is of; "" where it is of all of them.
+        sided: False where nothing says which side of the gear it is of.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ColumnGuess:
     high: float = np.nan
     tag: tuple[str, ...] = ()
     axis: str = ""
+    sided: bool = True
 
     @property
     def is_channel(self) -> bool:

@@ -17,7 +17,7 @@ from campaign.importing.defects.clock import ticks
 from campaign.importing.guess import numbers
 from campaign.importing.guess.axes import axes
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGuess
-from campaign.importing.guess.names import BY_UNIT, named
+from campaign.importing.guess.names import BY_UNIT, common_path, named
 from campaign.importing.guess.relations import Series, with_roles, with_units
 from campaign.importing.guess.words import INDEX, TIME, UNKNOWN
 from campaign.importing.interface import Array, Column, Table
@@ -55,7 +55,8 @@ def _beginning(table: Table) -> Series:
 
 def _by_names(path: Path, table: Table, series: Series) -> list[ColumnGuess]:
     """What names say, held against the numbers; of a single signal the file's name may be one."""
-    columns = [_by_name(each, series.get(k)) for k, each in enumerate(table.columns)]
+    path_of_all = common_path([each.name for each in table.columns])
+    columns = [_by_name(c, series.get(k), path_of_all) for k, c in enumerate(table.columns)]
     if table.clock is None and len(series) > 1 and all(each.role != TIME for each in columns):
         columns = _with_time(columns, series)
     signals = [k for k in series if columns[k].role not in (TIME, INDEX)]
@@ -67,10 +68,10 @@ def _by_names(path: Path, table: Table, series: Series) -> list[ColumnGuess]:
     return columns
 
 
-def _by_name(column: Column, values: Array | None) -> ColumnGuess:
+def _by_name(column: Column, values: Array | None, before: str = "") -> ColumnGuess:
     if values is None:
         return ColumnGuess(column.name, column.place, UNKNOWN, "it holds no numbers")
-    found = named(column.name, column.unit, column.place)
+    found = named(column.name, column.unit, column.place, before)
     known = values[np.isfinite(values)]
     if len(known):
         found = replace(found, low=float(known.min()), high=float(known.max()))
@@ -93,8 +94,8 @@ def _with_time(columns: list[ColumnGuess], series: Series) -> list[ColumnGuess]:
         each = columns[place]
         matrix = each.name.endswith(("(1,:)", "(:,1)"))
         if (matrix or (each.role == UNKNOWN and not each.why)) and numbers.evenly(values):
-            doubt = ("its name does not say so",)
-            columns[place] = replace(each, role=TIME, why="it increases evenly", doubts=doubt)
+            why = "it increases evenly, by its numbers alone"
+            columns[place] = replace(each, role=TIME, why=why)
             begin = each.name[: each.name.rindex("(")] if matrix else None
             return [replace(c, tag=()) if c.name.split("(")[0] == begin else c for c in columns]
     return columns

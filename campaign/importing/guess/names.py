@@ -90,9 +90,9 @@ def kind_of_unit(unit: str) -> str:
     return _KINDS.get(parse_unit(unit).dimensions, "") if unit else ""
 
 
-def named(name: str, stated: str = "", place: str = "") -> ColumnGuess:
-    """What a name says; the unit that its file states tells names apart that are one letter."""
-    text = unicodedata.normalize("NFKC", name).strip(" \"'#%")
+def named(name: str, stated: str = "", place: str = "", before: str = "") -> ColumnGuess:
+    """What a name says behind `before`; a unit that the file states tells single letters apart."""
+    text = unicodedata.normalize("NFKC", name.removeprefix(before)).strip(" \"'#%")
     behind = _UNIT_BEHIND.fullmatch(text)
     unit = usable_unit(next(filter(None, behind.groups()[1:]), "")) if behind else ""
     sure = len(unit) > 1 or not (behind and behind["per"])  # `x/s` may be a path
@@ -106,16 +106,23 @@ def named(name: str, stated: str = "", place: str = "") -> ColumnGuess:
     kind, why = _kind(said, kind_of_unit(usable or unit))
     if re.fullmatch(r"T_?\d{1,2}", text) and not stated:
         kind, why = "warmth", "a T with a number"
-    role, doubts = _role(kind, said, usable or unit)
+    role, doubts, sided = _role(kind, said, usable or unit)
     if stated and not usable:
         doubts += (f"{stated!r}, as the file has it, is no unit that is known here",)
-    found = ColumnGuess(name, place, role, why, doubts=doubts, tag=tag)
+    found = ColumnGuess(name, place, role, why, doubts=doubts, tag=tag, sided=sided)
     if usable:
         return replace(found, unit=usable, basis=Basis.STATED, unit_why="the file states it")
     if not unit or kind_of_unit(unit) != kind:
         return found
     basis = Basis.STATED if sure else Basis.LIKELY
     return replace(found, unit=unit, basis=basis, unit_why="its name ends with it")
+
+
+def common_path(names: Sequence[str]) -> str:
+    """What stands before all names and says nothing, as a group of a file does: `run1.`."""
+    path = re.split(r"[^./]*$", names[0])[0] if len(names) > 1 else ""
+    common = all(name.startswith(path) for name in names)
+    return path if common and KNOWN.isdisjoint(_words(_pieces(path))) else ""
 
 
 def _pieces(text: str) -> list[str]:
@@ -224,20 +231,22 @@ _CHANNELS = (
     ("rate", "", channels.RELATIVE_RATE),
 )
 """The channel of a quantity of which a word says that; the first that fits."""
+_OF_A_SIDE = {row[-1] for row in _CHANNELS[-6:]} | {channels.DRIVE_TORQUE}
+_TURNS = frozenset(("rpm", "drehzahl"))
+"""A rate in turns is likely the motor's, and that is all that says so."""
 
 
-def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ...]]:
-    """The channel of the vocabulary, and what a reader should know of it."""
+def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ...], bool]:
+    """The channel of the vocabulary, what to check, and whether a side of the gear is said."""
     if kind in (TIME, INDEX, UNKNOWN):
-        return kind, ()
+        return kind, (), True
+    said = said[kind == "rate" and said[:1] == ["d"] :]  # in front it is a derivative, no target
     told = {change for change, words in WORDS.items() if not words.isdisjoint(said)} | {""}
-    if unit == "rpm":
+    sided = not told.isdisjoint(("motor", "load"))
+    if unit == "rpm" or not _TURNS.isdisjoint(said):
         told.add("motor")
     if unit and parse_unit(unit).dimensions == _FORCE and _LOADED.issuperset(said):
         told.add("normal")  # `Nominal load [N]`
-    of, change, role = next(r for r in _CHANNELS if r[0] in ("", kind) and r[1] in told)
-    unsaid = of in ("angle", "rate", "torque") and not change and role != UNKNOWN
-    doubts = ("which side of the gear is not said",) if unsaid else ()
-    if "estimate" in told:
-        doubts = ("an estimate, and not what a sensor showed", *doubts)
-    return role, doubts
+    role = next(r[2] for r in _CHANNELS if r[0] in ("", kind) and r[1] in told)
+    doubts = ("an estimate, and not what a sensor showed",) if "estimate" in told else ()
+    return role, doubts, sided or role not in _OF_A_SIDE

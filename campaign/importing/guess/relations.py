@@ -24,9 +24,9 @@ MOST = 24
 """Such columns that are looked at; each is held against each."""
 _CERTAIN = 0.995
 """Share explained from which on a column counts as the derivative of another."""
-_ANGLES = (channels.RELATIVE_ANGLE, channels.MOTOR_ANGLE)
-_RATES = (channels.RELATIVE_RATE, channels.MOTOR_RATE)
-_TORQUES = (channels.DRIVE_TORQUE, channels.JOINT_TORQUE)
+ANGLES = (channels.RELATIVE_ANGLE, channels.MOTOR_ANGLE)
+RATES = (channels.RELATIVE_RATE, channels.MOTOR_RATE)
+TORQUES = (channels.DRIVE_TORQUE, channels.JOINT_TORQUE)
 _TARGETS = (channels.REFERENCE, channels.COMMAND)
 Series = dict[int, Array]
 
@@ -36,7 +36,7 @@ def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
     found = list(columns)
     part = {k: values[:ROWS] for k, values in series.items()}
     silent = [k for k in part if found[k].role == UNKNOWN and not found[k].why][:MOST]
-    angles, rates = ([k for k in part if found[k].role in roles] for roles in (_ANGLES, _RATES))
+    angles, rates = ([k for k in part if found[k].role in roles] for roles in (ANGLES, RATES))
     pairs = [(k, j) for k in (*angles, *silent) for j in (*silent, *rates) if k != j]
     pairs = [pair for pair in pairs if not set(silent).isdisjoint(pair)]
     fits = [(k, j) for k, j in pairs if _is_derivative(time[:ROWS], part[k], part[j])]
@@ -45,11 +45,8 @@ def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
         motor = found[k].role == channels.MOTOR_ANGLE or found[j].role == channels.MOTOR_RATE
         whys = (f"{found[j].name} is its derivative", f"the derivative of {found[k].name}")
         new = {
-            place: _told(
-                replace(found[place], role=roles[motor], why=f"{why}, by its numbers"),
-                "its name does not say so",
-            )
-            for place, roles, why in zip((k, j), (_ANGLES, _RATES), whys, strict=True)
+            place: replace(found[place], role=roles[motor], why=f"{why}, by its numbers alone")
+            for place, roles, why in zip((k, j), (ANGLES, RATES), whys, strict=True)
             if found[place].role == UNKNOWN
         }
         # What is like a rate that is there may be its target, or a copy.
@@ -73,18 +70,20 @@ def _factor(time: Array, angle: Array, rate: Array) -> Slope | None:
 def with_units(columns: Sequence[ColumnGuess], series: Series, time: Array) -> list[ColumnGuess]:
     """Units that columns suggest of each other; and what contradicts those that a file states."""
     found = list(columns)
-    for k, j in _pairs(found, _ANGLES, _RATES):
+    for k, j in _pairs(found, ANGLES, RATES):
         factor = _factor(time, series[k], series[j])
         if factor is not None:
             _rate_of_angle(found, k, j, factor)
-    for k, j in _pairs(found, _TARGETS, (*_ANGLES, *_RATES, *_TORQUES, channels.MOTOR_CURRENT)):
+    for k, j in _pairs(found, _TARGETS, (*ANGLES, *RATES, *TORQUES, channels.MOTOR_CURRENT)):
         size, fit = _beside(series[k], series[j])
         if fit > 0.98 and abs(size - 1) < 0.1:
             # A target is one of what follows it.
-            role = channels.REFERENCE if found[j].role in _ANGLES else channels.COMMAND
-            found[k] = _told(found[k], f"it goes with {found[j].name}, R² {fit:.4f}")
-            found[k] = _with_unit(replace(found[k], role=role), found[j].unit)
-    for k, j in _pairs(found, _TORQUES, (channels.MOTOR_CURRENT,)):
+            role = channels.REFERENCE if found[j].role in ANGLES else channels.COMMAND
+            why = f"it goes with {found[j].name}, R² {fit:.4f}"
+            found[k] = replace(found[k], role=role, why=f"{found[k].why}; {why}")
+            if found[k].basis is Basis.UNKNOWN:
+                found[k] = likely(found[k], found[j].unit, why)
+    for k, j in _pairs(found, TORQUES, (channels.MOTOR_CURRENT,)):
         size, fit = _beside(series[k], series[j])
         if fit > 0.9999:
             made = f"it is {size:.5g} times {found[j].name}: made of it, and not measured by itself"
@@ -105,24 +104,28 @@ def _told(column: ColumnGuess, doubt: str) -> ColumnGuess:
     return replace(column, doubts=(*column.doubts, doubt))
 
 
-def _with_unit(column: ColumnGuess, unit: str) -> ColumnGuess:
-    """With a unit that the last of its doubts suggests, where it has none."""
-    return likely(column, unit, column.doubts[-1]) if column.basis is Basis.UNKNOWN else column
-
-
 def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> None:
-    """The unit of a rate from that of its angle; where both are stated, whether they agree."""
+    """The unit of a rate, and its side, from its angle; whether those that are stated agree."""
     angle, rate, size = found[k], found[j], abs(factor.factor)
     told = f"{factor.factor:.5g} times the derivative of {angle.name}, R² {factor.explained:.4f}"
-    found[j] = _told(rate, told)
     for unit in ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s", "count/s"):
         due = _due(angle.unit, unit)
-        if due and abs(size / due - 1) < max(0.02, 3 * factor.error):
-            found[j] = _with_unit(found[j], unit)
+        alike = due and abs(size / due - 1) < max(0.02, 3 * factor.error)
+        if alike and rate.basis is Basis.UNKNOWN:
+            rate = likely(rate, unit, told)
     due = _due(angle.unit, rate.unit)
+    if due and abs(factor.factor / due - 1) <= max(0.1, 3 * factor.error):
+        own = RATES[ANGLES.index(angle.role)]
+        there = {(each.role, each.axis) for place, each in enumerate(found) if place != j}
+        if not rate.sided and (own, rate.axis) not in there:
+            why = f"{rate.why}; the derivative of {angle.name}"
+            rate = replace(rate, role=own, sided=angle.sided, why=why)
+        found[j] = rate
+        return
+    found[j] = _told(rate, f"{told}; {factor.factor / due:.5g} in its unit" if due else told)
     sides = (angle.role == channels.MOTOR_ANGLE) == (rate.role == channels.MOTOR_RATE)
     stated = {angle.basis, rate.basis} == {Basis.STATED}
-    if due and sides and stated and abs(size / due - 1) > max(0.1, 3 * factor.error):
+    if due and sides and stated:
         # One of the three is wrong, or a gear is between; nobody can tell which.
         why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due"
         for place, each in enumerate(found):

@@ -16,6 +16,7 @@ from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
 from campaign.importing.guess.layouts import Layout, Placed, layouts, slug
+from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
 from campaign.importing.guess.words import INDEX, TIME
 from campaign.unit_grammar import parse_unit
 
@@ -28,22 +29,23 @@ _HEAD = """\
 #        [axis]
 #        name = "..."
 #        kind = "{kind}"  # rotary: rad and N m; linear: m and N{asked}
-# 2. Lines that begin with `# ?` are to be checked. Those of the form `key = ...`: put right what is
-#    not, and remove the `# ?`. The others are remarks: think of them, and strike them out. Every
-#    channel needs a unit (and `times`, where that is asked); one that is not wanted is struck out
-#    with its whole block.
+# 2. Check lines that begin with `# ?`. Those of the form `key = ...` or `[...]`: correct what is
+#    wrong, and remove the `# ?`. The others are remarks: consider them, and delete them. Every
+#    channel needs a unit (and `times`, where that is asked); delete the whole block of one that is
+#    not wanted.
 # 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
 #    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
-# 4. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
+# 4. Without `[gear]` in rig.toml motor and load move as one. With it (`ratio = ...`) columns at the
+#    motor are motor_angle or motor_rate, and a torque there has `times = "RATIO"`.
+# 5. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
 #    `campaign import mapping.toml --report` makes run and report of it.
 # Never guessed: signs, the side of a gear, torque constants, rated torques, offsets, filters.
 schema = 2
 title = {title}"""
 _LACKING = {
-    (channels.RELATIVE_RATE, channels.RELATIVE_ANGLE): "no column was taken for the motion, which "
-    "`motion` needs: relative_rate, or relative_angle; for those of a motor the rig needs a gear",
-    (channels.DRIVE_TORQUE, channels.JOINT_TORQUE): "no column was taken for what drives it, which "
-    "`motion` needs: drive_torque or joint_torque; of a current it is made with `times`:",
+    (*ANGLES, *RATES): "no column was taken for the motion, which `motion` needs: angle or rate",
+    TORQUES: "no column was taken for what drives it, which `motion` needs: drive_torque or "
+    "joint_torque; of a current it is made with `times`:",
 }
 """What an experiment needs, one of each."""
 
@@ -60,7 +62,9 @@ def mapping_text(guess: Guess, base: Path | None = None) -> str:
         lines += ["", "[[test]]", f"name = {_quoted(slug(f'axis {axis}') if axis else 'recorded')}"]
         lines += ['kind = "motion"', _doubt("the rig: see above"), 'bench = "rig.toml"']
         for layout in (each for each in found if each.axis == axis):
-            lines += ["", *_recording(layout, base)]
+            own = _recording(layout, base)
+            # What files are read as stands once for all that are alike.
+            lines += ["", *(x for x in own if x not in lines or not x.startswith("# read as"))]
     alike = Counter(layout.name for layout in found)
     for name, layout in {each.name: each for each in reversed(found)}.items():
         lines += ["", *_columns(layout, alike[name])]
@@ -92,6 +96,9 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
     yield _comment(f"Columns of {first.file.name} {first.name} {layout.axis}".rstrip() + others)
     if first.clock:
         yield _comment(f"Time: the file states a step of {first.step:.9g} s.")
+    unsaid = [p.column.role for p in layout.columns if not p.column.sided]
+    if unsaid:
+        yield _doubt(f"side of the gear not said (4 above): {', '.join(dict.fromkeys(unsaid))}")
     taken: set[str] = set()
     for placed in layout.columns:
         role = placed.column.role
@@ -148,8 +155,8 @@ def _unit(column: ColumnGuess) -> Iterator[str]:
         why = column.unit_why or f"such as {' or '.join(due) or 's'}"
         yield _doubt(f"{unit}  # {column.basis}: {why}")
     if column.unit and due and not any(_same(column.unit, each) for each in due):
-        kinds = " or ".join(f'"... {each}/{column.unit}"' for each in due)
-        yield _doubt(f"times = {kinds}  # nobody knows it but you")
+        kinds = "  # or ".join(f'"... {each}/{column.unit}"' for each in due)
+        yield _doubt(f'times = {kinds}  # of the rig, such as "0.3 N m/A", "1/4096 rev/count"')
 
 
 def _due(column: ColumnGuess) -> list[str]:
@@ -178,11 +185,11 @@ def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
             yield ""
             yield _doubt(told)
     current = next((p for p in layout.columns if p.column.role == channels.MOTOR_CURRENT), None)
-    if current is not None and taken.isdisjoint((channels.DRIVE_TORQUE, channels.JOINT_TORQUE)):
+    if current is not None and taken.isdisjoint(TORQUES):
         unit = current.column.unit
         yield from map(_doubt, _which(layout, current, channels.DRIVE_TORQUE))
         yield _doubt(f"unit = {_quoted(unit or '...')}")
-        times = f'"... N m/{unit or "A"}" or "... N/{unit or "A"}"'
+        times = f'"... N m/{unit or "A"}"  # or "... N/{unit or "A"}"'
         yield _doubt(f"times = {times}  # at the load: torque constant times gear")
 
 

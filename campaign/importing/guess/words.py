@@ -37,8 +37,7 @@ _CHANGES = {
     "target": "target targets cmd cmds command commands commanded soll sollwert demand demanded "
     "dmd setpoint stpt set desired des ref reference goal d g qg sp tgt request requested req "
     "consigne vorgabe action wanted planned traj trajectory profile star",
-    "motor": "rpm drehzahl motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor "
-    "spindle spindel",
+    "motor": "motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor spindle spindel",
     "load": "load link joint joints jnt gimbal output l j abtrieb abtriebsseite last arm",
     "hull": "base hull platform plattform ship vessel carrier",
     "gyro": "gyro gyr gyroscope imu inertial los gx gy gz",
