@@ -239,12 +239,14 @@ def is_measured(one: dict[str, Any]) -> bool:
     return one["origin"] == str(Origin.MEASURED) and one["held"] is not None
 
 
-def rows(rigs: Sequence[dict[str, Any]]) -> Iterator[list[str]]:
-    """One for each parameter, and one for all."""
+def rows(rigs: Sequence[dict[str, Any]], *, apart: bool = False) -> Iterator[list[str]]:
+    """One for each parameter, and one for all; `apart`: by direction, statistic and exponent."""
     by: dict[str, list[tuple[int, dict[str, Any]]]] = defaultdict(list)
     for rig in rigs:
         for one in rig["told"]:
-            by[one["parameter"]].append((rig["number"], one))
+            name = one["parameter"]
+            name = name if apart else name.split(",")[0].removesuffix(" with delta = 2")
+            by[name].append((rig["number"], one))
     for name in sorted(by):
         yield row(name, by[name])
     yield row("**all**", [each for own in by.values() for each in own])
@@ -290,18 +292,26 @@ def page(rigs: Sequence[dict[str, Any]]) -> str:
     trials, at_limit = (sum(rig[key] for rig in rigs) for key in ("trials", "at_limit"))
     warned = sum(bool(rig["warnings"]) for rig in rigs)
     failed = sum(len(rig["failed"]) for rig in rigs)
+    head = [f"| {' | '.join(HEADINGS)} |", f"|{' --- |' * len(HEADINGS)}"]
     lines = [
         (
             f"Drawn by `{rigs[0]['text']}`: {len(rigs)} rigs, {trials} trials; {at_limit} ended at "
             f"a limit, {warned} plans had a warning of the program, {failed} analyses failed, "
             f"{sum(refused.values())} rigs were refused."
         ),
+        *(f"- {n} refused: {why}" for why, n in refused.items()),
         "",
-        f"| {' | '.join(HEADINGS)} |",
-        f"|{' --- |' * len(HEADINGS)}",
+        "By parameter, all directions, means and exponents together:",
+        "",
+        *head,
         *(f"| {' | '.join(cells)} |" for cells in rows(rigs)),
+        "",
+        "The same, apart:",
+        "",
+        *head,
+        *(f"| {' | '.join(cells)} |" for cells in rows(rigs, apart=True)),
     ]
-    return "\n".join([*lines, *(f"- {n} refused: {why}" for why, n in refused.items())])
+    return "\n".join(lines)
 
 
 def listed(rigs: Iterable[dict[str, Any]]) -> str:

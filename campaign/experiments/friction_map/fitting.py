@@ -28,6 +28,8 @@ SLOWEST = 0.1
 """of the fastest speed of a map, at most: its slowest, so that it is a curve."""
 FEW = 5.0
 """times that, where the loop is too weak to turn friction round at lower speeds."""
+ROUNDED = 1.1
+"""times what a run needs: rounding takes up to a twentieth of it."""
 SPEEDS = 40
 """of a map: the fit needs some ten, the rest shows where the curve is not the model's."""
 
@@ -109,7 +111,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
         "max_time",
         "s",
         {
-            "the slowest speed settles": max(20.0, needed + 2 * slowest / acceleration),
+            "the slowest speed settles": max(20.0, ROUNDED * (needed + 2 * slowest / acceleration)),
             "a minute": MINUTE,
             "what the limit of duration leaves a run": allowed,
         },

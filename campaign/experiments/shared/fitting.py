@@ -19,12 +19,15 @@ from campaign.experiments.shared.choices import Choices, nice, share
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate, inertia_of, limits_of
+from campaign.physics.limits import worst_friction
 
 DEG = math.pi / 180.0
 MILLIMETRE = 1e-3
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SWEPT = 40
 """frequencies, evenly in their logarithm."""
+ROOM = 0.5
+"""of the torque, for friction that is not described, noise, and what the loop overshoots."""
 SAMPLES = 100
 """a cycle: of 20 the 19th harmonic folds onto the fundamental, and turned it by 0.1 to 0.2 deg."""
 PEAK = 1.8
@@ -113,6 +116,18 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     top = "35 % of the controller's sample rate" if control else "a usual size"
     told = f"from {low:.2g} Hz ({why}) to {highest:.3g} Hz ({top})"
     choices.take("frequencies", tuple(swept), told)
+    if options.loop == "closed":
+        part = ROOM if rig.static_torque is None else 1.4 * ROOM
+        left = rig.accelerated_by(rig.torque - worst_friction(bench, amplitude))
+        friction = "an unknown friction" if rig.static_torque is None else "friction"
+        choices.least(
+            "max_acceleration",
+            "deg/s^2",
+            {
+                share("acceleration", 0.7): 0.7 * limits.acceleration,
+                f"{100 * part:.0f} % of what {friction} leaves of the torque": part * left,
+            },
+        )
     folds = "harmonics that friction makes fold onto the sine: of 100 samples the 99th, 1e-4 of it"
     choices.take("samples_per_cycle", SAMPLES, folds)
     return choices.told
