@@ -12,7 +12,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from campaign.errors import Problem
 from campaign.importing.interface import RecordingError, check_regular
 from campaign.options import Options
 from campaign.recording import ChannelInfo
@@ -139,5 +138,5 @@ def file_used(path: Path, name: str) -> FileUsed:
                 size += len(chunk)
     except OSError as error:
         why = error.strerror or str(error)
-        raise RecordingError([Problem(path, 0, 0, f"it cannot be read: {why}")]) from None
+        raise RecordingError.of(path, f"it cannot be read: {why}") from None
     return FileUsed(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

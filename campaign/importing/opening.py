@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.formats import recording_formats
 from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table, check_regular
 
@@ -24,15 +23,15 @@ def format_of(path: Path) -> RecordingFormat:
             head = file.read(HEAD)
     except OSError as error:
         why = error.strerror or str(error)
-        raise RecordingError([Problem(path, 0, 0, f"it cannot be opened: {why}")]) from None
+        raise RecordingError.of(path, f"it cannot be opened: {why}") from None
     if not head.strip():
-        raise RecordingError([Problem(path, 0, 0, "it is empty")])
+        raise RecordingError.of(path, "it is empty")
     formats = [each for _, each in recording_formats().described() if not isinstance(each, str)]
     fitting = [each for each in formats if each.recognises(head)]
     fitting.sort(key=lambda each: (each.name == TEXT, path.suffix.lower() not in each.endings))
     if not fitting:
         known = ", ".join(sorted(each.name for each in formats))
-        raise RecordingError([Problem(path, 0, 0, f"it is in none of the formats {known}")])
+        raise RecordingError.of(path, f"it is in none of the formats {known}")
     return fitting[0]
 
 

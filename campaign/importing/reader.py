@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
@@ -145,7 +144,7 @@ class RecordingReader:
             )
         except UnevenError as error:  # it was even when the plan was made
             path = self._opened.paths[told.table[0]]
-            raise RecordingError([Problem(path, 0, 0, str(error))]) from None
+            raise RecordingError.of(path, str(error)) from None
 
 
 def clock_times(clock: ClockUsed, opened: OpenedFiles, first: int, stop: int) -> Array:
@@ -164,6 +163,6 @@ def paths_unchanged(described: Described) -> Sequence[Path]:
         path = Path(used.path)
         if file_used(path, used.name).sha256 != used.sha256:
             message = "it has changed since it was mapped (its SHA-256 is another)"
-            raise RecordingError([Problem(path, 0, 0, message)])
+            raise RecordingError.of(path, message)
         paths.append(path)
     return paths

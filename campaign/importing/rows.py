@@ -14,7 +14,6 @@ from typing import TextIO
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_lost, value_of
 from campaign.importing.dialect import Dialect, encoding_of
 from campaign.importing.interface import HEAD, ROWS, Array, RecordingError
@@ -43,16 +42,16 @@ def lines_of(file: TextIO, path: Path) -> Iterator[str]:
         while line := file.readline(LONGEST):
             number += 1
             if len(line) == LONGEST:
-                raise RecordingError(
-                    [Problem(path, number, 1, f"a line of over {LONGEST} characters: no table")]
+                raise RecordingError.of(
+                    path, f"a line of over {LONGEST} characters: no table", number
                 )
             if "\0" in line:
                 at = line.index("\0") + 1
-                raise RecordingError([Problem(path, number, at, "a zero byte: this is no text")])
+                raise RecordingError.of(path, "a zero byte: this is no text", number, at)
             yield line
     except UnicodeDecodeError as error:
         message = f"the text is not {error.encoding}: {error.reason}"
-        raise RecordingError([Problem(path, number + 1, 0, message)]) from None
+        raise RecordingError.of(path, message, number + 1, 0) from None
 
 
 def beginning(file: TextIO, path: Path, count: int) -> list[str]:

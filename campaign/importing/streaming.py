@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import Array, Clock, Column, RecordingError, Table
 
 REFUSED = 3
@@ -115,17 +114,13 @@ def _process(module: str, path: Path, *task: object) -> Iterator[_Output]:
         end = process.wait()
         if output.late:
             message = f"reading it did not go on for {PATIENCE:g} s"
-            raise RecordingError([Problem(path, 0, 0, message)])
+            raise RecordingError.of(path, message)
         if end == REFUSED:
             said.seek(0)
-            raise RecordingError([Problem(path, 0, 0, said.read().decode("utf-8", "replace"))])
+            raise RecordingError.of(path, said.read().decode("utf-8", "replace"))
         if end:
-            raise _broken(path)
-
-
-def _broken(path: Path) -> RecordingError:
-    message = "it is so broken that the library that reads such files fell over it"
-    return RecordingError([Problem(path, 0, 0, message)])
+            message = "it is so broken that the library that reads such files fell over it"
+            raise RecordingError.of(path, message)
 
 
 def answer(tables: Callable[[Path], Sequence[Table]]) -> None:

@@ -143,7 +143,7 @@ def test_workbooks_that_are_none(tmp_path):
     with pytest.raises(RecordingError, match=r"save it as .xlsx"):
         opened(path, "excel")
     path.write_bytes(b"PK\x03\x04 xl/ and nothing else")
-    with pytest.raises(RecordingError, match="cannot be unpacked"):
+    with pytest.raises(RecordingError, match="workbook cannot be read"):
         opened(path, "excel")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("[Content_Types].xml", "<a/>")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.dialect import SEPARATORS, Dialect, dialect_of, encoding_of
 from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import beginning, blocks, encoding_of_file
@@ -25,7 +24,7 @@ def tables(path: Path) -> Sequence[Table]:
     if dialect is None:
         separators = ", ".join(SEPARATORS.values())
         message = f"no table of numbers, separated by {separators}, was found in it"
-        raise RecordingError([Problem(path, 0, 0, message)])
+        raise RecordingError.of(path, message)
     below = stacked(path, encoding, dialect, sample)
     if not below:
         read = partial(blocks, path, encoding, dialect)

@@ -9,14 +9,13 @@ from __future__ import annotations
 import datetime as dt
 import zipfile
 from collections.abc import Container, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, is_unit, plain, value_of
 from campaign.importing.dialect import Dialect, letters, read_as
 from campaign.importing.interface import (
@@ -27,6 +26,7 @@ from campaign.importing.interface import (
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 from campaign.importing.rows import blocks_of
 from campaign.importing.streaming import tables_streamed
@@ -46,7 +46,7 @@ def tables(path: Path) -> Sequence[Table]:
     with _opened(path) as book:
         found = [each for sheet in book.worksheets for each in _table(path, sheet)]
     if not found:
-        raise _error(path, "no sheet of it has a table of numbers")
+        raise RecordingError.of(path, "no sheet of it has a table of numbers")
     return found
 
 
@@ -157,34 +157,24 @@ def _heading(rows: list[list[str]], start: int) -> list[list[str]]:
 
 def _check_size(path: Path) -> None:
     """A small file may unpack to more than a machine holds."""
-    try:
-        with zipfile.ZipFile(path) as packed:
-            sizes = {each.filename: each.file_size for each in packed.infolist()}
-    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
-        raise _error(path, f"this workbook cannot be unpacked: {error}") from None
+    with read_by("zipfile", path, "workbook"), zipfile.ZipFile(path) as packed:
+        sizes = {each.filename: each.file_size for each in packed.infolist()}
     shared = max((size for name, size in sizes.items() if "sharedStrings" in name), default=0)
     if shared > LARGEST_PART or sum(sizes.values()) > MOST_UNPACKED:
-        raise _error(path, f"it unpacks to {sum(sizes.values()) / 1e9:.3g} GB, which is too much")
+        raise RecordingError.of(
+            path, f"it unpacks to {sum(sizes.values()) / 1e9:.3g} GB, which is too much"
+        )
 
 
 @contextmanager
 def _opened(path: Path, values: bool = True) -> Iterator[Any]:
     """A workbook; with its formulas in place of their values if `values` is false."""
-    try:
+    with read_by("openpyxl", path, "workbook", "excel"):
         import openpyxl
-    except ImportError:
-        raise _error(path, "Excel files need openpyxl: pip install 'campaign[excel]'") from None
-    try:
+
         book = openpyxl.load_workbook(path, read_only=True, data_only=values, keep_links=False)
-        try:
+        with closing(book):
             yield book
-        finally:
-            book.close()
-    except RecordingError:
-        raise
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise _error(path, f"this workbook cannot be read ({why[:300]})") from None
 
 
 def _rows(sheet: Any) -> Iterator[Cells]:
@@ -208,14 +198,12 @@ def _check_formulas(path: Path, dialect: Dialect) -> None:
                     raise RecordingError([dialect.problem(path, row, message, place=place)])
 
 
-def _error(path: Path, message: str) -> RecordingError:
-    return RecordingError([Problem(path, 0, 0, message)])
-
-
 def _tables(path: Path) -> Sequence[Table]:
     with path.open("rb") as file:
         if file.read(len(_OLD)) == _OLD:
-            raise _error(path, "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx")
+            raise RecordingError.of(
+                path, "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx"
+            )
     return tables_streamed(__name__, path)
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import (
@@ -50,7 +49,7 @@ def _tables(path: Path) -> Sequence[Table]:
     decimal = said.get("Decimal_Separator", ".")
     if decimal not in (".", ","):
         message = f"Decimal_Separator is {decimal!r}, and not a point or a comma"
-        raise RecordingError([Problem(path, 0, 0, message)])
+        raise RecordingError.of(path, message)
     return [
         table
         for number, block in enumerate(found, start=1)
@@ -81,7 +80,7 @@ def _blocks(path: Path, lines: Iterator[str]) -> tuple[dict[str, str], list[_Blo
             state, heading = "rows", {}
         elif state == "between" and found and not heading and _is_row(cells):
             message = "a row of numbers behind an empty line, which ends a block"
-            raise RecordingError([Problem(path, number, 1, message)])
+            raise RecordingError.of(path, message, number)
         elif state == "rows" and cells[0] != "Channels":
             found[-1].rows += 1
         else:
@@ -92,10 +91,10 @@ def _blocks(path: Path, lines: Iterator[str]) -> tuple[dict[str, str], list[_Blo
 
 def _check(path: Path, found: Sequence[_Block]) -> None:
     if not found:
-        raise RecordingError([Problem(path, 0, 0, f"no block ended its heading with {END}")])
+        raise RecordingError.of(path, f"no block ended its heading with {END}")
     for block in found:
         if not block.rows:
-            raise RecordingError([Problem(path, block.first, 1, "a block without any row")])
+            raise RecordingError.of(path, "a block without any row", block.first)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -163,7 +162,7 @@ def _clocks(path: Path, block: _Block, decimal: str, count: int) -> list[Clock]:
         return [Clock(step, start) for step, start in zip(steps, starts, strict=True)]
     except (KeyError, ValueError):
         message = "the heading of the block above states no X0 and Delta_X of each channel"
-        raise RecordingError([Problem(path, block.first, 1, message)]) from None
+        raise RecordingError.of(path, message, block.first) from None
 
 
 def _chosen(

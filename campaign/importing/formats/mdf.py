@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import (
     ROWS,
     Array,
@@ -23,6 +22,7 @@ from campaign.importing.interface import (
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 from campaign.importing.streaming import tables_streamed
 
@@ -51,14 +51,14 @@ def tables(path: Path) -> Sequence[Table]:
             size = each.channel_group.samples_byte_nr + each.channel_group.invalidation_bytes_nr
             if rows * size > DENSEST * path.stat().st_size:
                 told = f"group {group + 1} says that it has {rows} samples of {size} bytes"
-                raise _error(path, f"{told}, more than are in a file of this size")
+                raise RecordingError.of(path, f"{told}, more than are in a file of this size")
             columns, places = _columns(file, group, each)
             if any(column.numeric for column in columns[1:]):
                 name = str(getattr(each.channel_group, "acq_name", "") or f"group {group + 1}")
                 read = partial(_read, path, places, rows)
                 found.append(Table(name, tuple(columns), read, rows=rows))
     if not found:
-        raise _error(path, "no group of it has a series of numbers")
+        raise RecordingError.of(path, "no group of it has a series of numbers")
     return found
 
 
@@ -92,7 +92,7 @@ def _read(
                 message = (
                     f"group {places[0].group + 1} ends after {start + there} of {rows} samples"
                 )
-                raise _error(path, message)
+                raise RecordingError.of(path, message)
             yield np.column_stack(series) if series else np.empty((count, 0))
 
 
@@ -116,28 +116,19 @@ def _part(file: Any, place: _Place, start: int, count: int) -> Array:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    try:
+    with read_by("asammdf", path, "MDF file", "mdf"):
         from asammdf import MDF
-    except ImportError:
-        raise _error(path, "MDF needs asammdf: pip install 'campaign[mdf]'") from None
-    try:
+
         with MDF(path) as file:
             yield file
-    except RecordingError:
-        raise
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise _error(path, f"this MDF file cannot be read ({why[:300]})") from None
-
-
-def _error(path: Path, message: str) -> RecordingError:
-    return RecordingError([Problem(path, 0, 0, message)])
 
 
 def _tables(path: Path) -> Sequence[Table]:
     with path.open("rb") as file:
         if file.read(len(UNFINISHED)) == UNFINISHED:
-            raise _error(path, "its recording was never finished: let its program mend it first")
+            raise RecordingError.of(
+                path, "its recording was never finished: let its program mend it first"
+            )
     return tables_streamed(__name__, path)
 
 

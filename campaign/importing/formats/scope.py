@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import Clock, Column, RecordingError, RecordingFormat, Table
@@ -30,7 +29,7 @@ def _tables(path: Path) -> Sequence[Table]:
     clock = _clock(path, names, units)
     width = len(first)
     if width < count or not all(is_number(cell, ".") for cell in first[:count]):
-        raise RecordingError([Problem(path, 3, 1, "no row of numbers follows the heading")])
+        raise RecordingError.of(path, "no row of numbers follows the heading", 3)
     dialect = Dialect(
         ",", ".", 3, width, tuple(names[:count]), ("",) * count, (True,) * count
     )  # fmt: skip
@@ -47,7 +46,7 @@ def _clock(path: Path, names: Sequence[str], units: Sequence[str]) -> Clock:
         start = step = float("nan")
     if not step > 0:
         message = f"below {' and '.join(_CLOCK)} there is no time of the first sample, and no step"
-        raise RecordingError([Problem(path, 2, 1, message)])
+        raise RecordingError.of(path, message, 2)
     return Clock(step, start)
 
 

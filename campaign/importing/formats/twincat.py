@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.cells import NO_UNIT, is_lost, is_number, is_unit
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import (
@@ -40,7 +39,7 @@ def _tables(path: Path) -> Sequence[Table]:
     headed = next((k for k, cells in enumerate(rows) if k and cells[0] == NAME), None)
     said = {cells[0]: cells[1] for cells in rows[:headed] if len(cells) > 1 and cells[0]}
     if headed is None:
-        raise RecordingError([Problem(path, 0, 0, f"no row of the channels begins with {NAME!r}")])
+        raise RecordingError.of(path, f"no row of the channels begins with {NAME!r}")
     facts: dict[str, list[str]] = {}
     first = None
     for number, cells in enumerate(rows[headed:], start=headed + 1):
@@ -51,7 +50,7 @@ def _tables(path: Path) -> Sequence[Table]:
         if cells[0]:
             facts[cells[0]] = cells
     if first is None or decimal is None:
-        raise RecordingError([Problem(path, headed + 1, 1, "no row of numbers follows")])
+        raise RecordingError.of(path, "no row of numbers follows", headed + 1)
     names = facts[NAME]
     width = len(names)
     while width > 1 and not names[width - 1]:
@@ -126,7 +125,7 @@ def _rows(
         if len(left):
             at = row + count + int(left[0])
             message = "values without a time beside them, or after an end of their times"
-            raise RecordingError([Problem(path, at, 1, message)])
+            raise RecordingError.of(path, message, at)
         over = over or count < len(timed)
         yield block[:count, 1:]
         row += len(block)
