@@ -41,6 +41,11 @@ class Cells(Options):
     name: str = ""
     """As the file has it."""
 
+    @property
+    def rows_of(self) -> tuple[int, int]:
+        """File and table: columns of one have their rows in common."""
+        return self.file, self.table
+
 
 class ClockUsed(Options):
     """How rows are told by their times: row k is at start + k / sample_rate, or as `cells` say."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,10 @@ from campaign.importing.mapping import Layout, RecordingEntry, layouts, recordin
 from campaign.importing.mapping_errors import MappingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
-from campaign.importing.rig_facts import rig_facts
-from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Origin
 from campaign.protocol.problems import allowed, nearest, shown
-from campaign.protocol.schema import ChosenValue, ExperimentKind, Protocol, StageKind, Test
+from campaign.protocol.schema import ExperimentKind, Protocol, Test
 from campaign.recording import Recording
 from campaign.trial import Offered, Task, TrialRequest
 from campaign.units import to_si
@@ -94,23 +92,6 @@ def _of_file(
 
 
 @dataclass(frozen=True)
-class RecordedKind:
-    """An experiment whose trials have been executed; see `protocol.schema.ExperimentKind`."""
-
-    name: str
-    options: type[Options]
-    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
-    requires: Mapping[str, str]
-    can_use: Mapping[str, str]
-    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
-    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
-    recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
-    windows: tuple[str, ...] = ()
-    stages: Sequence[StageKind] = ()
-    seeks_instability: bool = False
-
-
-@dataclass(frozen=True)
 class Found:
     """One recording of a test: what its entry says, and what its files hold."""
 
@@ -158,7 +139,7 @@ class _Loader:
         entries = recordings_of(
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
-        rig = rig_facts(Bench.model_validate(test.bench))
+        rig = RigFacts.of(Bench.model_validate(test.bench))
         found = [each for place in entries for each in self._found(test, *place, rig)]
         return replace(test, experiment=_kind(test.experiment, found))
 
@@ -214,36 +195,27 @@ class _Loader:
 
     def _files(
         self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
-    ) -> Iterator[list[str]]:
+    ) -> list[list[str]]:
         if not isinstance(entry.file, str):
-            yield list(entry.file)
-            return
+            return [list(entry.file)]
         if not any(sign in entry.file for sign in "*?["):
-            yield [entry.file]
-            return
-        pattern = entry.file
+            return [[entry.file]]
         try:
-            matching = _matching(self.folder, pattern)
-        except _OutsideError as error:
-            matching, why = [], str(error)
-        else:
-            why = f"no file of that name (looked in {self.folder})"
-        if not matching:
-            problem = at.problem((*below, "file"), "value", f"{shown(pattern)}: {why}")
-            self.problems.append(problem)
-        for each in matching:
-            yield [each]
-
-
-class _OutsideError(Exception):
-    """What of a pattern leads out of the folder of its mapping."""
+            return [[each] for each in _matching(self.folder, entry.file)]
+        except ValueError as error:
+            message = f"{shown(entry.file)}: {error}"
+            self.problems.append(at.problem((*below, "file"), "value", message))
+            return []
 
 
 def _matching(folder: Path, pattern: str) -> list[str]:
-    """Files below `folder` that the pattern matches; nothing outside is looked at."""
+    """Files below `folder` that the pattern matches; nothing outside is looked at.
+
+    Raises ValueError where it leads out of the folder, or matches nothing.
+    """
     parts = Path(pattern).parts
     if Path(pattern).anchor or ".." in parts:
-        raise _OutsideError(f"a pattern {OUTSIDE}")
+        raise ValueError(f"a pattern {OUTSIDE}")
     root, found = folder.resolve(), [""]
     for part in parts:
         found = [
@@ -253,11 +225,13 @@ def _matching(folder: Path, pattern: str) -> list[str]:
         ]
         for each in found:
             if not Path(os.path.realpath(folder / each)).is_relative_to(root):
-                raise _OutsideError(f"the link {shown(each)} {OUTSIDE}")
+                raise ValueError(f"the link {shown(each)} {OUTSIDE}")
+    if not found:
+        raise ValueError(f"no file of that name (looked in {folder})")
     return sorted(found)
 
 
-def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
+def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> ExperimentKind:
     planned = any(each.entry.trial is not None for each in found)
 
     def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
@@ -274,13 +248,16 @@ def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
         if wrong:
             raise ValueError("; ".join(wrong))
 
-    return RecordedKind(
-        experiment.name,
-        experiment.options,
-        trials,
-        experiment.requires,
-        experiment.can_use,
+    # Of what has been executed nothing is fitted, followed up or warned of.
+    return replace(
+        experiment,
+        trials=trials,
         fit=experiment.fit if planned else None,
+        warnings=None,
+        recorded=None,
+        windows=(),
+        stages=(),
+        seeks_instability=False,
     )
 
 
@@ -298,16 +275,7 @@ def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
         )
     count = min(told.samples, round(task.duration * told.sample_rate))
     told = told.model_copy(update={"samples": count})
-    task = task.model_copy(
-        update={"sample_rate": told.sample_rate, "duration": count / told.sample_rate}
-    )
-    return replace(
-        request,
-        task=task,
-        point={**request.point, **_conditions(found)},
-        recording=told.model_dump(mode="json", exclude_defaults=True),
-        note=_note(found, request.note),
-    )
+    return _served(found, request, told, {**request.point, **_conditions(found)})
 
 
 def _offered(
@@ -343,7 +311,7 @@ def _offered(
         offered = Offered(
             duration,
             told.sample_rate,
-            sufficient(names, rig_facts(bench)),
+            sufficient(names, RigFacts.of(bench)),
             conditions,
             windows,
             read,
@@ -353,18 +321,22 @@ def _offered(
         except ValueError as error:
             raise ValueError(f"{found.label}: {error}") from None
     for request in requests:
-        part = _part(told, request.part)
-        task = request.task.model_copy(
-            update={"sample_rate": told.sample_rate, "duration": part.samples / told.sample_rate}
-        )
-        yield replace(
-            request,
-            task=task,
-            point={**conditions, **request.point},
-            planned=False,
-            recording=part.model_dump(mode="json", exclude_defaults=True),
-            note=_note(found, request.note),
-        )
+        part, point = _part(told, request.part), {**conditions, **request.point}
+        yield replace(_served(found, request, part, point), planned=False)
+
+
+def _served(
+    found: Found, request: TrialRequest, told: Described, point: Mapping[str, JsonValue]
+) -> TrialRequest:
+    """The trial that is served from what is told of a recording."""
+    rate = told.sample_rate
+    return replace(
+        request,
+        task=request.task.model_copy(update={"sample_rate": rate, "duration": told.samples / rate}),
+        point=point,
+        recording=told.model_dump(mode="json", exclude_defaults=True),
+        note="; ".join(filter(None, (found.entry.note, request.note, found.label))),
+    )
 
 
 def _part(told: Described, part: tuple[float, float] | None) -> Described:
@@ -383,12 +355,6 @@ def _conditions(found: Found) -> dict[str, JsonValue]:
     for name, value in found.entry.conditions.items():
         told[name] = value
         if isinstance(value, str):
-            try:
+            with suppress(ValueError):  # a word
                 told[name] = to_si(value)
-            except ValueError:
-                told[name] = value  # a word
     return told
-
-
-def _note(found: Found, planned: str) -> str:
-    return "; ".join(filter(None, (found.entry.note, planned, found.label)))

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.formats import excel, mdf
+from campaign.importing.formats import excel, mdf, open_recordings
 from campaign.importing.interface import RecordingError, Table
-from campaign.importing.opening import open_recordings
 from tests.importing.files import RATE, TIME, TORQUE
 
 

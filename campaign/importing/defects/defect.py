@@ -14,6 +14,14 @@ MOST = 10
 """Places of one kind that are told one by one; of the others their number is."""
 
 
+_REMEDIES = {
+    "factor": "correct its 'unit' or 'times', or ",
+    "sign": "correct its 'sign', or ",
+    "delay": "put it back by 'delay', or ",
+    "wraparound": 'repair = ["unwrap"] makes it continuous, or ',
+}
+
+
 class Severity(StrEnum):
     """What a defect means for the recording."""
 
@@ -33,7 +41,6 @@ class Defect:
         rows: the first and the last row, from 0.
         size: the number that tells how much: of missing samples, of a factor, s of a delay.
         severity: what it means for the recording.
-        repair: the word of a mapping that is for it, `sign` or `unwrap`; "" where there is none.
     """
 
     kind: str
@@ -42,7 +49,12 @@ class Defect:
     rows: tuple[int, int]
     size: float
     severity: Severity
-    repair: str = ""
+
+    @property
+    def remedy(self) -> str:
+        """What a mapping can say about it."""
+        does = _REMEDIES.get(self.kind, "")
+        return f'{does}accept = ["{self.kind}"] takes it as it is'
 
 
 BETTER = 0.25

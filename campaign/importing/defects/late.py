@@ -69,7 +69,7 @@ def of_drive_delay(
         f"{one} comes {abs(lag):.3g} s {where} the motion of {two}, which explains "
         f"{100 * explained[peak]:.3g} % of it then, and {100 * explained[most]:.3g} % as it is"
     )
-    yield Defect("delay", names, what, (0, n - 1), lag, Severity.REPAIRABLE, "delay")
+    yield Defect("delay", names, what, (0, n - 1), lag, Severity.REPAIRABLE)
 
 
 def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:

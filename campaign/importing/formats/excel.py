@@ -17,18 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from campaign.importing.cells import is_number, is_unit, plain, value_of
-from campaign.importing.dialect import Dialect, letters, read_as
+from campaign.importing.dialect import Dialect, read_as
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
     Array,
-    Column,
     RecordingError,
     RecordingFormat,
     Table,
     read_by,
 )
-from campaign.importing.rows import blocks_of
+from campaign.importing.rows import blocks_of, columns_of
 from campaign.importing.streaming import tables_streamed
 
 SAMPLE = 200
@@ -64,22 +63,16 @@ def _table(path: Path, sheet: Any) -> Iterator[Table]:
     body = [[*cells, *[None] * width][:width] for cells in sample[dialect.first - 1 :]]
     moments = {k for cells in body for k, cell in enumerate(cells) if isinstance(cell, _MOMENTS)}
     commas = {k for cells in body for k, cell in enumerate(cells) if _has_comma(cell)}
-    names = [
-        (dialect.names[k] if dialect.names else "") or f"column {letters(k)}"
-        for k in range(len(dialect.numeric))
+    columns = [
+        replace(column, unit=column.unit or "s") if k in moments else column
+        for k, column in enumerate(columns_of(dialect))
     ]
     doubts = []
     if commas:
-        told = ", ".join(names[k] for k in sorted(commas))
+        told = ", ".join(columns[k].name for k in sorted(commas))
         doubts.append(f"numbers of {told} are text with a decimal comma")
     if moments:
         doubts.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
-    columns = (
-        Column(name, unit or ("s" if k in moments else ""), f"column {letters(k)}", numeric)
-        for k, (name, unit, numeric) in enumerate(
-            zip(names, dialect.units, dialect.numeric, strict=True)
-        )
-    )
     _check_formulas(path, dialect)
     yield Table(
         sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=tuple(doubts)

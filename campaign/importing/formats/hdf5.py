@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.importing.arrays import WIDEST, Named, tables_of
+from campaign.importing.arrays import OPAQUE, WIDEST, Named, tables_of
 from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table, read_by
 from campaign.importing.streaming import tables_streamed
 
@@ -26,10 +26,6 @@ CLASS = "MATLAB_class"
 PLAIN = {"double", "single", "logical", "int8", "int16", "int32", "int64"}
 PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
 """MATLAB's classes of numbers."""
-OPAQUE = (
-    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
-    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y', '-v7.3')"
-)
 
 
 def tables(path: Path) -> Sequence[Table]:

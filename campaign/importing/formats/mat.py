@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from campaign.importing.arrays import Named, named, table_of, tables_of
+from campaign.importing.arrays import OPAQUE, Named, named, table_of, tables_of
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
@@ -32,11 +32,6 @@ MOST_TIMES = 100
 _COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
 """Structures within each other."""
-OPAQUE = (
-    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
-    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y')"
-)
-
 OBJECT = "an object of a MATLAB class, which other programs cannot read"
 """What is said of one that stands beside numbers."""
 NOTHING = "no variable of it is a series of numbers"
