@@ -83,12 +83,12 @@ def _long(
     if not long:
         lengths = [b - a for a, b in found]
         raise ValueError(
-            f"{what} makes {_stretches(len(found))}, the shortest of "
+            f"{what} makes {counted(len(found), 'stretch')}, the shortest of "
             f"{counted(min(lengths), 'row')} and the longest of {counted(max(lengths), 'row')}; "
             f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}"
         )
     are = "is no trial" if short == 1 else "are no trials"
-    told = f"{_stretches(short)} of {what} with fewer than {SHORTEST} rows {are}"
+    told = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
     return long, [told] if short else []
 
 
@@ -140,7 +140,3 @@ def numbered(stretches: Sequence[Stretch]) -> list[Stretch]:
         replace(each, conditions={**each.conditions, key: number})
         for number, each in enumerate(stretches, 1)
     ]
-
-
-def _stretches(count: int) -> str:
-    return counted(count, "stretch") if count == 1 else f"{count} stretches"

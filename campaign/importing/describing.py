@@ -31,7 +31,7 @@ from campaign.importing.mapping import (
     RecordingEntry,
     TimeColumn,
 )
-from campaign.importing.mapping_errors import DefectError, Key, MappingError
+from campaign.importing.mapping_errors import Key, MappingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader, clock_times
 from campaign.unit_grammar import parse_unit
@@ -343,19 +343,17 @@ class _Finding:
         periods: dict[str, float] = {}
         faults: list[MappingError] = []
         for defect in RecordingReader(described, self.opened).defects(self.rig.ratio):
-            name = next(iter(defect.channels), "")
-            entry = self.layout.channels.get(name)
-            if defect.kind == "wraparound" and entry is not None and "unwrap" in entry.repair:
+            name = defect.channels[0]
+            entry = self.layout.channels[name]
+            if defect.kind == "wraparound" and "unwrap" in entry.repair:
                 periods[name] = defect.size
                 remarks.append(f"{name} was made continuous: {defect.what}")
                 continue
-            accepted = entry is not None and defect.kind in entry.accept
-            if defect.severity is Severity.NOTED or accepted:
+            if defect.severity is Severity.NOTED or defect.kind in entry.accept:
                 remarks.append(defect.what)
                 continue
             what = f"{self._names(described.first)}: {defect.what}; {defect.remedy}"
-            keys = (name,) if name else ()
-            faults.append(DefectError(what, keys, defect.kind, of_columns=bool(name)))
+            faults.append(MappingError(what, (name,), of_columns=True, defect=defect.kind))
         MappingError.together(faults)
         channels = tuple(
             each.model_copy(update={"period": periods.get(each.name)})

@@ -35,11 +35,11 @@ class Defect:
     """Something that is wrong with a recording, or that its reader should know.
 
     Attributes:
-        kind: a word of the field: `gap`, `clipping`.
-        channels: which it is about; none where it is about time.
+        kind: a word of the field, such as `clipping`.
+        channels: which it is about, first the one to correct.
         what: a sentence with its number.
         rows: the first and the last row, from 0.
-        size: the number that tells how much: of missing samples, of a factor, s of a delay.
+        size: the number that tells how much: of lost samples, of a factor, s of a delay.
         severity: what it means for the recording.
     """
 
@@ -140,5 +140,6 @@ def rows_in_words(first: int, last: int) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """`1 sample`, `2 samples`."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """`1 sample`, `2 samples`, `2 stretches`."""
+    ending = "es" if noun.endswith("ch") else "s"
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}{ending}"

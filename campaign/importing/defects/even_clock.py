@@ -7,14 +7,14 @@ the mapping does not ask for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.importing.defects.clock import SHORTEST, restarts, ticks
-from campaign.importing.defects.defect import Array, Defect, Severity, counted
+from campaign.importing.defects.clock import restarts, ticks
+from campaign.importing.defects.defect import Array, counted
 
 TOLERANCE = 0.25
 """of a sample by which a time may be off an even clock: half of what would name another sample."""
@@ -78,17 +78,6 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
     if rows > LONGEST:
         raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
     return _repaired(times(first, first + rows), first, repairs)
-
-
-def of_time(time: Array) -> Iterator[Defect]:
-    """What an import would refuse of times, shape (n,), s."""
-    rows = (0, len(time) - 1)
-    try:
-        if len(time) >= SHORTEST:
-            with np.errstate(all="ignore"):
-                even_clock(lambda first, stop: time[first:stop], 0, len(time))
-    except UnevenError as error:
-        yield Defect("uneven", (), str(error), rows, 0.0, Severity.REPAIRABLE)
 
 
 def _furthest(

@@ -79,8 +79,8 @@ def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
     what is left, as a share of how the whole torque varies: of a part that is steady, nothing.
     """
     width = len(rate) - 2 * most
-    largest = float(np.abs(rate).max()) or 1.0
-    parts = np.stack([rate, np.gradient(rate), np.tanh(rate / (RISE * largest))])
+    rise = RISE * float(np.abs(rate).max()) or 1.0
+    parts = np.stack([rate, np.gradient(rate), np.tanh(rate / rise)])
     parts = parts[:, most : most + width]
     reach = np.abs(parts).max(axis=1)
     parts = parts - parts.mean(axis=1, keepdims=True)

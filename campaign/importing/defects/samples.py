@@ -150,7 +150,7 @@ def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Def
     rest = stretches[MOST:]
     if rest:
         samples = sum(last - first + 1 for first, last in rest)
-        what = f"{name} {does} in {counted(len(rest), 'further stretch').replace('chs', 'ches')}"
+        what = f"{name} {does} in {counted(len(rest), 'further stretch')}"
         ends = (rest[0][0], rest[-1][1])
         yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE)
 

@@ -42,15 +42,15 @@ Cells = Sequence[Any]
 def tables(path: Path) -> Sequence[Table]:
     """The tables of a workbook, in the process that asks."""
     _check_size(path)
-    with _opened(path) as book:
-        found = [each for sheet in book.worksheets for each in _table(path, sheet)]
+    with _opened(path) as book, _opened(path, values=False) as asked:
+        found = [t for sheet in book.worksheets for t in _table(path, sheet, asked[sheet.title])]
     if not found:
         raise RecordingError.of(path, "no sheet of it has a table of numbers")
     return found
 
 
-def _table(path: Path, sheet: Any) -> Iterator[Table]:
-    """The table of a sheet, if it has one."""
+def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
+    """The table of a sheet, if it has one; `formulas`: the sheet with those in place of values."""
     sample = list(islice(_rows(sheet), SAMPLE))
     texts = [[_text(cell) for cell in cells] for cells in sample]
     width = max((k + 1 for cells in texts for k, cell in enumerate(cells) if cell), default=0)
@@ -73,7 +73,7 @@ def _table(path: Path, sheet: Any) -> Iterator[Table]:
         doubts.append(f"numbers of {told} are text with a decimal comma")
     if moments:
         doubts.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
-    _check_formulas(path, dialect)
+    _check_formulas(path, dialect, sample, formulas)
     yield Table(
         sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=tuple(doubts)
     )
@@ -176,19 +176,16 @@ def _rows(sheet: Any) -> Iterator[Cells]:
     return rows
 
 
-def _check_formulas(path: Path, dialect: Dialect) -> None:
+def _check_formulas(path: Path, dialect: Dialect, sample: Sequence[Cells], formulas: Any) -> None:
     """Raises RecordingError for a formula among the first rows whose value is not in the file."""
-    with _opened(path) as book, _opened(path, values=False) as asked:
-        told, written = (
-            islice(_rows(each[dialect.sheet]), dialect.first - 1, dialect.first - 1 + SAMPLE)
-            for each in (book, asked)
-        )
-        for row, (values, texts) in enumerate(zip(told, written, strict=False), dialect.first):
-            for place, text in enumerate(texts):
-                value = values[place] if place < len(values) else None
-                if value is None and isinstance(text, str) and text.startswith("="):
-                    message = "a formula whose value is not in the file; open and save it in Excel"
-                    raise RecordingError([dialect.problem(path, row, message, place=place)])
+    written = islice(_rows(formulas), dialect.first - 1, None)
+    told = zip(sample[dialect.first - 1 :], written, strict=False)
+    for row, (values, texts) in enumerate(told, dialect.first):
+        for place, text in enumerate(texts):
+            value = values[place] if place < len(values) else None
+            if value is None and isinstance(text, str) and text.startswith("="):
+                message = "a formula whose value is not in the file; open and save it in Excel"
+                raise RecordingError([dialect.problem(path, row, message, place=place)])
 
 
 def _tables(path: Path) -> Sequence[Table]:

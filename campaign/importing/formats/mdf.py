@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,14 +31,6 @@ DENSEST = 1100
 """Times its size that compressed data can unpack to."""
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Where a channel is; the clock of its group has no index of its own here."""
-
-    group: int
-    index: int | None
-
-
 def tables(path: Path) -> Sequence[Table]:
     """The groups of a file with more than one sample, in the process that asks."""
     found: list[Table] = []
@@ -55,18 +46,18 @@ def tables(path: Path) -> Sequence[Table]:
             columns, places = _columns(file, group, each)
             if any(column.numeric for column in columns[1:]):
                 name = str(getattr(each.channel_group, "acq_name", "") or f"group {group + 1}")
-                read = partial(_read, path, places, rows)
+                read = partial(_read, path, group, places, rows)
                 found.append(Table(name, tuple(columns), read, rows=rows))
     if not found:
         raise RecordingError.of(path, "no group of it has a series of numbers")
     return found
 
 
-def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[_Place]]:
-    """The clock first, then the channels as they come; two may have one name."""
+def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[int | None]]:
+    """The clock first, then the channels as they come, by index; two may have one name."""
     where = f"group {group + 1}"
     columns = [Column("time", "s", f"{where}, its clock")]
-    places = [_Place(group, None)]
+    places: list[int | None] = [None]
     master = file.masters_db.get(group)
     for index, channel in enumerate(of.channels):
         if index == master:
@@ -75,35 +66,32 @@ def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[_Place]
         usable = first.samples.dtype.kind in "fiub" and first.samples.ndim == 1
         unit = str(first.unit or "")
         columns.append(Column(str(channel.name), unit, f"{where}, channel {index}", usable))
-        places.append(_Place(group, index))
+        places.append(index)
     return columns, places
 
 
 def _read(
-    path: Path, places: Sequence[_Place], rows: int, wanted: Sequence[int]
+    path: Path, group: int, places: Sequence[int | None], rows: int, wanted: Sequence[int]
 ) -> Iterator[Array]:
     with _opened(path) as file:
         for start in range(0, rows, ROWS):
             count = min(ROWS, rows - start)
-            chosen = (places[place] for place in wanted)
-            series = [_part(file, place, start, count) for place in chosen]
+            series = [_part(file, group, places[place], start, count) for place in wanted]
             there = min((len(each) for each in series), default=count)
             if there < count:
-                message = (
-                    f"group {places[0].group + 1} ends after {start + there} of {rows} samples"
-                )
+                message = f"group {group + 1} ends after {start + there} of {rows} samples"
                 raise RecordingError.of(path, message)
             yield np.column_stack(series) if series else np.empty((count, 0))
 
 
-def _part(file: Any, place: _Place, start: int, count: int) -> Array:
-    """Physical values; those that the file marks as invalid are lost."""
-    if place.index is None:
-        times = file.get_master(place.group, record_offset=start, record_count=count)
+def _part(file: Any, group: int, index: int | None, start: int, count: int) -> Array:
+    """Physical values of a channel, or the clock; those marked as invalid are lost."""
+    if index is None:
+        times = file.get_master(group, record_offset=start, record_count=count)
         return np.asarray(times, dtype=np.float64)
     signal = file.get(
-        group=place.group,
-        index=place.index,
+        group=group,
+        index=index,
         record_offset=start,
         record_count=count,
         ignore_invalidation_bits=False,
