@@ -7,6 +7,7 @@ that is needed to read the samples, today and when a run is resumed: nothing is 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -127,9 +128,16 @@ class Described(Options):
     remarks: tuple[str, ...] = ()
     """What was done, and what was seen, in sentences."""
 
-    def made(self, name: str) -> Made | None:
-        """The channel of that name."""
-        return next((each for each in self.channels if each.name == name), None)
+    @property
+    def label(self) -> str:
+        """Where it is, for people."""
+        return label(self.files, self.first)
+
+
+def label(files: Sequence[FileUsed], first: int = 0) -> str:
+    """Files from a row on, for people."""
+    names = " and ".join(each.name for each in files)
+    return f"{names} from row {first + 1}" if first else names
 
 
 def file_used(path: Path, name: str) -> FileUsed:

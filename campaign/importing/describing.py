@@ -21,7 +21,15 @@ from campaign.importing.defects import Severity
 from campaign.importing.defects.clock import SHORTEST
 from campaign.importing.defects.defect import counted
 from campaign.importing.defects.even_clock import EvenClock, even_clock
-from campaign.importing.described import Cells, ClockUsed, Described, FileUsed, Made, file_used
+from campaign.importing.described import (
+    Cells,
+    ClockUsed,
+    Described,
+    FileUsed,
+    Made,
+    file_used,
+    label,
+)
 from campaign.importing.interface import Array
 from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
 from campaign.importing.mapping import (
@@ -174,7 +182,7 @@ class _Finding:
         self, what: object, keys: Key = (), *, of_columns: bool = False, first: int = 0
     ) -> MappingError:
         """What of these files, or of them from a row on, does not go with the mapping."""
-        return MappingError(f"{self._names(first)}: {what}", keys, of_columns=of_columns)
+        return MappingError(f"{label(self.used, first)}: {what}", keys, of_columns=of_columns)
 
     @contextmanager
     def _told(self, keys: Key, *, of_columns: bool = False, first: int = 0) -> Iterator[None]:
@@ -185,10 +193,6 @@ class _Finding:
             raise
         except ValueError as error:
             raise self._wrong(error, keys, of_columns=of_columns, first=first) from None
-
-    def _names(self, first: int = 0) -> str:
-        names = " and ".join(each.name for each in self.used)
-        return f"{names} from row {first + 1}" if first else names
 
     def _choosing(self) -> Iterator[tuple[Key, ColumnPlace]]:
         """The columns that tell trials apart."""
@@ -352,7 +356,7 @@ class _Finding:
             if defect.severity is Severity.NOTED or defect.kind in entry.accept:
                 remarks.append(defect.what)
                 continue
-            what = f"{self._names(described.first)}: {defect.what}; {defect.remedy}"
+            what = f"{described.label}: {defect.what}; {defect.remedy}"
             faults.append(MappingError(what, (name,), of_columns=True, defect=defect.kind))
         MappingError.together(faults)
         channels = tuple(

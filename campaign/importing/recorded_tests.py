@@ -25,7 +25,7 @@ from campaign.importing.mapping_errors import MappingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.physics.bench import Bench
-from campaign.protocol.files import Origin
+from campaign.protocol.files import Origin, Within
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import ExperimentKind, Protocol, Test
 from campaign.recording import Recording
@@ -78,16 +78,10 @@ def _once(problems: Sequence[Problem]) -> list[Problem]:
     ]
 
 
-def _of_file(
-    what: Problem,
-    at: Origin,
-    keys: tuple[str | int, ...],
-    paths: Sequence[Path],
-    entry: RecordingEntry,
-) -> Problem:
-    """What is wrong with a file, at its name in the mapping; `keys` are those of `file`."""
-    if not isinstance(entry.file, str) and what.file in paths:
-        keys = (*keys, paths.index(what.file))
+def _of_file(what: Problem, at: Origin, paths: Sequence[Path], entry: RecordingEntry) -> Problem:
+    """What is wrong with a file, at its name in the mapping."""
+    several = not isinstance(entry.file, str) and what.file in paths
+    keys = ("file", paths.index(what.file)) if several else ("file",)
     return at.problem(keys, "value", str(what))
 
 
@@ -96,16 +90,9 @@ class Found:
     """One recording of a test: what its entry says, and what its files hold."""
 
     entry: RecordingEntry
-    index: int
     described: Described
     stretch: Stretch
     opened: OpenedFiles
-
-    @property
-    def label(self) -> str:
-        """Where it is, for people."""
-        names = " and ".join(file.name for file in self.described.files)
-        return f"{names} from row {self.described.first + 1}" if self.described.first else names
 
 
 @dataclass
@@ -140,15 +127,18 @@ class _Loader:
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
         rig = RigFacts.of(Bench.model_validate(test.bench))
-        found = [each for place in entries for each in self._found(test, *place, rig)]
+        found = [
+            each
+            for index, entry in entries
+            for each in self._found(test, Within(origin, ("recording", index)), entry, rig)
+        ]
         return replace(test, experiment=_kind(test.experiment, found))
 
-    def _found(self, test: Test, index: int, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
-        at, below = test.origin, ("recording", index)
-        layout = self._layout(at, below, entry)
+    def _found(self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
+        layout = self._layout(at, entry)
         wanted = {*test.experiment.requires, *test.experiment.can_use}
         found: list[Found] = []
-        for written in self._files(at, below, entry):
+        for written in self._files(at, entry):
             paths = [self.folder / each for each in written]
             try:
                 if layout is None:  # what can be said of its files is said all the same
@@ -156,46 +146,37 @@ class _Loader:
                     continue
                 opened, trials = describe(entry, layout, paths, written, rig, wanted)
             except RecordingError as error:
-                self.problems += (
-                    _of_file(each, at, (*below, "file"), paths, entry) for each in error.problems
-                )
+                self.problems += (_of_file(each, at, paths, entry) for each in error.problems)
                 continue
             except MappingError as error:
                 every = (error, *error.others)
-                self.problems += (self._placed(at, below, entry, each) for each in every)
+                self.problems += (self._placed(at, entry, each) for each in every)
                 continue
             self.stack.enter_context(opened)
-            found += (Found(entry, index, *both, opened) for both in trials)
+            found += (Found(entry, *both, opened) for both in trials)
         return found
 
-    def _placed(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry, error: MappingError
-    ) -> Problem:
+    def _placed(self, at: Origin, entry: RecordingEntry, error: MappingError) -> Problem:
         if error.of_columns:
             name = entry.columns or next(iter(self.layouts))
-            at, below = self.protocol.origin or at, ("columns", name)
-            return at.problem((*below, *error.keys), "key", str(error))
-        return at.problem((*below, *error.keys), "value", str(error))
+            at = Within(self.protocol.origin or at, ("columns", name))
+        return at.problem(error.keys, "key" if error.of_columns else "value", str(error))
 
-    def _layout(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
-    ) -> Layout | None:
+    def _layout(self, at: Origin, entry: RecordingEntry) -> Layout | None:
         names = list(self.protocol.columns)
         name = entry.columns or (names[0] if len(names) == 1 else "")
         if not names:
             message = "nothing says what its columns are; add [columns.NAME] tables"
-            self.problems.append(at.problem((*below, "file"), "key", message))
+            self.problems.append(at.problem(("file",), "key", message))
         elif not name:
             message = f"say by which 'columns' it is read; {allowed(names)}"
-            self.problems.append(at.problem((*below, "file"), "key", message))
+            self.problems.append(at.problem(("file",), "key", message))
         elif name not in names:
             message = f"there is no [columns.{name}]; {allowed(names)}{nearest(name, names)}"
-            self.problems.append(at.problem((*below, "columns"), "value", message))
+            self.problems.append(at.problem(("columns",), "value", message))
         return self.layouts.get(name)
 
-    def _files(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
-    ) -> list[list[str]]:
+    def _files(self, at: Origin, entry: RecordingEntry) -> list[list[str]]:
         if not isinstance(entry.file, str):
             return [list(entry.file)]
         if not any(sign in entry.file for sign in "*?["):
@@ -204,7 +185,7 @@ class _Loader:
             return [[each] for each in _matching(self.folder, entry.file)]
         except ValueError as error:
             message = f"{shown(entry.file)}: {error}"
-            self.problems.append(at.problem((*below, "file"), "value", message))
+            self.problems.append(at.problem(("file",), "value", message))
             return []
 
 
@@ -265,13 +246,13 @@ def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
     """The planned trial that a recording answers. Raises ValueError where it is none."""
     number, told = found.entry.trial or 0, found.described
     if number > len(asked):
-        raise ValueError(f"{found.label}: there is no trial {number}; {len(asked)} are planned")
+        raise ValueError(f"{told.label}: there is no trial {number}; {len(asked)} are planned")
     request = asked[number - 1]
     task, duration = request.task, told.samples / told.sample_rate
     short = duration < task.duration * (1.0 - ROUNDING) - 1.5 / told.sample_rate
     if short and task.stop_rate is None:
         raise ValueError(
-            f"{found.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
+            f"{told.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
         )
     count = min(told.samples, round(task.duration * told.sample_rate))
     told = told.model_copy(update={"samples": count})
@@ -288,7 +269,7 @@ def _offered(
     for window in windows:
         if not 0 <= window.start < window.stop <= duration * (1.0 + ROUNDING):
             raise ValueError(
-                f"{found.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
+                f"{told.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
                 f"s, is no part of its {duration:.6g} s"
             )
     conditions = _conditions(found)
@@ -319,7 +300,7 @@ def _offered(
         try:
             requests = list(experiment.recorded(options, bench, offered))
         except ValueError as error:
-            raise ValueError(f"{found.label}: {error}") from None
+            raise ValueError(f"{told.label}: {error}") from None
     for request in requests:
         part, point = _part(told, request.part), {**conditions, **request.point}
         yield replace(_served(found, request, part, point), planned=False)
@@ -335,7 +316,7 @@ def _served(
         task=request.task.model_copy(update={"sample_rate": rate, "duration": told.samples / rate}),
         point=point,
         recording=told.model_dump(mode="json", exclude_defaults=True),
-        note="; ".join(filter(None, (found.entry.note, request.note, found.label))),
+        note="; ".join(filter(None, (found.entry.note, request.note, found.described.label))),
     )
 
 
