@@ -58,7 +58,7 @@ from campaign.importing.described import file_used
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import sufficient
 from campaign.importing.mapping import Layout
-from campaign.importing.mapping_errors import DefectError, MappingError
+from campaign.importing.mapping_errors import MappingError
 from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED
@@ -281,13 +281,11 @@ class FilesBackend:
             raise Refused(checks.Found("another rate", str(error))) from None
         except RecordingError as error:
             raise Refused(checks.Found("unreadable", str(error))) from None
-        except DefectError as error:
-            name = DEFECTS.get(error.kind, error.kind)
-            raise Refused(checks.Found(name, str(error))) from None
         except MappingError as error:
-            if error.of_columns:
+            if error.of_columns and not error.defect:
                 raise
-            raise Refused(checks.Found("no even clock", str(error))) from None
+            name = DEFECTS.get(error.defect, error.defect or "no even clock")
+            raise Refused(checks.Found(name, str(error))) from None
         return as_asked(trial, recording, others, accepted)
 
     def _check_whose(

@@ -13,45 +13,27 @@ NUMBER = {
     ",": re.compile(rf"[+-]?(?:\d{{1,3}}(?:\.\d{{3}})+(?:,\d*)?|\d+(?:,\d*)?|,\d+){_EXPONENT}"),
 }
 """A number by its decimal sign; with a comma, points may group thousands."""
-LOST = frozenset(
-    {"", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "#n/a", "inf", "+inf", "-inf"}
-    | {
-        "-",
-        "--",
-        "---",
-        "1.#qnan",
-        "-1.#qnan",
-        "1.#ind",
-        "-1.#ind",
-        "1.#inf",
-        "-1.#inf",
-        "-nan(ind)",
-    }
+_NO_NUMBER = (
+    "nan +nan -nan -nan(ind) na n/a #n/a null none inf +inf -inf - -- --- "
+    "1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf"
 )
+LOST = frozenset({"", *_NO_NUMBER.split()})
 """Cells of a column of numbers that hold none, in lower case; infinity was never measured."""
 NO_UNIT = frozenset({"", "-", "–", "1", "none", "(none)", "[-]", "(-)", "unitless", "n/a"})
 UNIT_WORDS = {
-    "volt": "V",
-    "volts": "V",
-    "ampere": "A",
-    "amperes": "A",
-    "amp": "A",
-    "amps": "A",
-    "second": "s",
-    "seconds": "s",
-    "newton": "N",
-    "u/min": "rpm",
-    "umdr/min": "rpm",
-    "tr/min": "rpm",
-    "t/min": "rpm",
-    "giri/min": "rpm",
-    "min-1": "1/min",
-    "%": "percent",
-    "inc": "count",
-    "ticks": "count",
-    "cnt": "count",
-    "cnts": "count",
-    "cnt/s": "count/s",
+    word: unit
+    for unit, words in {
+        "V": "volt volts",
+        "A": "ampere amperes amp amps",
+        "s": "second seconds",
+        "N": "newton",
+        "rpm": "u/min umdr/min tr/min t/min giri/min",
+        "1/min": "min-1",
+        "percent": "%",
+        "count": "inc ticks cnt cnts",
+        "count/s": "cnt/s",
+    }.items()
+    for word in words.split()
 }
 """Units as instruments write them, in lower case, in the spelling of the program's grammar."""
 _BRACKETED = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")

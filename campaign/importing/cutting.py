@@ -17,18 +17,6 @@ from campaign.importing.interface import Array
 NEEDED = f"a recording needs {SHORTEST}"
 
 
-class CutError(ValueError):
-    """A column that tells no trials apart.
-
-    Attributes:
-        key: of `[[test.recording]]`: `where`, `each`, `restarts` or `trigger`.
-    """
-
-    def __init__(self, message: str, key: str) -> None:
-        self.key = key
-        super().__init__(message)
-
-
 @dataclass(frozen=True)
 class Stretch:
     """Rows of a table that are one trial, what tells it from others, and what to remark."""
@@ -39,16 +27,13 @@ class Stretch:
     remarks: tuple[str, ...] = ()
 
 
-def by_value(
-    values: Array, first: int, name: str, key: str, wanted: float | None = None
-) -> list[Stretch]:
-    """A trial for each stretch in which a column does not change; raises CutError for none.
+def by_value(values: Array, first: int, name: str, wanted: float | None = None) -> list[Stretch]:
+    """A trial for each stretch in which a column does not change; raises ValueError for none.
 
     Stretches that are too short for a trial are left out, and the first trial says so.
 
     Args:
         values: of the column, shape (n,); `first` is the row of the first.
-        key: what of the mapping asks for it, for messages.
         wanted: only stretches of this value.
     """
     there = np.isfinite(values)
@@ -59,25 +44,12 @@ def by_value(
     if wanted is not None:
         found = [(a, b) for a, b in found if values[a] == wanted]
         if not found:
-            raise CutError(f"column {name!r} is never {wanted:g}", key)
+            raise ValueError(f"column {name!r} is never {wanted:g}")
     empty = int(len(values) - there.sum())
     blank = f"column {name!r} has no value in {counted(empty, 'row')}" if empty else ""
     if not found:
-        raise CutError(blank, key)
-    long = [(a, b) for a, b in found if b - a >= SHORTEST]
-    if not long:
-        lengths = [b - a for a, b in found]
-        raise CutError(
-            f"column {name!r} makes {_stretches(len(found))}, the shortest of "
-            f"{counted(min(lengths), 'row')} and the longest of {counted(max(lengths), 'row')}; "
-            f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}",
-            key,
-        )
-    remarks = []
-    if short := len(found) - len(long):
-        remarks.append(
-            f"{_stretches(short)} of column {name!r} with fewer than {SHORTEST} rows {_are(short)}"
-        )
+        raise ValueError(blank)
+    long, remarks = _long(found, f"column {name!r}", blank)
     if blank:
         remarks.append(f"{blank}, which {'is' if empty == 1 else 'are'} in no trial")
     word = "".join(c if c.isalnum() else "_" for c in name.lower()).strip("_") or "value"
@@ -87,25 +59,37 @@ def by_value(
 
 
 def by_restart(times: Array, first: int) -> list[Stretch]:
-    """A trial for each stretch in which time (s), shape (n,), goes on; raises CutError for one.
+    """A trial for each stretch in which time (s), shape (n,), goes on; raises ValueError for one.
 
     Stretches that are too short for a trial are left out, and the first trial says so.
     """
     bounds = [0, *restarts(times), len(times)]
     if len(bounds) < 3:
-        raise CutError("its time begins once", "restarts")
-    long = [(a, b) for a, b in pairwise(bounds) if b - a >= SHORTEST]
-    if not long:
-        raise CutError(f"{_stretches(len(bounds) - 1)}, all too short; {NEEDED}", "restarts")
+        raise ValueError("its time begins once")
+    long, remarks = _long(list(pairwise(bounds)), "time")
     cut = numbered([Stretch(first + a, b - a, {}) for a, b in long])
-    if short := len(bounds) - 1 - len(long):
-        what = f"{_stretches(short)} of time with fewer than {SHORTEST} rows {_are(short)}"
-        cut[0] = replace(cut[0], remarks=(what,))
-    return cut
+    return [replace(cut[0], remarks=tuple(remarks)), *cut[1:]]
 
 
-def _are(count: int) -> str:
-    return "is no trial" if count == 1 else "are no trials"
+def _long(
+    found: Sequence[tuple[int, int]], what: str, blank: str = ""
+) -> tuple[list[tuple[int, int]], list[str]]:
+    """The stretches that are long enough for a trial, and a remark if others are not.
+
+    Raises ValueError for none, which also tells of the rows without a value.
+    """
+    long = [(a, b) for a, b in found if b - a >= SHORTEST]
+    short = len(found) - len(long)
+    if not long:
+        lengths = [b - a for a, b in found]
+        raise ValueError(
+            f"{what} makes {counted(len(found), 'stretch')}, the shortest of "
+            f"{counted(min(lengths), 'row')} and the longest of {counted(max(lengths), 'row')}; "
+            f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}"
+        )
+    are = "is no trial" if short == 1 else "are no trials"
+    told = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
+    return long, [told] if short else []
 
 
 def by_trigger(
@@ -123,7 +107,7 @@ def by_trigger(
         ends_of: from the rows in which trials begin to those after their ends, shape (k,) each.
         stop: row after the last; what would end later is left out.
 
-    Raises CutError for none, and where two trials would have rows in common.
+    Raises ValueError for none, and where two trials would have rows in common.
     """
     known = np.flatnonzero(np.isfinite(values))  # a lost value is no fall
     above = values[known] > level
@@ -131,19 +115,18 @@ def by_trigger(
     ends = ends_of(rises) if len(rises) else rises
     pairs = [(int(a), int(b)) for a, b in zip(rises, ends, strict=True) if b <= stop]
     if not pairs:
-        raise CutError(
-            f"column {name!r} never rises through {level:g} long enough before the end", "trigger"
+        raise ValueError(
+            f"column {name!r} never rises through {level:g} long enough before the end"
         )
     for (_, end), (begin, _) in pairwise(pairs):
         if begin < end:
-            raise CutError(
+            raise ValueError(
                 f"column {name!r} rises through {level:g} again in row {begin + 1}, "
                 f"{counted(end - begin, 'row')} before the trial that is running there ends: no "
-                "row may be in two trials; take a shorter 'duration', or another 'level'",
-                "trigger",
+                "row may be in two trials; take a shorter 'duration', or another 'level'"
             )
     if (fewest := min(b - a for a, b in pairs)) < SHORTEST:
-        raise CutError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}", "trigger")
+        raise ValueError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}")
     return numbered([Stretch(a, b - a, {}) for a, b in pairs])
 
 
@@ -157,7 +140,3 @@ def numbered(stretches: Sequence[Stretch]) -> list[Stretch]:
         replace(each, conditions={**each.conditions, key: number})
         for number, each in enumerate(stretches, 1)
     ]
-
-
-def _stretches(count: int) -> str:
-    return counted(count, "stretch") if count == 1 else f"{count} stretches"

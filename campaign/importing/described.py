@@ -7,12 +7,12 @@ that is needed to read the samples, today and when a run is resumed: nothing is 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
-from campaign.errors import Problem
 from campaign.importing.interface import RecordingError, check_regular
 from campaign.options import Options
 from campaign.recording import ChannelInfo
@@ -41,6 +41,11 @@ class Cells(Options):
     column: int
     name: str = ""
     """As the file has it."""
+
+    @property
+    def rows_of(self) -> tuple[int, int]:
+        """File and table: columns of one have their rows in common."""
+        return self.file, self.table
 
 
 class ClockUsed(Options):
@@ -123,9 +128,16 @@ class Described(Options):
     remarks: tuple[str, ...] = ()
     """What was done, and what was seen, in sentences."""
 
-    def made(self, name: str) -> Made | None:
-        """The channel of that name."""
-        return next((each for each in self.channels if each.name == name), None)
+    @property
+    def label(self) -> str:
+        """Where it is, for people."""
+        return label(self.files, self.first)
+
+
+def label(files: Sequence[FileUsed], first: int = 0) -> str:
+    """Files from a row on, for people."""
+    names = " and ".join(each.name for each in files)
+    return f"{names} from row {first + 1}" if first else names
 
 
 def file_used(path: Path, name: str) -> FileUsed:
@@ -139,5 +151,5 @@ def file_used(path: Path, name: str) -> FileUsed:
                 size += len(chunk)
     except OSError as error:
         why = error.strerror or str(error)
-        raise RecordingError([Problem(path, 0, 0, f"it cannot be read: {why}")]) from None
+        raise RecordingError.of(path, f"it cannot be read: {why}") from None
     return FileUsed(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

@@ -10,10 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.importing.checked import WRAPAROUND, defects_of, remedy
 from campaign.importing.cutting import (
     NEEDED,
-    CutError,
     Stretch,
     by_restart,
     by_trigger,
@@ -22,8 +20,16 @@ from campaign.importing.cutting import (
 from campaign.importing.defects import Severity
 from campaign.importing.defects.clock import SHORTEST
 from campaign.importing.defects.defect import counted
-from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
-from campaign.importing.described import Cells, ClockUsed, Described, FileUsed, Made, file_used
+from campaign.importing.defects.even_clock import EvenClock, even_clock
+from campaign.importing.described import (
+    Cells,
+    ClockUsed,
+    Described,
+    FileUsed,
+    Made,
+    file_used,
+    label,
+)
 from campaign.importing.interface import Array
 from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
 from campaign.importing.mapping import (
@@ -33,9 +39,9 @@ from campaign.importing.mapping import (
     RecordingEntry,
     TimeColumn,
 )
-from campaign.importing.mapping_errors import DefectError, Key, MappingError
-from campaign.importing.opened import AmbiguousError, OpenedFiles
-from campaign.importing.reader import clock_times
+from campaign.importing.mapping_errors import Key, MappingError
+from campaign.importing.opened import OpenedFiles
+from campaign.importing.reader import RecordingReader, clock_times
 from campaign.unit_grammar import parse_unit
 
 Clocks = dict[tuple[int, int], ClockUsed]
@@ -88,12 +94,6 @@ def _collected(faults: list[MappingError]) -> Iterator[None]:
         faults.append(error)
 
 
-def _table(made: Made) -> tuple[int, int]:
-    """File and table of a channel that is a column."""
-    assert made.cells is not None  # noqa: S101 - asked of no other
-    return made.cells.file, made.cells.table
-
-
 @dataclass(frozen=True)
 class _Finding:
     opened: OpenedFiles
@@ -113,7 +113,7 @@ class _Finding:
         main = self._main(clocks)
         faults: list[MappingError] = []
         for each in chosen:
-            if (each.file, each.table) != main:
+            if each.rows_of != main:
                 message = f"column {each.name!r} has another clock than the channels"
                 faults.append(MappingError(message))
         MappingError.together(faults)
@@ -139,7 +139,7 @@ class _Finding:
             if channel.column is not None:
                 with _collected(faults):
                     cells[name] = self._find((name, "column"), channel, of_columns=True)
-        for table in sorted({(each.file, each.table) for each in cells.values()}):
+        for table in sorted({each.rows_of for each in cells.values()}):
             with _collected(faults):
                 clocks[table] = self._clock(*table)
         for name in (*cells, *(name for name in channels if channels[name].derive)):
@@ -162,31 +162,37 @@ class _Finding:
         return made, remarks, clocks, chosen
 
     def _find(self, keys: Key, wanted: ColumnPlace, *, of_columns: bool = False) -> Cells:
-        try:
+        with self._told(keys, of_columns=of_columns):
             return self.opened.find(wanted, self.entry.table)
-        except AmbiguousError as error:
-            raise MappingError(f"{self._names()}: {error}", keys, of_columns=of_columns) from None
 
     def _of_column(self, name: str, channel: ChannelColumn, at: Cells, remarks: list[str]) -> Made:
         if channel.filter:
             remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
-        try:
+        with self._told((name,), of_columns=True):
             return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig)
-        except ValueError as error:
-            raise MappingError(f"{self._names()}: {error}", (name,), of_columns=True) from None
 
     def _derived(self, name: str, channel: ChannelColumn, source: Made, remarks: list[str]) -> Made:
-        try:
+        with self._told((name, "derive"), of_columns=True):
             one = made_of_channel(name, channel, source, self.rig)
-        except ValueError as error:
-            raise MappingError(str(error), (name, "derive"), of_columns=True) from None
         if one.how == "integral":
             remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
         return one
 
-    def _names(self, first: int = 0) -> str:
-        names = " and ".join(each.name for each in self.used)
-        return f"{names} from row {first + 1}" if first else names
+    def _wrong(
+        self, what: object, keys: Key = (), *, of_columns: bool = False, first: int = 0
+    ) -> MappingError:
+        """What of these files, or of them from a row on, does not go with the mapping."""
+        return MappingError(f"{label(self.used, first)}: {what}", keys, of_columns=of_columns)
+
+    @contextmanager
+    def _told(self, keys: Key, *, of_columns: bool = False, first: int = 0) -> Iterator[None]:
+        """A ValueError in the block is told so."""
+        try:
+            yield
+        except MappingError:
+            raise
+        except ValueError as error:
+            raise self._wrong(error, keys, of_columns=of_columns, first=first) from None
 
     def _choosing(self) -> Iterator[tuple[Key, ColumnPlace]]:
         """The columns that tell trials apart."""
@@ -208,7 +214,7 @@ class _Finding:
             return ClockUsed(step=1.0 / time.sample_rate)
         if stated is not None:
             return ClockUsed(step=stated.step, start=stated.start)
-        raise MappingError(f"{self._names()}: {TIMELESS}", of_columns=True)
+        raise self._wrong(TIMELESS, of_columns=True)
 
     def _column_clock(self, time: TimeColumn, file: int, table: int) -> ClockUsed:
         name = self.opened.table(file, table).name
@@ -216,22 +222,17 @@ class _Finding:
             update={"file": time.file or file + 1, "table": time.table or name}
         )
         cells = self._find(("time", "column"), within, of_columns=True)
-        if (cells.file, cells.table) != (file, table):
-            raise MappingError(
-                f"{self._names()}: the times of column {cells.name!r} are those of other rows",
-                ("time", "column"),
-                of_columns=True,
-            )
+        if cells.rows_of != (file, table):
+            message = f"the times of column {cells.name!r} are those of other rows"
+            raise self._wrong(message, ("time", "column"), of_columns=True)
         unit = time.unit or self.opened.column(cells).unit
         if unit in PLAIN:
             message = f"the file states no unit of column {cells.name!r}; write unit = ..."
-            raise MappingError(f"{self._names()}: {message}", ("time",), of_columns=True)
-        try:
+            raise self._wrong(message, ("time",), of_columns=True)
+        with self._told(("time", "unit"), of_columns=True):
             one = parse_unit(unit)
-        except ValueError as error:
-            raise MappingError(str(error), ("time", "unit"), of_columns=True) from None
-        if one.dimensions != parse_unit("s").dimensions:
-            raise MappingError(f"{unit!r} is no unit of time", ("time", "unit"), of_columns=True)
+            if one.dimensions != parse_unit("s").dimensions:
+                raise ValueError(f"{unit!r} is no unit of time")
         return ClockUsed(cells=cells, factor=float(one.factor))
 
     def _times(self, clock: ClockUsed) -> Callable[[int, int], Array]:
@@ -259,23 +260,22 @@ class _Finding:
         total = self.opened.rows(*main)
         if total < SHORTEST:
             message = f"it has {counted(total, 'row')}, and {NEEDED}"
-            raise MappingError(f"{self._names()}: {message}", ("file",))
+            raise self._wrong(message, ("file",))
         first, stop = self._bounds(clock, total)
         entry = self.entry
         if not chosen and not entry.restarts:
             return [Stretch(first, stop - first, {})]
-        try:
-            if entry.restarts:
+        if entry.restarts:
+            with self._told(("restarts",)):
                 return by_restart(self._times(clock)(first, stop), first)
-            name, values = chosen[0].name, self.opened.part(chosen[0], first, stop)
-            if entry.trigger is not None:
-                ends = partial(self._after, clock, entry.trigger.duration, stop)
+        name, values = chosen[0].name, self.opened.part(chosen[0], first, stop)
+        if entry.trigger is not None:
+            ends = partial(self._after, clock, entry.trigger.duration, stop)
+            with self._told(("trigger",)):
                 return by_trigger(values, first, name, entry.trigger.level, ends, stop)
-            if entry.where is not None:
-                return by_value(values, first, name, "where", entry.where.equals)
-            return by_value(values, first, name, "each")
-        except CutError as error:
-            raise MappingError(f"{self._names()}: {error}", (error.key,)) from None
+        key, wanted = ("each", None) if entry.where is None else ("where", entry.where.equals)
+        with self._told((key,)):
+            return by_value(values, first, name, wanted)
 
     def _after(self, clock: ClockUsed, duration: float, stop: int, rises: np.ndarray) -> np.ndarray:
         times = self._times(clock)(0, stop)
@@ -299,7 +299,7 @@ class _Finding:
                 f"times are {times[0]:g} to {times[-1]:g} s"
             )
             key = "stop" if entry.start is None else "start"
-            raise MappingError(f"{self._names()}: {message}", (key,))
+            raise self._wrong(message, (key,))
         return first, stop
 
     # Channels
@@ -314,17 +314,15 @@ class _Finding:
     ) -> Described:
         clock = clocks[main]
         repairs = self.layout.time.repair if self.layout.time is not None else ()
-        try:
+        with self._told(("file",), first=stretch.first):
             even = even_clock(self._times(clock), stretch.first, stretch.rows, repairs)
-        except UnevenError as error:
-            raise MappingError(f"{self._names(stretch.first)}: {error}", ("file",)) from None
         remarks = [*stretch.remarks, *even.remarks, *told]
         made = list(self._placed(columns, main, clocks, even, remarks))
         shifts = [each.shift for each in made if each.clock is None]
         skip, cut = max(0, -min(shifts, default=0)), max(0, *shifts, 0)
         if (left := even.samples - skip - cut) < SHORTEST:
             what = f"its delays and repairs leave {counted(max(left, 0), 'sample')}, and {NEEDED}"
-            raise MappingError(f"{self._names()}: {what}", ("file",))
+            raise self._wrong(what, ("file",))
         described = Described(
             files=self.used,
             table=main,
@@ -348,20 +346,18 @@ class _Finding:
         remarks = list(described.remarks)
         periods: dict[str, float] = {}
         faults: list[MappingError] = []
-        for defect in defects_of(described, self.opened, self.rig.ratio):
-            name = next(iter(defect.channels), "")
-            entry = self.layout.channels.get(name)
-            if defect.kind == WRAPAROUND and entry is not None and "unwrap" in entry.repair:
+        for defect in RecordingReader(described, self.opened).defects(self.rig.ratio):
+            name = defect.channels[0]
+            entry = self.layout.channels[name]
+            if defect.kind == "wraparound" and "unwrap" in entry.repair:
                 periods[name] = defect.size
                 remarks.append(f"{name} was made continuous: {defect.what}")
                 continue
-            accepted = entry is not None and defect.kind in entry.accept
-            if defect.severity is Severity.NOTED or accepted:
+            if defect.severity is Severity.NOTED or defect.kind in entry.accept:
                 remarks.append(defect.what)
                 continue
-            what = f"{self._names(described.first)}: {defect.what}; {remedy(defect)}"
-            keys = (name,) if name else ()
-            faults.append(DefectError(what, keys, defect.kind, of_columns=bool(name)))
+            what = f"{described.label}: {defect.what}; {defect.remedy}"
+            faults.append(MappingError(what, (name,), of_columns=True, defect=defect.kind))
         MappingError.together(faults)
         channels = tuple(
             each.model_copy(update={"period": periods.get(each.name)})
@@ -385,7 +381,7 @@ class _Finding:
                     told = f"{shift} samples, {shift / even.rate:.6g} s"
                     remarks.append(f"{name} is put back by {told}")
                 of: dict[str, object] = {"shift": shift}
-                if (table := _table(one)) != main:
+                if (table := one.cells.rows_of) != main:
                     of |= self._slower(clocks[table], table, even)
                 one = one.model_copy(update=of)
             yield one
@@ -403,5 +399,5 @@ class _Finding:
                 f"{what} has times from {times[0]:.6g} to {times[-1]:.6g} s, and the trial is from "
                 f"{ends[0]:.6g} to {ends[1]:.6g} s: cut it by start and stop, or correct a clock"
             )
-            raise MappingError(f"{self._names()}: {message}", ("file",))
+            raise self._wrong(message, ("file",))
         return {"clock": clock, "own_rate": 1.0 / step}

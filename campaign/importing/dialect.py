@@ -64,12 +64,16 @@ class Dialect:
     def split(self, line: str) -> list[str]:
         return split(line, self.separator)
 
+    def place(self, column: int) -> str:
+        """Where a column is, for people."""
+        return f"column {_letters(column) if self.sheet else column + 1}"
+
     def problem(
         self, path: Path, row: int, message: str, line: str = "", place: int = 0
     ) -> Problem:
         """What is wrong with a cell, where a person finds it."""
         if self.sheet:
-            return Problem(path, 0, 0, f"{self.sheet}!{letters(place)}{row}: {message}")
+            return Problem(path, 0, 0, f"{self.sheet}!{_letters(place)}{row}: {message}")
         if self.separator == " ":
             word = list(re.finditer(r"\S+", line))[place : place + 1]
             return Problem(path, row, word[0].start() + 1 if word else 1, message)
@@ -77,9 +81,9 @@ class Dialect:
         return Problem(path, row, sum(len(cell) + 1 for cell in before) + 1, message)
 
 
-def letters(place: int) -> str:
+def _letters(place: int) -> str:
     """A column as Excel names it: 0 is A, 26 is AA."""
-    return (letters(place // 26 - 1) if place >= 26 else "") + chr(ord("A") + place % 26)
+    return (_letters(place // 26 - 1) if place >= 26 else "") + chr(ord("A") + place % 26)
 
 
 def encoding_of(head: bytes, whole: bool) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -39,6 +40,31 @@ class RecordingError(UsageError):
         self.problems = tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
 
+    @classmethod
+    def of(cls, path: Path, message: str, line: int = 0, column: int = 1) -> RecordingError:
+        """One thing that is wrong with a file, or with a line of it (from 1)."""
+        return cls([Problem(path, line, column if line else 0, message)])
+
+
+@contextmanager
+def read_by(package: str, path: Path, what: str, extra: str = "") -> Iterator[None]:
+    """A library reads the file; whatever a broken one leads it to becomes a RecordingError.
+
+    Args:
+        what: kind of file, for the message.
+        extra: of this program, by which the library is installed where it is missing.
+    """
+    try:
+        yield
+    except RecordingError:
+        raise
+    except Exception as error:  # noqa: BLE001 - libraries raise all there is
+        if extra and isinstance(error, ImportError):
+            message = f"reading it needs {package}: pip install 'campaign[{extra}]'"
+            raise RecordingError.of(path, message) from None
+        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise RecordingError.of(path, f"this {what} cannot be read ({why[:300]})") from None
+
 
 def check_regular(path: Path) -> None:
     """Raise RecordingError for what is no regular file; nothing is opened.
@@ -51,12 +77,12 @@ def check_regular(path: Path) -> None:
         told = getattr(error, "strerror", None) or str(error)
         hint = _nearest_file(path) if isinstance(error, FileNotFoundError) else ""
         message = f"it cannot be opened: {told}{hint}"
-        raise RecordingError([Problem(path, 0, 0, message)]) from None
+        raise RecordingError.of(path, message) from None
     if stat.S_ISDIR(mode):
-        raise RecordingError([Problem(path, 0, 0, "it cannot be opened: it is a folder")])
+        raise RecordingError.of(path, "it cannot be opened: it is a folder")
     if not stat.S_ISREG(mode):
         message = "it cannot be opened: it is a pipe, a device or the like, and no regular file"
-        raise RecordingError([Problem(path, 0, 0, message)])
+        raise RecordingError.of(path, message)
 
 
 def _nearest_file(path: Path) -> str:

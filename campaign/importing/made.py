@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from campaign.channels import (
     COMMAND,
@@ -27,6 +27,9 @@ from campaign.recording import ChannelInfo
 from campaign.unit_grammar import ONE, Unit, parse_unit
 from campaign.units import split_quantity
 
+if TYPE_CHECKING:
+    from campaign.physics.bench import Bench
+
 PLAIN = ("", "1", "-")
 """How people write that a number has no unit."""
 AT_REST = "the hull is taken to be at rest, so the load's rate in space is that to the hull"
@@ -47,6 +50,13 @@ class RigFacts:
     motor: AxisKind = AxisKind.ROTARY
     ratio: float = 1.0
     torque_per_current: float | None = None
+
+    @classmethod
+    def of(cls, bench: Bench) -> RigFacts:
+        """The facts of a bench, as far as it has them."""
+        return cls(
+            bench.sides.load, bench.sides.motor, bench.ratio or 1.0, bench.torque_per_current
+        )
 
 
 def made_of_column(
@@ -73,11 +83,9 @@ def made_of_column(
     si = _unit(what.unit)
     if unit.dimensions != si.dimensions:
         raise ValueError(_mismatch(name, entry, written, what))
-    return Made(
-        name=name,
-        unit=what.unit,
-        label=what.label,
-        display_unit=what.display_unit,
+    return _made(
+        name,
+        what,
         cells=cells,
         factor=entry.sign * number * float(unit.factor / si.factor),
         offset=entry.offset,
@@ -101,11 +109,9 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
     for how, per in ways:
         unit = _unit(source.unit) * by * _unit(per)
         if unit.dimensions == _unit(what.unit).dimensions:
-            return Made(
-                name=name,
-                unit=what.unit,
-                label=what.label,
-                display_unit=what.display_unit,
+            return _made(
+                name,
+                what,
                 how=how,
                 source=source.name,
                 factor=entry.sign * number * float(unit.factor / _unit(what.unit).factor),
@@ -118,6 +124,12 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
         f"{name} is in {what.unit} and {source.name} in {source.unit}; neither that times a "
         "constant nor its derivative or integral is the other"
     )
+
+
+def _made(name: str, what: ChannelInfo, **of: Any) -> Made:
+    return Made(
+        name=name, unit=what.unit, label=what.label, display_unit=what.display_unit, **of
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -164,12 +176,9 @@ def following(
     known = dict(have)
     for name in sorted(wanted):
         for way in _path(name, known, rig):
-            what = info(way.name, axis=rig.axis)
-            made = Made(
-                name=way.name,
-                unit=what.unit,
-                label=what.label,
-                display_unit=what.display_unit,
+            made = _made(
+                way.name,
+                info(way.name, axis=rig.axis),
                 how="derivative" if way.derivative else "copy",
                 source=way.source,
                 factor=way.factor(rig) or 1.0,
@@ -177,10 +186,8 @@ def following(
             )
             known[way.name] = made
             verb = "the derivative of" if way.derivative else "made of"
-            yield (
-                made,
-                f"{way.name} is {verb} {way.source}{f'; {way.remark}' if way.remark else ''}",
-            )
+            remark = f"; {way.remark}" if way.remark else ""
+            yield made, f"{way.name} is {verb} {way.source}{remark}"
 
 
 def _path(

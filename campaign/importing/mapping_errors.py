@@ -13,11 +13,15 @@ class MappingError(ValueError):
     Attributes:
         keys: of `[[test.recording]]` or of `[columns.NAME]`, where it stands.
         of_columns: which of the two.
+        defect: the kind of what was found in the samples and nobody has accepted, as `clipping`.
         others: what is wrong besides, told together with it.
     """
 
-    def __init__(self, message: str, keys: Key = (), *, of_columns: bool = False) -> None:
+    def __init__(
+        self, message: str, keys: Key = (), *, of_columns: bool = False, defect: str = ""
+    ) -> None:
         self.keys = keys
+        self.defect = defect
         self.of_columns = of_columns
         self.others: tuple[MappingError, ...] = ()
         super().__init__(message)
@@ -29,15 +33,3 @@ class MappingError(ValueError):
             later = (each for one in faults[1:] for each in (one, *one.others))
             faults[0].others = (*faults[0].others, *later)
             raise faults[0]
-
-
-class DefectError(MappingError):
-    """A defect of a recording that nobody has accepted.
-
-    Attributes:
-        kind: of the defect, as in `clipping`.
-    """
-
-    def __init__(self, message: str, keys: Key, kind: str, *, of_columns: bool) -> None:
-        super().__init__(message, keys, of_columns=of_columns)
-        self.kind = kind

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from campaign.errors import Problem
+from campaign.importing.defects import Defect, find
 from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
 from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
 from campaign.importing.interface import ROWS, Array, RecordingError
 from campaign.importing.opened import OpenedFiles
 from campaign.recording import Channel, Recording
+
+AT_ONCE = 2_000_000
+"""samples that are looked at together: memory does not grow with a recording."""
 
 
 class RecordingReader:
@@ -35,7 +39,7 @@ class RecordingReader:
         self._whole: dict[str, Array] = {}
         self._positions: Array | None = None
         if described.repairs:
-            self._positions = self._clock().positions
+            self._positions = self._even().positions
 
     def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array, Array]]:
         """Time (n,), samples (channels, n) in the order described, and which rows are lost (n,)."""
@@ -58,6 +62,25 @@ class RecordingReader:
             for name, made in chosen.items()
         }
         return Recording(np.arange(count) / self.described.sample_rate, channels)
+
+    def defects(self, gear: float | None) -> Iterator[Defect]:
+        """Of the channels that are columns, on the trial's own even clock; each kind once.
+
+        A long recording is looked at part by part; rows are those of the trial.
+        """
+        told = self.described
+        names = [each.name for each in told.channels if each.how == "column"]
+        found = set()
+        for first in range(0, told.samples, AT_ONCE):
+            stop = min(first + AT_ONCE, told.samples)
+            if stop - first < 2 and first:
+                return
+            samples = self.samples(names, first, stop)
+            time = np.arange(first, stop) / told.sample_rate
+            for each in find(time, dict(zip(names, samples, strict=True)), gear=gear):
+                if (each.kind, each.channels) not in found:
+                    found.add((each.kind, each.channels))
+                    yield replace(each, rows=(each.rows[0] + first, each.rows[1] + first))
 
     def _channel(self, made: Made, first: int, stop: int) -> Array:
         if made.period is not None:
@@ -110,10 +133,11 @@ class RecordingReader:
 
     def _held(self, made: Made, cells: Cells, clock: ClockUsed, first: int, stop: int) -> Array:
         """Of another clock: the last value that was known at each time."""
-        count = self._opened.rows(cells.file, cells.table)
+        count = self._opened.rows(*cells.rows_of)
         times = clock_times(clock, self._opened, 0, count)
         values = self._opened.part(cells, 0, count)
-        start = float(clock_times(self.described.clock, self._opened, *self._first_row())[0])
+        row = self.described.first
+        start = float(clock_times(self.described.clock, self._opened, row, row + 1)[0])
         wanted = np.arange(first, stop) + self.described.skip + made.shift
         at = start + wanted / self.described.sample_rate
         # Half a millionth of a sample: both clocks are written with finite digits.
@@ -124,9 +148,6 @@ class RecordingReader:
         known = (index >= 0) & (at <= times[-1] + step + slack)
         return np.where(known, values[np.maximum(index, 0)], np.nan)
 
-    def _first_row(self) -> tuple[int, int]:
-        return self.described.first, self.described.first + 1
-
     def _lost(self, first: int, stop: int) -> np.ndarray:
         if self._positions is None:
             return np.zeros(stop - first, dtype=bool)
@@ -134,7 +155,7 @@ class RecordingReader:
         lost: np.ndarray = ~np.isfinite(self._positions[first + skip : stop + skip])
         return lost
 
-    def _clock(self) -> EvenClock:
+    def _even(self) -> EvenClock:
         told = self.described
         try:
             return even_clock(
@@ -145,7 +166,7 @@ class RecordingReader:
             )
         except UnevenError as error:  # it was even when the plan was made
             path = self._opened.paths[told.table[0]]
-            raise RecordingError([Problem(path, 0, 0, str(error))]) from None
+            raise RecordingError.of(path, str(error)) from None
 
 
 def clock_times(clock: ClockUsed, opened: OpenedFiles, first: int, stop: int) -> Array:
@@ -164,6 +185,6 @@ def paths_unchanged(described: Described) -> Sequence[Path]:
         path = Path(used.path)
         if file_used(path, used.name).sha256 != used.sha256:
             message = "it has changed since it was mapped (its SHA-256 is another)"
-            raise RecordingError([Problem(path, 0, 0, message)])
+            raise RecordingError.of(path, message)
         paths.append(path)
     return paths

@@ -5,8 +5,8 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,10 @@ from campaign.importing.mapping import Layout, RecordingEntry, layouts, recordin
 from campaign.importing.mapping_errors import MappingError
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
-from campaign.importing.rig_facts import rig_facts
-from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.protocol.files import Origin
+from campaign.protocol.files import Origin, Within
 from campaign.protocol.problems import allowed, nearest, shown
-from campaign.protocol.schema import ChosenValue, ExperimentKind, Protocol, StageKind, Test
+from campaign.protocol.schema import ExperimentKind, Protocol, Test
 from campaign.recording import Recording
 from campaign.trial import Offered, Task, TrialRequest
 from campaign.units import to_si
@@ -80,34 +78,11 @@ def _once(problems: Sequence[Problem]) -> list[Problem]:
     ]
 
 
-def _of_file(
-    what: Problem,
-    at: Origin,
-    keys: tuple[str | int, ...],
-    paths: Sequence[Path],
-    entry: RecordingEntry,
-) -> Problem:
-    """What is wrong with a file, at its name in the mapping; `keys` are those of `file`."""
-    if not isinstance(entry.file, str) and what.file in paths:
-        keys = (*keys, paths.index(what.file))
+def _of_file(what: Problem, at: Origin, paths: Sequence[Path], entry: RecordingEntry) -> Problem:
+    """What is wrong with a file, at its name in the mapping."""
+    several = not isinstance(entry.file, str) and what.file in paths
+    keys = ("file", paths.index(what.file)) if several else ("file",)
     return at.problem(keys, "value", str(what))
-
-
-@dataclass(frozen=True)
-class RecordedKind:
-    """An experiment whose trials have been executed; see `protocol.schema.ExperimentKind`."""
-
-    name: str
-    options: type[Options]
-    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
-    requires: Mapping[str, str]
-    can_use: Mapping[str, str]
-    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
-    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
-    recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
-    windows: tuple[str, ...] = ()
-    stages: Sequence[StageKind] = ()
-    seeks_instability: bool = False
 
 
 @dataclass(frozen=True)
@@ -115,16 +90,9 @@ class Found:
     """One recording of a test: what its entry says, and what its files hold."""
 
     entry: RecordingEntry
-    index: int
     described: Described
     stretch: Stretch
     opened: OpenedFiles
-
-    @property
-    def label(self) -> str:
-        """Where it is, for people."""
-        names = " and ".join(file.name for file in self.described.files)
-        return f"{names} from row {self.described.first + 1}" if self.described.first else names
 
 
 @dataclass
@@ -158,16 +126,19 @@ class _Loader:
         entries = recordings_of(
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
-        rig = rig_facts(Bench.model_validate(test.bench))
-        found = [each for place in entries for each in self._found(test, *place, rig)]
+        rig = RigFacts.of(Bench.model_validate(test.bench))
+        found = [
+            each
+            for index, entry in entries
+            for each in self._found(test, Within(origin, ("recording", index)), entry, rig)
+        ]
         return replace(test, experiment=_kind(test.experiment, found))
 
-    def _found(self, test: Test, index: int, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
-        at, below = test.origin, ("recording", index)
-        layout = self._layout(at, below, entry)
+    def _found(self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
+        layout = self._layout(at, entry)
         wanted = {*test.experiment.requires, *test.experiment.can_use}
         found: list[Found] = []
-        for written in self._files(at, below, entry):
+        for written in self._files(at, entry):
             paths = [self.folder / each for each in written]
             try:
                 if layout is None:  # what can be said of its files is said all the same
@@ -175,75 +146,57 @@ class _Loader:
                     continue
                 opened, trials = describe(entry, layout, paths, written, rig, wanted)
             except RecordingError as error:
-                self.problems += (
-                    _of_file(each, at, (*below, "file"), paths, entry) for each in error.problems
-                )
+                self.problems += (_of_file(each, at, paths, entry) for each in error.problems)
                 continue
             except MappingError as error:
                 every = (error, *error.others)
-                self.problems += (self._placed(at, below, entry, each) for each in every)
+                self.problems += (self._placed(at, entry, each) for each in every)
                 continue
             self.stack.enter_context(opened)
-            found += (Found(entry, index, *both, opened) for both in trials)
+            found += (Found(entry, *both, opened) for both in trials)
         return found
 
-    def _placed(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry, error: MappingError
-    ) -> Problem:
+    def _placed(self, at: Origin, entry: RecordingEntry, error: MappingError) -> Problem:
         if error.of_columns:
             name = entry.columns or next(iter(self.layouts))
-            at, below = self.protocol.origin or at, ("columns", name)
-            return at.problem((*below, *error.keys), "key", str(error))
-        return at.problem((*below, *error.keys), "value", str(error))
+            at = Within(self.protocol.origin or at, ("columns", name))
+        return at.problem(error.keys, "key" if error.of_columns else "value", str(error))
 
-    def _layout(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
-    ) -> Layout | None:
+    def _layout(self, at: Origin, entry: RecordingEntry) -> Layout | None:
         names = list(self.protocol.columns)
         name = entry.columns or (names[0] if len(names) == 1 else "")
         if not names:
             message = "nothing says what its columns are; add [columns.NAME] tables"
-            self.problems.append(at.problem((*below, "file"), "key", message))
+            self.problems.append(at.problem(("file",), "key", message))
         elif not name:
             message = f"say by which 'columns' it is read; {allowed(names)}"
-            self.problems.append(at.problem((*below, "file"), "key", message))
+            self.problems.append(at.problem(("file",), "key", message))
         elif name not in names:
             message = f"there is no [columns.{name}]; {allowed(names)}{nearest(name, names)}"
-            self.problems.append(at.problem((*below, "columns"), "value", message))
+            self.problems.append(at.problem(("columns",), "value", message))
         return self.layouts.get(name)
 
-    def _files(
-        self, at: Origin, below: tuple[str | int, ...], entry: RecordingEntry
-    ) -> Iterator[list[str]]:
+    def _files(self, at: Origin, entry: RecordingEntry) -> list[list[str]]:
         if not isinstance(entry.file, str):
-            yield list(entry.file)
-            return
+            return [list(entry.file)]
         if not any(sign in entry.file for sign in "*?["):
-            yield [entry.file]
-            return
-        pattern = entry.file
+            return [[entry.file]]
         try:
-            matching = _matching(self.folder, pattern)
-        except _OutsideError as error:
-            matching, why = [], str(error)
-        else:
-            why = f"no file of that name (looked in {self.folder})"
-        if not matching:
-            problem = at.problem((*below, "file"), "value", f"{shown(pattern)}: {why}")
-            self.problems.append(problem)
-        for each in matching:
-            yield [each]
-
-
-class _OutsideError(Exception):
-    """What of a pattern leads out of the folder of its mapping."""
+            return [[each] for each in _matching(self.folder, entry.file)]
+        except ValueError as error:
+            message = f"{shown(entry.file)}: {error}"
+            self.problems.append(at.problem(("file",), "value", message))
+            return []
 
 
 def _matching(folder: Path, pattern: str) -> list[str]:
-    """Files below `folder` that the pattern matches; nothing outside is looked at."""
+    """Files below `folder` that the pattern matches; nothing outside is looked at.
+
+    Raises ValueError where it leads out of the folder, or matches nothing.
+    """
     parts = Path(pattern).parts
     if Path(pattern).anchor or ".." in parts:
-        raise _OutsideError(f"a pattern {OUTSIDE}")
+        raise ValueError(f"a pattern {OUTSIDE}")
     root, found = folder.resolve(), [""]
     for part in parts:
         found = [
@@ -253,11 +206,13 @@ def _matching(folder: Path, pattern: str) -> list[str]:
         ]
         for each in found:
             if not Path(os.path.realpath(folder / each)).is_relative_to(root):
-                raise _OutsideError(f"the link {shown(each)} {OUTSIDE}")
+                raise ValueError(f"the link {shown(each)} {OUTSIDE}")
+    if not found:
+        raise ValueError(f"no file of that name (looked in {folder})")
     return sorted(found)
 
 
-def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
+def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> ExperimentKind:
     planned = any(each.entry.trial is not None for each in found)
 
     def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
@@ -274,13 +229,16 @@ def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> RecordedKind:
         if wrong:
             raise ValueError("; ".join(wrong))
 
-    return RecordedKind(
-        experiment.name,
-        experiment.options,
-        trials,
-        experiment.requires,
-        experiment.can_use,
+    # Of what has been executed nothing is fitted, followed up or warned of.
+    return replace(
+        experiment,
+        trials=trials,
         fit=experiment.fit if planned else None,
+        warnings=None,
+        recorded=None,
+        windows=(),
+        stages=(),
+        seeks_instability=False,
     )
 
 
@@ -288,26 +246,17 @@ def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
     """The planned trial that a recording answers. Raises ValueError where it is none."""
     number, told = found.entry.trial or 0, found.described
     if number > len(asked):
-        raise ValueError(f"{found.label}: there is no trial {number}; {len(asked)} are planned")
+        raise ValueError(f"{told.label}: there is no trial {number}; {len(asked)} are planned")
     request = asked[number - 1]
     task, duration = request.task, told.samples / told.sample_rate
     short = duration < task.duration * (1.0 - ROUNDING) - 1.5 / told.sample_rate
     if short and task.stop_rate is None:
         raise ValueError(
-            f"{found.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
+            f"{told.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
         )
     count = min(told.samples, round(task.duration * told.sample_rate))
     told = told.model_copy(update={"samples": count})
-    task = task.model_copy(
-        update={"sample_rate": told.sample_rate, "duration": count / told.sample_rate}
-    )
-    return replace(
-        request,
-        task=task,
-        point={**request.point, **_conditions(found)},
-        recording=told.model_dump(mode="json", exclude_defaults=True),
-        note=_note(found, request.note),
-    )
+    return _served(found, request, told, {**request.point, **_conditions(found)})
 
 
 def _offered(
@@ -320,7 +269,7 @@ def _offered(
     for window in windows:
         if not 0 <= window.start < window.stop <= duration * (1.0 + ROUNDING):
             raise ValueError(
-                f"{found.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
+                f"{told.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
                 f"s, is no part of its {duration:.6g} s"
             )
     conditions = _conditions(found)
@@ -343,7 +292,7 @@ def _offered(
         offered = Offered(
             duration,
             told.sample_rate,
-            sufficient(names, rig_facts(bench)),
+            sufficient(names, RigFacts.of(bench)),
             conditions,
             windows,
             read,
@@ -351,20 +300,24 @@ def _offered(
         try:
             requests = list(experiment.recorded(options, bench, offered))
         except ValueError as error:
-            raise ValueError(f"{found.label}: {error}") from None
+            raise ValueError(f"{told.label}: {error}") from None
     for request in requests:
-        part = _part(told, request.part)
-        task = request.task.model_copy(
-            update={"sample_rate": told.sample_rate, "duration": part.samples / told.sample_rate}
-        )
-        yield replace(
-            request,
-            task=task,
-            point={**conditions, **request.point},
-            planned=False,
-            recording=part.model_dump(mode="json", exclude_defaults=True),
-            note=_note(found, request.note),
-        )
+        part, point = _part(told, request.part), {**conditions, **request.point}
+        yield replace(_served(found, request, part, point), planned=False)
+
+
+def _served(
+    found: Found, request: TrialRequest, told: Described, point: Mapping[str, JsonValue]
+) -> TrialRequest:
+    """The trial that is served from what is told of a recording."""
+    rate = told.sample_rate
+    return replace(
+        request,
+        task=request.task.model_copy(update={"sample_rate": rate, "duration": told.samples / rate}),
+        point=point,
+        recording=told.model_dump(mode="json", exclude_defaults=True),
+        note="; ".join(filter(None, (found.entry.note, request.note, found.described.label))),
+    )
 
 
 def _part(told: Described, part: tuple[float, float] | None) -> Described:
@@ -383,12 +336,6 @@ def _conditions(found: Found) -> dict[str, JsonValue]:
     for name, value in found.entry.conditions.items():
         told[name] = value
         if isinstance(value, str):
-            try:
+            with suppress(ValueError):  # a word
                 told[name] = to_si(value)
-            except ValueError:
-                told[name] = value  # a word
     return told
-
-
-def _note(found: Found, planned: str) -> str:
-    return "; ".join(filter(None, (found.entry.note, planned, found.label)))

@@ -14,10 +14,9 @@ from typing import TextIO
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_lost, value_of
 from campaign.importing.dialect import Dialect, encoding_of
-from campaign.importing.interface import HEAD, ROWS, Array, RecordingError
+from campaign.importing.interface import HEAD, ROWS, Array, Column, RecordingError
 
 LONGEST = 1 << 20
 """Most characters of a line; what is longer is no table."""
@@ -43,16 +42,16 @@ def lines_of(file: TextIO, path: Path) -> Iterator[str]:
         while line := file.readline(LONGEST):
             number += 1
             if len(line) == LONGEST:
-                raise RecordingError(
-                    [Problem(path, number, 1, f"a line of over {LONGEST} characters: no table")]
+                raise RecordingError.of(
+                    path, f"a line of over {LONGEST} characters: no table", number
                 )
             if "\0" in line:
                 at = line.index("\0") + 1
-                raise RecordingError([Problem(path, number, at, "a zero byte: this is no text")])
+                raise RecordingError.of(path, "a zero byte: this is no text", number, at)
             yield line
     except UnicodeDecodeError as error:
         message = f"the text is not {error.encoding}: {error.reason}"
-        raise RecordingError([Problem(path, number + 1, 0, message)]) from None
+        raise RecordingError.of(path, message, number + 1, 0) from None
 
 
 def beginning(file: TextIO, path: Path, count: int) -> list[str]:
@@ -71,10 +70,31 @@ def _up_to(lines: Iterator[str], count: int, size: int) -> list[str]:
     return found
 
 
+def columns_of(dialect: Dialect) -> tuple[Column, ...]:
+    """The columns of a table of text; those without a name are called by their place."""
+    names = dialect.names or [""] * len(dialect.numeric)
+    told = zip(names, dialect.units, dialect.numeric, strict=True)
+    return tuple(
+        Column(name or dialect.place(k), unit, dialect.place(k), numeric)
+        for k, (name, unit, numeric) in enumerate(told)
+    )
+
+
 def blocks(
-    path: Path, encoding: str, dialect: Dialect, places: Sequence[int], rows: int | None = None
+    path: Path,
+    encoding: str,
+    dialect: Dialect,
+    places: Sequence[int],
+    rows: int | None = None,
+    among: Sequence[int] | None = None,
 ) -> Iterator[Array]:
-    """The columns at `places` of a table, shape (k, len(places)); `rows`: no further than these."""
+    """The columns at `places` of a table, shape (k, len(places)).
+
+    Args:
+        rows: no further than these.
+        among: columns of the file that the table has; absent: all.
+    """
+    places = places if among is None else [among[place] for place in places]
     with path.open(encoding=encoding) as file:
         last = None if rows is None else dialect.first - 1 + rows
         lines = islice(lines_of(file, path), dialect.first - 1, last)
@@ -105,19 +125,23 @@ def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> A
         cells = text.count(separator) + len(lines)
     # Cells that are too many would be dropped; points beside decimal commas may group thousands.
     grouped = dialect.decimal == "," and "." in text
-    if cells != dialect.width * len(lines) or '"' in text or grouped:
+    even = cells == dialect.width * len(lines)
+    if not (even or dialect.comments) or '"' in text or grouped:
         return None
+    # A row may go on after its cells, but must have them all.
+    wanted = places if even else [*places, dialect.width - 1]
     try:
         values = np.loadtxt(
             StringIO(text.replace(",", ".") if dialect.decimal == "," else text),
             delimiter=separator,
-            usecols=places,
+            usecols=wanted,
             comments=None,
             ndmin=2,
         )
     except ValueError:
         return None
-    return values if np.isfinite(values).all() and len(values) == len(lines) else None
+    whole = np.isfinite(values).all() and len(values) == len(lines)
+    return values[:, : len(places)] if whole else None
 
 
 def _row_by_row(

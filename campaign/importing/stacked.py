@@ -21,15 +21,18 @@ ABOVE = 100
 
 @dataclass(frozen=True)
 class Block:
-    """One of the tables: how it is read, in how many lines, of which so many are rows."""
+    """One of the tables: how it is read, in how many lines, of which so many are rows.
+
+    None of those of a table that goes on to the end of its file.
+    """
 
     dialect: Dialect
-    lines: int
-    rows: int
+    lines: int | None = None
+    rows: int | None = None
 
 
 def stacked(path: Path, encoding: str, dialect: Dialect, sample: Sequence[str]) -> list[Block]:
-    """The tables below each other, given how the first is read; none where there is only one.
+    """The tables below each other, or the only one, given how the first is read.
 
     Args:
         sample: the beginning of the file, with the heading of the first.
@@ -37,10 +40,9 @@ def stacked(path: Path, encoding: str, dialect: Dialect, sample: Sequence[str]) 
     Raises RecordingError for what is no text.
     """
     title = _title(dialect, sample)
-    if not title or not _again(path, encoding, title):
-        return []
-    found = list(_blocks(path, encoding, dialect, title))
-    return found if len(found) > 1 else []
+    again = title and _again(path, encoding, title)
+    found = list(_blocks(path, encoding, dialect, title)) if again else []
+    return found if len(found) > 1 else [Block(dialect)]
 
 
 def _title(dialect: Dialect, sample: Sequence[str]) -> str:

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import Array, Clock, Column, RecordingError, Table
 
 REFUSED = 3
@@ -33,8 +32,8 @@ _LENGTH = 8
 
 def tables_streamed(module: str, path: Path) -> list[Table]:
     """What `module.tables` finds in a file, asked in other processes. Raises RecordingError."""
-    with _process(module, path, "tell") as output:
-        raw = output.read()
+    with _process(module, path, "tell") as read:
+        told = read()
     return [
         Table(
             each["name"],
@@ -45,15 +44,15 @@ def tables_streamed(module: str, path: Path) -> list[Table]:
             each["said"],
             tuple(each["doubts"]),
         )
-        for number, each in enumerate(json.loads(raw))
+        for number, each in enumerate(json.loads(told))
     ]
 
 
 def _read(module: str, path: Path, number: int, places: Sequence[int]) -> Iterator[Array]:
     wanted = list(places)
-    with _process(module, path, "pour", number, *wanted) as output:
-        while rows := int.from_bytes(output.read(_LENGTH), "little"):
-            raw = output.read(8 * rows * len(wanted))
+    with _process(module, path, "pour", number, *wanted) as read:
+        while rows := int.from_bytes(read(_LENGTH), "little"):
+            raw = read(8 * rows * len(wanted))
             yield np.frombuffer(raw, dtype="<f8").reshape(rows, len(wanted)).astype(np.float64)
 
 
@@ -61,37 +60,12 @@ class _EndedEarlyError(Exception):
     """The process says no more; how it ended tells why."""
 
 
-class _Output:
-    """What a process says; it is ended when it is silent for too long."""
-
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
-        assert process.stdout is not None  # noqa: S101 - it is a pipe
-        self._pipe = process.stdout
-        self._process = process
-        self.late = False
-
-    def read(self, size: int = -1) -> bytes:
-        """So many bytes, or all that come. Raises _EndedEarlyError for fewer."""
-        # Only while somebody waits: what becomes of a block may take its time.
-        watch = threading.Timer(PATIENCE, self._end)
-        watch.daemon = True
-        watch.start()
-        try:
-            found = self._pipe.read(size)
-        finally:
-            watch.cancel()
-        if len(found) < size:
-            raise _EndedEarlyError
-        return found
-
-    def _end(self) -> None:
-        self.late = True
-        self._process.kill()
-
-
 @contextmanager
-def _process(module: str, path: Path, *task: object) -> Iterator[_Output]:
-    """What a process says about a file; it ends with the block.
+def _process(module: str, path: Path, *task: object) -> Iterator[Callable[..., bytes]]:
+    """A process that answers about a file; it ends with the block, and is ended when it is silent.
+
+    What is handed on reads so many bytes of what it says, or all; it raises _EndedEarlyError for
+    fewer.
 
     Raises RecordingError where it says what is wrong, falls, or is silent for too long.
     """
@@ -104,28 +78,42 @@ def _process(module: str, path: Path, *task: object) -> Iterator[_Output]:
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said
         ) as process,
     ):
-        output = _Output(process)
+        late = threading.Event()
+
+        def end_it() -> None:
+            late.set()
+            process.kill()
+
+        def read(size: int = -1) -> bytes:
+            # Only while somebody waits: what becomes of a block may take its time.
+            watch = threading.Timer(PATIENCE, end_it)
+            watch.daemon = True
+            watch.start()
+            try:
+                found = process.stdout.read(size) if process.stdout else b""
+            finally:
+                watch.cancel()
+            if len(found) < size:
+                raise _EndedEarlyError
+            return found
+
         try:
-            yield output
+            yield read
         except _EndedEarlyError:
             pass
         except BaseException:
             process.kill()  # nobody wants the rest
             raise
         end = process.wait()
-        if output.late:
+        if late.is_set():
             message = f"reading it did not go on for {PATIENCE:g} s"
-            raise RecordingError([Problem(path, 0, 0, message)])
+            raise RecordingError.of(path, message)
         if end == REFUSED:
             said.seek(0)
-            raise RecordingError([Problem(path, 0, 0, said.read().decode("utf-8", "replace"))])
+            raise RecordingError.of(path, said.read().decode("utf-8", "replace"))
         if end:
-            raise _broken(path)
-
-
-def _broken(path: Path) -> RecordingError:
-    message = "it is so broken that the library that reads such files fell over it"
-    return RecordingError([Problem(path, 0, 0, message)])
+            message = "it is so broken that the library that reads such files fell over it"
+            raise RecordingError.of(path, message)
 
 
 def answer(tables: Callable[[Path], Sequence[Table]]) -> None:

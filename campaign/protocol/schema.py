@@ -58,6 +58,9 @@ class StageKind(typing.Protocol):
 class ExperimentKind(typing.Protocol):
     """What this room needs of an experiment; see `campaign.experiments.interface`."""
 
+    __dataclass_fields__: typing.ClassVar[dict[str, Any]]
+    """It is one, so that `replace` makes one with other trials of it."""
+
     @property
     def name(self) -> str: ...
 

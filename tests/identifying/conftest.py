@@ -50,7 +50,7 @@ bench = "./rig.toml"
 [[test.recording]]
 file = "{name}.csv"
 """
-ACCEPT = 'accept = ["unrelated", "quantisation", "delay", "constant", "held"]\n'
+ACCEPT = 'accept = ["unrelated", "delay", "held"]\n'
 
 Importer = Callable[..., Path]
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from campaign.importing.formats import open_recordings
 from campaign.importing.guess import guess, mapping_text
 from campaign.importing.interface import RecordingError
-from campaign.importing.opening import open_recordings
 from tests.importing.files import MADE
 
 ALL, SOME, APART = 46, 12, 2

@@ -127,7 +127,7 @@ def test_anything_at_all_is_looked_at_without_falling(seed):
             case _:
                 return np.where(chance.uniform(size=n) < 0.2, chance.choice(odd, n), np.arange(n))
 
-    time = np.arange(n) / 100 if seed % 2 else series()
+    time = np.arange(n) / 100
     names = ("relative_angle", "relative_rate", "motor_angle", "motor_rate", "drive_torque",
              "motor_current", "command", "reference", "odd")  # fmt: skip
     for gear in (None, 50.0):

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.formats import excel, mdf
+from campaign.importing.formats import excel, mdf, open_recordings
 from campaign.importing.interface import RecordingError, Table
-from campaign.importing.opening import open_recordings
 from tests.importing.files import RATE, TIME, TORQUE
 
 
@@ -143,7 +142,7 @@ def test_workbooks_that_are_none(tmp_path):
     with pytest.raises(RecordingError, match=r"save it as .xlsx"):
         opened(path, "excel")
     path.write_bytes(b"PK\x03\x04 xl/ and nothing else")
-    with pytest.raises(RecordingError, match="cannot be unpacked"):
+    with pytest.raises(RecordingError, match="workbook cannot be read"):
         opened(path, "excel")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("[Content_Types].xml", "<a/>")

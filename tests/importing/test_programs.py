@@ -12,10 +12,9 @@ import pytest
 import scipy.io
 from scipy.io.matlab import MatlabOpaque
 
-from campaign.importing.formats import hdf5, tdms
+from campaign.importing.formats import hdf5, open_recordings, tdms
 from campaign.importing.formats import mat as mat_format
 from campaign.importing.interface import Clock, RecordingError, Table
-from campaign.importing.opening import open_recordings
 from tests.importing.files import LVM, MADE, RATE, RIGOL, TIME, TORQUE, TWINCAT, N, mat
 
 OPAQUE_FIELDS = ("s0", "s1", "s2", "arr")

@@ -16,8 +16,8 @@ from campaign.cli.prepare import Request, prepare
 from campaign.errors import ProtocolError, UsageError
 from campaign.importing import defects
 from campaign.importing.described import file_used
+from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError
-from campaign.importing.opening import open_recordings
 from tests.importing.test_mapping import COLUMNS, ENTRY, TEST, planned, refused, write
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.cutting import CutError, by_restart, restarts
+from campaign.importing.cutting import by_restart, restarts
 from campaign.importing.formats.delimited import tables
 from campaign.importing.guess import guess, mapping_text
 from tests.importing.test_mapping import COLUMNS, ENTRY, TEST, planned, refused, served
@@ -113,7 +113,7 @@ def test_a_clock_that_is_set_back_begins_nothing() -> None:
     assert restarts(exchanged) == []
     short = np.concatenate([np.arange(50), np.arange(5), np.arange(70)]) * 1e-3
     assert restarts(short) == [50]
-    with pytest.raises(CutError, match="begins once"):
+    with pytest.raises(ValueError, match="begins once"):
         by_restart(time, 0)
 
 

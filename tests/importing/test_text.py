@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError, Table
-from campaign.importing.opening import open_recordings
 from tests.importing.files import CSV, GERMAN
 
 

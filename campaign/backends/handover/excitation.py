@@ -13,7 +13,6 @@ from campaign.axis_kind import sides_in
 from campaign.channels import COMMAND, VOCABULARY, AxisKind, info
 from campaign.channels import axis_of as axis_of_channel
 from campaign.importing.made import RigFacts
-from campaign.importing.rig_facts import rig_facts
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import Bench
 from campaign.recording import Array
@@ -60,7 +59,7 @@ def shown(trial: Trial, channel: str, value: float) -> str:
 def facts_of(trial: Trial) -> RigFacts:
     """What of the trial's bench makes one channel of another; nothing where there is no bench."""
     try:
-        return rig_facts(Bench.model_validate(trial.bench, context={"si": True}))
+        return RigFacts.of(Bench.model_validate(trial.bench, context={"si": True}))
     except ValidationError:
         return RigFacts()
 

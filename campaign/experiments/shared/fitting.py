@@ -119,13 +119,13 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     if options.loop == "closed":
         part = ROOM if rig.static_torque is None else 1.4 * ROOM
         left = rig.accelerated_by(rig.torque - worst_friction(bench, amplitude))
-        friction = "an unknown friction" if rig.static_torque is None else "friction"
+        holds = "an unknown friction" if rig.static_torque is None else "friction"
         choices.least(
             "max_acceleration",
             "deg/s^2",
             {
                 share("acceleration", 0.7): 0.7 * limits.acceleration,
-                f"{100 * part:.0f} % of what {friction} leaves of the torque": part * left,
+                f"{100 * part:.0f} % of what {holds} leaves of the torque": part * left,
             },
         )
     folds = "harmonics that friction makes fold onto the sine: of 100 samples the 99th, 1e-4 of it"

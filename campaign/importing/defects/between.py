@@ -138,7 +138,7 @@ def of_rate(
             f"{two} has the opposite sign of the derivative of {one} (factor {found.factor:.4g}, "
             f"R² {found.explained:.3f})"
         )
-        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE, "sign")
+        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE)
     yield from _factor(found, names, rows, gear)
     if found.explained > 0.9:
         apart = delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
@@ -171,7 +171,7 @@ def _factor(
     means = candidates(found.factor, found.error, gear)
     if len(means) == 1:
         what = f"{told}: {means[0]}"
-        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE, "times")
+        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE)
     elif means:
         what = f"{told}: either {', or '.join(means)}"
         yield Defect("factor", (two, one), what, rows, size, Severity.REFUSED)
@@ -224,4 +224,4 @@ def delay(
         f"({abs(lag) / step:.2g} samples): a delay or a filter"
     )
     severity = Severity.REPAIRABLE if is_long else Severity.NOTED
-    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), severity, "delay")
+    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), severity)

@@ -26,14 +26,12 @@ class Ticks:
         step: s between samples, as most of them have it; 0 where that cannot be told.
         resolution: s that all stamps are multiples of; 0 where they are as fine as numbers.
         gaps: rows behind which samples are missing.
-        missing: of each gap, how many.
         scatter: standard deviation of the steps beside gaps, beyond what rounding explains; s.
     """
 
     step: float
     resolution: float
     gaps: tuple[int, ...]
-    missing: tuple[int, ...]
     scatter: float
 
 
@@ -43,13 +41,13 @@ def ticks(time: Array) -> Ticks:
     wide = max(1, min(64, len(steps) // 4))
     step = float(np.median(time[wide:] - time[:-wide])) / wide if len(steps) else 0.0
     if step <= 0:
-        return Ticks(0.0, 0.0, (), (), 0.0)
+        return Ticks(0.0, 0.0, (), 0.0)
     resolution = _resolution(steps, step)
     beyond = np.maximum(np.abs(steps - step) - resolution, 0.0)
     usual = float(np.quantile(beyond, 0.9))
     slack = 1e-6 * step
     late = steps - step > max(0.5 * step, resolution + slack + 3 * usual)
-    gaps, missing = [], []
+    gaps = []
     shifted = time - step * np.arange(len(time))
     for row in np.flatnonzero(late).tolist():
         before = np.median(shifted[max(0, row - _BESIDE + 1) : row + 1])
@@ -57,14 +55,13 @@ def ticks(time: Array) -> Ticks:
         lost = round(min(float(after - before), float(steps[row]) - step) / step)
         if lost >= 1:
             gaps.append(row)
-            missing.append(lost)
     kept = np.delete(steps, gaps)
     scatter = float(np.std(kept)) if len(kept) else 0.0
     # Of two rounded stamps the difference scatters by their step / sqrt(6).
     scatter = float(np.sqrt(max(scatter**2 - resolution**2 / 6, 0.0)))
     if resolution and np.all(np.abs(kept - step) <= resolution + slack):
         scatter = 0.0
-    return Ticks(step, resolution, tuple(gaps), tuple(missing), scatter)
+    return Ticks(step, resolution, tuple(gaps), scatter)
 
 
 def _resolution(steps: Array, step: float) -> float:

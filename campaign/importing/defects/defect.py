@@ -14,6 +14,14 @@ MOST = 10
 """Places of one kind that are told one by one; of the others their number is."""
 
 
+_REMEDIES = {
+    "factor": "correct its 'unit' or 'times', or ",
+    "sign": "correct its 'sign', or ",
+    "delay": "put it back by 'delay', or ",
+    "wraparound": 'repair = ["unwrap"] makes it continuous, or ',
+}
+
+
 class Severity(StrEnum):
     """What a defect means for the recording."""
 
@@ -27,13 +35,12 @@ class Defect:
     """Something that is wrong with a recording, or that its reader should know.
 
     Attributes:
-        kind: a word of the field: `gap`, `clipping`.
-        channels: which it is about; none where it is about time.
+        kind: a word of the field, such as `clipping`.
+        channels: which it is about, first the one to correct.
         what: a sentence with its number.
         rows: the first and the last row, from 0.
-        size: the number that tells how much: of missing samples, of a factor, s of a delay.
+        size: the number that tells how much: of lost samples, of a factor, s of a delay.
         severity: what it means for the recording.
-        repair: the word of a mapping that is for it, `sign` or `unwrap`; "" where there is none.
     """
 
     kind: str
@@ -42,7 +49,12 @@ class Defect:
     rows: tuple[int, int]
     size: float
     severity: Severity
-    repair: str = ""
+
+    @property
+    def remedy(self) -> str:
+        """What a mapping can say about it."""
+        does = _REMEDIES.get(self.kind, "")
+        return f'{does}accept = ["{self.kind}"] takes it as it is'
 
 
 BETTER = 0.25
@@ -128,5 +140,6 @@ def rows_in_words(first: int, last: int) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """`1 sample`, `2 samples`."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """`1 sample`, `2 samples`, `2 stretches`."""
+    ending = "es" if noun.endswith("ch") else "s"
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}{ending}"

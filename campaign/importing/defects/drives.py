@@ -105,7 +105,7 @@ def of_drive_sign(
     if not proven:
         what += "; or something else drove, such as gravity or the hull"
     severity = Severity.REPAIRABLE if proven else Severity.NOTED
-    yield Defect("sign", names, what, (0, len(time) - 1), share, severity, "sign")
+    yield Defect("sign", names, what, (0, len(time) - 1), share, severity)
 
 
 def _mass_sign(time: Array, rate: Array, torque: Array) -> int:

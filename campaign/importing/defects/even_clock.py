@@ -7,13 +7,14 @@ the mapping does not ask for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from campaign.importing.defects.clock import SHORTEST, restarts, ticks
-from campaign.importing.defects.defect import Array, Defect, Severity, counted
+from campaign.importing.defects.clock import restarts, ticks
+from campaign.importing.defects.defect import Array, counted
 
 TOLERANCE = 0.25
 """of a sample by which a time may be off an even clock: half of what would name another sample."""
@@ -52,16 +53,6 @@ class EvenClock:
     remarks: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """What the steps between rows are; rows from the first of the recording."""
-
-    step: float  # the usual one (s)
-    back: tuple[int, ...]  # rows whose time is not after that of the row before
-    gaps: tuple[int, ...]  # rows before which rows are missing
-    undefined: tuple[int, ...]
-
-
 def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ()) -> EvenClock:
     """The clock of `rows` rows from row `first`.
 
@@ -86,19 +77,7 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
             return EvenClock(rate, start, rows, None, remarks)
     if rows > LONGEST:
         raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
-    clock = times(first, first + rows)
-    return _repaired(clock, first, _look(clock, first), repairs)
-
-
-def of_time(time: Array) -> Iterator[Defect]:
-    """What an import would refuse of times, shape (n,), s."""
-    rows = (0, len(time) - 1)
-    try:
-        if len(time) >= SHORTEST:
-            with np.errstate(all="ignore"):
-                even_clock(lambda first, stop: time[first:stop], 0, len(time))
-    except UnevenError as error:
-        yield Defect("uneven", (), str(error), rows, 0.0, Severity.REPAIRABLE, "repair")
+    return _repaired(times(first, first + rows), first, repairs)
 
 
 def _furthest(
@@ -125,35 +104,30 @@ def _furthest(
     return worst, row, total / rows, moment / square
 
 
-def _look(clock: Array, first: int) -> _Seen:
-    """What is wrong with times, shape (n,)."""
-    undefined = np.flatnonzero(~np.isfinite(clock))
+def _usual_step(clock: Array) -> float:
+    """Of times, shape (n,), all finite."""
     steps = np.diff(clock)
-    forward = steps[np.isfinite(steps) & (steps > 0)]
-    if not len(forward):
+    if not (steps > 0).any():
         raise UnevenError("its times do not go on: all rows have one time")
     # Of rounded times no step is the usual one: 2 and 3 ms at 430 Hz.
-    told = ticks(np.unique(clock[np.isfinite(clock)]))
-    step = told.step if told.resolution else float(np.median(forward))
-    back = np.flatnonzero(steps <= 0) + 1
-    gaps = np.flatnonzero(steps > GAP * step) + 1
-
-    def rows(found: np.ndarray) -> tuple[int, ...]:
-        return tuple(int(k) + first for k in found)
-
-    return _Seen(step, rows(back), rows(gaps), rows(undefined))
+    told = ticks(np.unique(clock))
+    return told.step if told.resolution else float(np.median(steps[steps > 0]))
 
 
-def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> EvenClock:
+def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
     """Raises UnevenError where `repairs` do not allow for what is wrong."""
     remarks: list[str] = []
-    keep = np.isfinite(clock)
-    if seen.undefined:
-        raise UnevenError(f"row {_told(seen.undefined)} {_has(seen.undefined)} no time")
-    if seen.back:
+    undefined = np.flatnonzero(~np.isfinite(clock)) + first
+    if len(undefined):
+        has = "has" if len(undefined) == 1 else "have"
+        raise UnevenError(f"row {_told(undefined)} {has} no time")
+    step = _usual_step(clock)
+    back = np.flatnonzero(np.diff(clock) <= 0) + 1 + first
+    rows = np.arange(len(clock))
+    if len(back):
         if anew := restarts(clock):
             raise UnevenError(
-                f"time begins anew in row {_told([first + k for k in anew])}: {len(anew) + 1} "
+                f"time begins anew in row {_told(np.array(anew) + first)}: {len(anew) + 1} "
                 "recordings in one file; 'restarts = true' under its [[test.recording]] makes a "
                 "trial of each, and so does 'each' with a column that numbers them"
             )
@@ -161,65 +135,59 @@ def _repaired(clock: Array, first: int, seen: _Seen, repairs: Sequence[str]) -> 
             raise UnevenError(coarse)
         if "drop repeated" not in repairs:
             raise UnevenError(
-                f"the time of row {_told(seen.back)} is not after that of the row before; "
+                f"the time of row {_told(back)} is not after that of the row before; "
                 'repair = ["drop repeated"] leaves such rows out'
             )
-        latest = np.maximum.accumulate(clock)
-        keep = np.concatenate([[True], clock[1:] > latest[:-1]])
-        remarks.append(
-            f"{int(np.sum(~keep))} rows were left out, whose time was no later: row "
-            f"{_told([first + int(k) for k in np.flatnonzero(~keep)])}"
-        )
-    rows = np.flatnonzero(keep).astype(np.float64)
-    clock = clock[keep]
-    if len(clock) < 2:
-        raise UnevenError("its times do not go on")
+        later = clock[1:] > np.maximum.accumulate(clock)[:-1]
+        rows = np.flatnonzero([True, *later])
+        left = np.flatnonzero(~later) + 1 + first
+        told = f"{len(left)} rows were left out, whose time was no later: row {_told(left)}"
+        remarks.append(told)
+        clock = clock[rows]
+        if len(clock) < 2:
+            raise UnevenError("its times do not go on")
     if "resample" in repairs:
-        return _resampled(clock, rows, seen.step, remarks)
-    return _marked(clock, rows, first, seen, repairs, remarks)
+        return _resampled(clock, rows.astype(np.float64), step, remarks)
+    return _marked(clock, rows, first, step, repairs, remarks)
 
 
 def _marked(
     clock: Array,
-    rows: Array,
+    rows: NDArray[np.intp],
     first: int,
-    seen: _Seen,
+    step: float,
     repairs: Sequence[str],
     remarks: list[str],
 ) -> EvenClock:
     """Each row on the sample it belongs to, and nothing where there is no row."""
-    number = np.concatenate(
-        [[0.0], np.cumsum(np.maximum(1.0, np.rint(np.diff(clock) / seen.step)))]
-    )
+    steps = np.diff(clock)
+    number = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.rint(steps / step)))])
     # The usual step is rounded as the times are; the line through all of them is not.
     slope = float(np.polynomial.Polynomial.fit(number, clock, 1).convert().coef[1])
     number = np.rint((clock - clock[0]) / slope)
     off = np.abs((clock - clock[0]) / slope - number)
-    even = len(np.unique(number)) == len(number) and float(off.max()) <= TOLERANCE
-    missing = int(number[-1]) + 1 - len(number)
-    if even and (not missing or "mark gaps" in repairs):
-        if not missing:
-            return EvenClock(1.0 / slope, float(clock[0]), len(clock), rows, tuple(remarks))
-        positions = np.full(int(number[-1]) + 1, np.nan)
-        positions[number.astype(int)] = rows
-        told = f"{missing} samples are missing and marked as lost, before row {_told(seen.gaps)}"
-        return EvenClock(1.0 / slope, float(clock[0]), len(positions), positions, (*remarks, told))
-    if even:
+    if len(np.unique(number)) < len(number) or float(off.max()) > TOLERANCE:
+        if coarse := _coarse(clock):
+            raise UnevenError(coarse)
+        spread = float(np.std(steps) / step)
+        worst = int(np.argmax(np.abs(steps - step)))
         raise UnevenError(
-            f"{missing} samples are missing, before row {_told(seen.gaps)}; "
-            'repair = ["mark gaps"] marks them as lost, and a trial for each stretch is had by '
-            "'start' and 'stop'"
+            f"its times are no even clock: steps vary by {100 * spread:.3g} % about {step:.6g} s, "
+            f"most by that of {steps[worst]:.6g} s before row {first + rows[worst + 1] + 1}; "
+            'repair = ["resample"] puts lines through the samples'
         )
-    if coarse := _coarse(clock):
-        raise UnevenError(coarse)
-    spread = float(np.std(np.diff(clock)) / seen.step)
-    worst = int(np.argmax(np.abs(np.diff(clock) - seen.step))) + 1
-    raise UnevenError(
-        f"its times are no even clock: steps vary by {100 * spread:.3g} % about {seen.step:.6g} s, "
-        f"most by that of {clock[worst] - clock[worst - 1]:.6g} s before row "
-        f"{first + int(rows[worst]) + 1}; "
-        'repair = ["resample"] puts lines through the samples'
-    )
+    positions = np.full(int(number[-1]) + 1, np.nan)
+    positions[number.astype(int)] = rows
+    if missing := len(positions) - len(rows):
+        before = _told(rows[1:][np.diff(number) > 1] + first)
+        if "mark gaps" not in repairs:
+            raise UnevenError(
+                f"{missing} samples are missing, before row {before}; "
+                'repair = ["mark gaps"] marks them as lost, and a trial for each stretch is had by '
+                "'start' and 'stop'"
+            )
+        remarks.append(f"{missing} samples are missing and marked as lost, before row {before}")
+    return EvenClock(1.0 / slope, float(clock[0]), len(positions), positions, tuple(remarks))
 
 
 def _coarse(clock: Array) -> str:
@@ -259,11 +227,7 @@ def _resampled(clock: Array, rows: Array, step: float, remarks: list[str]) -> Ev
     return EvenClock(1.0 / step, float(clock[0]), samples, positions, tuple(remarks))
 
 
-def _told(rows: Sequence[int]) -> str:
+def _told(rows: NDArray[np.intp]) -> str:
     """`17, 18, 40 and 12 more`, as people count: from 1."""
     told = ", ".join(str(row + 1) for row in rows[:3])
     return told if len(rows) <= 3 else f"{told} and {len(rows) - 3} more"
-
-
-def _has(rows: Sequence[int]) -> str:
-    return "has" if len(rows) == 1 else "have"

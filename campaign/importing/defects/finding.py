@@ -25,7 +25,6 @@ from campaign.channels import (
 from campaign.importing.defects.between import of_rate
 from campaign.importing.defects.defect import Array, Defect, Severity
 from campaign.importing.defects.drives import of_drive, of_drive_sign, of_twins
-from campaign.importing.defects.even_clock import of_time
 from campaign.importing.defects.late import of_drive_delay
 from campaign.importing.defects.rates import frozen, slower
 from campaign.importing.defects.samples import continuous, of_channel
@@ -47,19 +46,16 @@ def find(
     """What is wrong with a recording, the worst first.
 
     Args:
-        time: shape (n,), s.
+        time: shape (n,), s, even.
         channels: by their name in the vocabulary, each shape (n,), in one system of units.
         gear: ratio of motor to load, where it is known.
     """
-    found = [*_absurd({"time": time, **channels})]
-    if any(not each.channels for each in found):
-        return tuple(found)
+    found = [*_absurd(channels)]
     channels = {
         name: np.where(np.isinf(values), np.nan, values)  # infinity was never measured
         for name, values in channels.items()
         if not any(name in each.channels for each in found)
     }
-    found += of_time(time)
     sound = {}
     # What follows a command that is drawn by lines is drawn by lines, too.
     drawn = {
@@ -79,7 +75,7 @@ def find(
     for name in DRIVES:
         if name in sound:
             found += of_drive(name, sound[name])
-    if np.isfinite(time).all() and len(time) > 1 and np.all(np.diff(time) >= 0):
+    if len(time) > 1:
         found += _between(time, sound, gear)
     return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))
 
@@ -91,9 +87,8 @@ def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
         if len(beyond):
             first, last = int(beyond[0]), int(beyond[-1])
             what = f"{name} is {values[first]:.3g} in row {first + 1}: no measurement is that large"
-            about = () if name == "time" else (name,)
             size = float(values[first])
-            yield Defect("absurd", about, what, (first, last), size, Severity.REFUSED)
+            yield Defect("absurd", (name,), what, (first, last), size, Severity.REFUSED)
 
 
 def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> list[Defect]:
@@ -136,7 +131,7 @@ def _motion(time: Array, channels: Mapping[str, Array]) -> tuple[str, Array | No
         if rate in channels:
             return rate, channels.get(angle), channels[rate]
     for angle, _ in _DERIVATIVES:
-        if angle in channels and len(time) > 2 and time[-1] > time[0]:
+        if angle in channels and len(time) > 2:
             there = channels[angle]
             step = float(time[-1] - time[0]) / (len(time) - 1)
             return f"the derivative of {angle}", there, np.gradient(there, step)

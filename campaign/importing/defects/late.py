@@ -69,7 +69,7 @@ def of_drive_delay(
         f"{one} comes {abs(lag):.3g} s {where} the motion of {two}, which explains "
         f"{100 * explained[peak]:.3g} % of it then, and {100 * explained[most]:.3g} % as it is"
     )
-    yield Defect("delay", names, what, (0, n - 1), lag, Severity.REPAIRABLE, "delay")
+    yield Defect("delay", names, what, (0, n - 1), lag, Severity.REPAIRABLE)
 
 
 def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
@@ -79,8 +79,8 @@ def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
     what is left, as a share of how the whole torque varies: of a part that is steady, nothing.
     """
     width = len(rate) - 2 * most
-    largest = float(np.abs(rate).max()) or 1.0
-    parts = np.stack([rate, np.gradient(rate), np.tanh(rate / (RISE * largest))])
+    rise = RISE * float(np.abs(rate).max()) or 1.0
+    parts = np.stack([rate, np.gradient(rate), np.tanh(rate / rise)])
     parts = parts[:, most : most + width]
     reach = np.abs(parts).max(axis=1)
     parts = parts - parts.mean(axis=1, keepdims=True)

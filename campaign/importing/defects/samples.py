@@ -1,4 +1,4 @@
-"""What is wrong with a channel by itself: lost samples, dropouts, clipping, wraparound, steps.
+"""What is wrong with a channel by itself: lost samples, dropouts, clipping, wraparound.
 
 Standing still is no defect, however long: what only a motion would show is judged by how a channel
 enters and leaves the stretch in question.
@@ -19,7 +19,6 @@ from campaign.importing.defects.defect import (
     counted,
     rows_in_words,
     runs,
-    step_size,
     usual_step,
 )
 
@@ -52,26 +51,14 @@ def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Def
         yield Defect("lost", (name,), what, ends, float(len(lost)), Severity.NOTED)
     if len(values) < 2:
         return
-    level = values[known][0]
-    if np.all(values[known] == level):
-        what = f"{name} is {level:g} throughout"
-        yield Defect("constant", (name,), what, rows, float(level), Severity.NOTED)
+    if np.ptp(values[known]) == 0:  # standing still is no defect
         return
-    yield from _quantised(name, values)
     turns = list(_wraparound(name, values)) if angle else []
     yield from turns
     if not turns:
         yield from _zeros(name, values)
         yield from _spikes(name, values)
     yield from _limit_of_integers(name, values)
-
-
-def _quantised(name: str, values: Array) -> Iterator[Defect]:
-    step = step_size(values)
-    span = float(np.ptp(values[np.isfinite(values)]))
-    if step > 1e-6 * span:
-        what = f"{name} comes in steps of {step:.6g}, {span / step + 1:.0f} of them in its range"
-        yield Defect("quantisation", (name,), what, (0, len(values) - 1), step, Severity.NOTED)
 
 
 def _wraparound(name: str, values: Array) -> Iterator[Defect]:
@@ -93,7 +80,7 @@ def _wraparound(name: str, values: Array) -> Iterator[Defect]:
                 f"the first behind row {jumps[0] + 1}"
             )
             where = (int(jumps[0]), int(jumps[-1]) + 1)
-            yield Defect("wraparound", (name,), what, where, scale, Severity.REPAIRABLE, "unwrap")
+            yield Defect("wraparound", (name,), what, where, scale, Severity.REPAIRABLE)
             return
 
 
@@ -163,7 +150,7 @@ def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Def
     rest = stretches[MOST:]
     if rest:
         samples = sum(last - first + 1 for first, last in rest)
-        what = f"{name} {does} in {counted(len(rest), 'further stretch').replace('chs', 'ches')}"
+        what = f"{name} {does} in {counted(len(rest), 'further stretch')}"
         ends = (rest[0][0], rest[-1][1])
         yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE)
 

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
-from campaign.importing.dialect import SEPARATORS, Dialect, dialect_of, encoding_of
-from campaign.importing.interface import HEAD, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, encoding_of_file
+from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
+from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
+from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file
 from campaign.importing.stacked import stacked
 
 SAMPLE = 400
@@ -25,34 +24,19 @@ def tables(path: Path) -> Sequence[Table]:
     if dialect is None:
         separators = ", ".join(SEPARATORS.values())
         message = f"no table of numbers, separated by {separators}, was found in it"
-        raise RecordingError([Problem(path, 0, 0, message)])
-    below = stacked(path, encoding, dialect, sample)
-    if not below:
-        read = partial(blocks, path, encoding, dialect)
-        return (Table("", _columns(dialect), read, said=dialect.said, doubts=dialect.doubts),)
+        raise RecordingError.of(path, message)
+    found = stacked(path, encoding, dialect, sample)
     return tuple(
         Table(
-            f"block {number}",
-            _columns(each.dialect),
+            f"block {number}" if len(found) > 1 else "",
+            columns_of(each.dialect),
             partial(blocks, path, encoding, each.dialect, rows=each.lines),
             rows=each.rows,
             said=each.dialect.said,
             doubts=dialect.doubts,
-            below=True,
+            below=len(found) > 1,
         )
-        for number, each in enumerate(below, start=1)
-    )
-
-
-def _columns(dialect: Dialect) -> tuple[Column, ...]:
-    count = len(dialect.numeric)
-    names = dialect.names or ("",) * count
-    names = tuple(name or f"column {k}" for k, name in enumerate(names, start=1))
-    return tuple(
-        Column(name, unit, f"column {k}", numeric)
-        for k, (name, unit, numeric) in enumerate(
-            zip(names, dialect.units, dialect.numeric, strict=True), start=1
-        )
+        for number, each in enumerate(found, start=1)
     )
 
 

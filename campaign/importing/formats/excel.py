@@ -9,26 +9,25 @@ from __future__ import annotations
 import datetime as dt
 import zipfile
 from collections.abc import Container, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, is_unit, plain, value_of
-from campaign.importing.dialect import Dialect, letters, read_as
+from campaign.importing.dialect import Dialect, read_as
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
     Array,
-    Column,
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
-from campaign.importing.rows import blocks_of
+from campaign.importing.rows import blocks_of, columns_of
 from campaign.importing.streaming import tables_streamed
 
 SAMPLE = 200
@@ -43,15 +42,15 @@ Cells = Sequence[Any]
 def tables(path: Path) -> Sequence[Table]:
     """The tables of a workbook, in the process that asks."""
     _check_size(path)
-    with _opened(path) as book:
-        found = [each for sheet in book.worksheets for each in _table(path, sheet)]
+    with _opened(path) as book, _opened(path, values=False) as asked:
+        found = [t for sheet in book.worksheets for t in _table(path, sheet, asked[sheet.title])]
     if not found:
-        raise _error(path, "no sheet of it has a table of numbers")
+        raise RecordingError.of(path, "no sheet of it has a table of numbers")
     return found
 
 
-def _table(path: Path, sheet: Any) -> Iterator[Table]:
-    """The table of a sheet, if it has one."""
+def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
+    """The table of a sheet, if it has one; `formulas`: the sheet with those in place of values."""
     sample = list(islice(_rows(sheet), SAMPLE))
     texts = [[_text(cell) for cell in cells] for cells in sample]
     width = max((k + 1 for cells in texts for k, cell in enumerate(cells) if cell), default=0)
@@ -64,23 +63,17 @@ def _table(path: Path, sheet: Any) -> Iterator[Table]:
     body = [[*cells, *[None] * width][:width] for cells in sample[dialect.first - 1 :]]
     moments = {k for cells in body for k, cell in enumerate(cells) if isinstance(cell, _MOMENTS)}
     commas = {k for cells in body for k, cell in enumerate(cells) if _has_comma(cell)}
-    names = [
-        (dialect.names[k] if dialect.names else "") or f"column {letters(k)}"
-        for k in range(len(dialect.numeric))
+    columns = [
+        replace(column, unit=column.unit or "s") if k in moments else column
+        for k, column in enumerate(columns_of(dialect))
     ]
     doubts = []
     if commas:
-        told = ", ".join(names[k] for k in sorted(commas))
+        told = ", ".join(columns[k].name for k in sorted(commas))
         doubts.append(f"numbers of {told} are text with a decimal comma")
     if moments:
         doubts.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
-    columns = (
-        Column(name, unit or ("s" if k in moments else ""), f"column {letters(k)}", numeric)
-        for k, (name, unit, numeric) in enumerate(
-            zip(names, dialect.units, dialect.numeric, strict=True)
-        )
-    )
-    _check_formulas(path, dialect)
+    _check_formulas(path, dialect, sample, formulas)
     yield Table(
         sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=tuple(doubts)
     )
@@ -157,34 +150,24 @@ def _heading(rows: list[list[str]], start: int) -> list[list[str]]:
 
 def _check_size(path: Path) -> None:
     """A small file may unpack to more than a machine holds."""
-    try:
-        with zipfile.ZipFile(path) as packed:
-            sizes = {each.filename: each.file_size for each in packed.infolist()}
-    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
-        raise _error(path, f"this workbook cannot be unpacked: {error}") from None
+    with read_by("zipfile", path, "workbook"), zipfile.ZipFile(path) as packed:
+        sizes = {each.filename: each.file_size for each in packed.infolist()}
     shared = max((size for name, size in sizes.items() if "sharedStrings" in name), default=0)
     if shared > LARGEST_PART or sum(sizes.values()) > MOST_UNPACKED:
-        raise _error(path, f"it unpacks to {sum(sizes.values()) / 1e9:.3g} GB, which is too much")
+        raise RecordingError.of(
+            path, f"it unpacks to {sum(sizes.values()) / 1e9:.3g} GB, which is too much"
+        )
 
 
 @contextmanager
 def _opened(path: Path, values: bool = True) -> Iterator[Any]:
     """A workbook; with its formulas in place of their values if `values` is false."""
-    try:
+    with read_by("openpyxl", path, "workbook", "excel"):
         import openpyxl
-    except ImportError:
-        raise _error(path, "Excel files need openpyxl: pip install 'campaign[excel]'") from None
-    try:
+
         book = openpyxl.load_workbook(path, read_only=True, data_only=values, keep_links=False)
-        try:
+        with closing(book):
             yield book
-        finally:
-            book.close()
-    except RecordingError:
-        raise
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise _error(path, f"this workbook cannot be read ({why[:300]})") from None
 
 
 def _rows(sheet: Any) -> Iterator[Cells]:
@@ -193,29 +176,24 @@ def _rows(sheet: Any) -> Iterator[Cells]:
     return rows
 
 
-def _check_formulas(path: Path, dialect: Dialect) -> None:
+def _check_formulas(path: Path, dialect: Dialect, sample: Sequence[Cells], formulas: Any) -> None:
     """Raises RecordingError for a formula among the first rows whose value is not in the file."""
-    with _opened(path) as book, _opened(path, values=False) as asked:
-        told, written = (
-            islice(_rows(each[dialect.sheet]), dialect.first - 1, dialect.first - 1 + SAMPLE)
-            for each in (book, asked)
-        )
-        for row, (values, texts) in enumerate(zip(told, written, strict=False), dialect.first):
-            for place, text in enumerate(texts):
-                value = values[place] if place < len(values) else None
-                if value is None and isinstance(text, str) and text.startswith("="):
-                    message = "a formula whose value is not in the file; open and save it in Excel"
-                    raise RecordingError([dialect.problem(path, row, message, place=place)])
-
-
-def _error(path: Path, message: str) -> RecordingError:
-    return RecordingError([Problem(path, 0, 0, message)])
+    written = islice(_rows(formulas), dialect.first - 1, None)
+    told = zip(sample[dialect.first - 1 :], written, strict=False)
+    for row, (values, texts) in enumerate(told, dialect.first):
+        for place, text in enumerate(texts):
+            value = values[place] if place < len(values) else None
+            if value is None and isinstance(text, str) and text.startswith("="):
+                message = "a formula whose value is not in the file; open and save it in Excel"
+                raise RecordingError([dialect.problem(path, row, message, place=place)])
 
 
 def _tables(path: Path) -> Sequence[Table]:
     with path.open("rb") as file:
         if file.read(len(_OLD)) == _OLD:
-            raise _error(path, "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx")
+            raise RecordingError.of(
+                path, "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx"
+            )
     return tables_streamed(__name__, path)
 
 

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
-from campaign.importing.arrays import WIDEST, Named, tables_of
-from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table
+from campaign.importing.arrays import OPAQUE, WIDEST, Named, tables_of
+from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table, read_by
 from campaign.importing.streaming import tables_streamed
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -27,10 +26,6 @@ CLASS = "MATLAB_class"
 PLAIN = {"double", "single", "logical", "int8", "int16", "int32", "int64"}
 PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
 """MATLAB's classes of numbers."""
-OPAQUE = (
-    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
-    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y', '-v7.3')"
-)
 
 
 def tables(path: Path) -> Sequence[Table]:
@@ -39,18 +34,12 @@ def tables(path: Path) -> Sequence[Table]:
 
     arrays: list[Named] = []
     said: dict[str, str] = {}
-    try:
-        with h5py.File(path, "r") as file:
-            for name, dataset in _datasets(file, said):
-                _sort_out(path, name, dataset, arrays, said)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        # What h5py makes of files that are no longer what they were.
-        raise RecordingError(
-            [Problem(path, 0, 0, f"this HDF5 file cannot be read: {error}")]
-        ) from None
+    with read_by("h5py", path, "HDF5 file"), h5py.File(path, "r") as file:
+        for name, dataset in _datasets(file, said):
+            _sort_out(path, name, dataset, arrays, said)
     if not arrays:
         message = said.pop("", "no dataset of it is a series of numbers")
-        raise RecordingError([Problem(path, 0, 0, message)])
+        raise RecordingError.of(path, message)
     return tables_of(arrays, said)
 
 
@@ -126,15 +115,12 @@ def _named(path: Path, name: str, dataset: Any, matlab: bool) -> Named:
 def _part(path: Path, name: str, along: int, start: int, stop: int) -> Array:
     import h5py
 
-    try:
-        with h5py.File(path, "r") as file:
-            dataset = file[name]
-            where = [slice(None)] * dataset.ndim
-            where[along] = slice(start, stop)
-            values = np.moveaxis(dataset[tuple(where)], along, 0)
-    except (OSError, RuntimeError, KeyError) as error:
-        message = f"{name} cannot be read from sample {start}: {error}"
-        raise RecordingError([Problem(path, 0, 0, message)]) from None
+    what = f"HDF5 file: {name}, from sample {start},"
+    with read_by("h5py", path, what), h5py.File(path, "r") as file:
+        dataset = file[name]
+        where = [slice(None)] * dataset.ndim
+        where[along] = slice(start, stop)
+        values = np.moveaxis(dataset[tuple(where)], along, 0)
     series: Array = values.reshape(stop - start, -1).astype(np.float64)
     return series
 

@@ -7,150 +7,133 @@ heading are plain text tables.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
-from campaign.importing.interface import (
-    Array,
-    Clock,
-    Column,
-    RecordingError,
-    RecordingFormat,
-    Table,
-)
+from campaign.importing.interface import Clock, Column, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import blocks, encoding_of_file, lines_of
 
 MARK = "LabVIEW Measurement"
 END = "***End_of_Header***"
 SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
 TIMES = "X_Value"
+_FACT = re.compile(r"([^\t,;]+)([\t,;])(.*)")
 
 
 @dataclass
 class _Block:
     """A block as its heading tells it; `rows` counts what follows."""
 
+    name: str
     heading: dict[str, list[str]]
-    titles: list[str] = field(default_factory=list)
-    first: int = 0
+    titles: list[str]
+    first: int
     rows: int = 0
 
 
 def _tables(path: Path) -> Sequence[Table]:
     encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
-        said, found = _blocks(path, lines_of(file, path))
-    _check(path, found)
-    separator = SEPARATORS.get(said.get("Separator", "Tab").lower(), "\t")
+        lines = enumerate(lines_of(file, path), start=1)
+        said = _said(lines)
+        separator = SEPARATORS.get(said.get("Separator", "Tab").lower(), "\t")
+        found = _blocks(path, lines, separator)
     decimal = said.get("Decimal_Separator", ".")
     if decimal not in (".", ","):
         message = f"Decimal_Separator is {decimal!r}, and not a point or a comma"
-        raise RecordingError([Problem(path, 0, 0, message)])
-    return [
-        table
-        for number, block in enumerate(found, start=1)
-        for table in _of_block(path, encoding, (separator, decimal), said, block, number)
-    ]
-
-
-def _blocks(path: Path, lines: Iterator[str]) -> tuple[dict[str, str], list[_Block]]:
-    """What the file says of itself, and its blocks."""
-    said: dict[str, str] = {}
-    found: list[_Block] = []
-    heading: dict[str, list[str]] = {}
-    separator, state = "\t", "file"
-    for number, line in enumerate(lines, start=1):
-        if number == 1 and "," in line and "\t" not in line:
-            separator = ","
-        cells = split(line, separator)
-        if not any(cells):
-            state = "between" if state == "rows" else state
-        elif cells[0] == END:
-            state, heading = ("between", {}) if state == "file" else ("titles", heading)
-        elif state == "file":
-            said[cells[0]] = separator.join(cells[1:]).strip(separator)
-            if cells[0] == "Separator" and len(cells) > 1:
-                separator = SEPARATORS.get(cells[1].lower(), separator)
-        elif state == "titles":
-            found.append(_Block(heading, cells, number + 1))
-            state, heading = "rows", {}
-        elif state == "between" and found and not heading and _is_row(cells):
-            message = "a row of numbers behind an empty line, which ends a block"
-            raise RecordingError([Problem(path, number, 1, message)])
-        elif state == "rows" and cells[0] != "Channels":
-            found[-1].rows += 1
-        else:
-            state = "between"
-            heading[cells[0]] = cells[1:]
-    return said, found
-
-
-def _check(path: Path, found: Sequence[_Block]) -> None:
+        raise RecordingError.of(path, message)
     if not found:
-        raise RecordingError([Problem(path, 0, 0, f"no block ended its heading with {END}")])
+        raise RecordingError.of(path, f"no block ended its heading with {END}")
+    tables: list[Table] = []
     for block in found:
         if not block.rows:
-            raise RecordingError([Problem(path, block.first, 1, "a block without any row")])
+            raise RecordingError.of(path, "a block without any row", block.first)
+        dialect = Dialect.of_numbers(separator, decimal, block.first, block.titles)
+        tables += _of_block(path, encoding, dialect, said, block)
+    return tables
+
+
+def _said(lines: Iterator[tuple[int, str]]) -> dict[str, str]:
+    """What the file says of itself, up to the end of its own heading."""
+    said: dict[str, str] = {}
+    for _, line in lines:
+        if line.startswith(END):
+            break
+        if fact := _FACT.match(line):
+            key, separator, value = fact.groups()
+            said[key] = value.strip(f"{separator} ")
+    return said
+
+
+def _blocks(path: Path, lines: Iterator[tuple[int, str]], separator: str) -> list[_Block]:
+    found: list[_Block] = []
+    heading: dict[str, list[str]] = {}
+    titled = inside = False
+    for number, line in lines:
+        cells = split(line, separator)
+        if not any(cells):
+            inside = False
+        elif cells[0] == END:
+            titled, inside = True, False
+        elif titled:
+            titles = [title for title in cells if title]
+            titles = titles[:-1] if titles[-1] == "Comment" else titles
+            found.append(_Block(f"block {len(found) + 1}", heading, titles, number + 1))
+            titled, inside, heading = False, True, {}
+        elif inside and cells[0] != "Channels":
+            found[-1].rows += 1
+        elif found and not heading and _is_row(cells):
+            message = "a row of numbers behind an empty line, which ends a block"
+            raise RecordingError.of(path, message, number)
+        else:
+            inside = False
+            heading[cells[0]] = cells[1:]
+    return found
 
 
 def _is_row(cells: Sequence[str]) -> bool:
-    given = [cell for cell in cells if cell]
-    return bool(given) and all(is_number(cell, ".") or is_number(cell, ",") for cell in given)
+    return all(is_number(cell, ".") or is_number(cell, ",") for cell in cells if cell)
 
 
 def _of_block(
-    path: Path,
-    encoding: str,
-    notation: tuple[str, str],
-    said: dict[str, str],
-    block: _Block,
-    number: int,
+    path: Path, encoding: str, dialect: Dialect, said: dict[str, str], block: _Block
 ) -> Iterator[Table]:
     """The tables of one block: one, but for channels with clocks of their own."""
-    separator, decimal = notation
-    titles = [title for title in block.titles if title]
-    if titles and titles[-1] == "Comment":
-        titles.pop()
-    width = len(titles)
-    dialect = Dialect(
-        separator, decimal, block.first, width, tuple(titles), ("",) * width, (True,) * width,
-        comments=True,
-    )  # fmt: skip
-    units = [*block.heading.get("Y_Unit_Label", []), *[""] * width]
-    name = f"block {number}"
-
-    def table(places: Sequence[int], first: int, clock: Clock | None, part: str = "") -> Table:
-        """Columns of the file at `places`, times first unless a clock tells them."""
-        columns = [
-            Column(titles[place], units[first + k], f"{name}, column {place + 1}")
-            for k, place in enumerate(places if clock else places[1:])
-        ]
-        if clock is None:
-            columns.insert(0, Column("time", "s", f"{name}, column {places[0] + 1}"))
-        read = partial(_chosen, path, encoding, dialect, block.rows, places)
-        title = f"{name}, {part}" if part else name
-        return Table(title, tuple(columns), read, clock, block.rows, said)
-
-    times = said.get("X_Columns", "One").lower()
+    titles, times = block.titles, said.get("X_Columns", "One").lower()
+    channels = list(range(1, len(titles), 2 if times == "multi" else 1))
+    clocks: list[Clock | int] = [0] * len(channels)
     if times == "multi":
-        for k, place in enumerate(range(0, width - 1, 2)):
-            yield table((place, place + 1), k, None, titles[place + 1])
+        clocks = [place - 1 for place in channels]
     elif times == "no":
         # The column of times is there all the same, and empty.
         channels = [place for place, title in enumerate(titles) if title != TIMES]
-        clocks = _clocks(path, block, decimal, len(channels))
-        if len(set(clocks)) == 1:
-            yield table(channels, 0, clocks[0])
-        else:
-            for k, place in enumerate(channels):
-                yield table((place,), k, clocks[k], titles[place])
-    else:
-        yield table(range(width), 0, None)
+        clocks = [*_clocks(path, block, dialect.decimal, len(channels))]
+    units = [*block.heading.get("Y_Unit_Label", []), *[""] * len(titles)]
+    for clock in dict.fromkeys(clocks):
+        own = [k for k, each in enumerate(clocks) if each == clock]
+        places = [channels[k] for k in own]
+        part = "" if len(own) == len(channels) else f", {', '.join(titles[p] for p in places)}"
+        columns = [Column(titles[channels[k]], units[k], _place(block, channels[k])) for k in own]
+        if isinstance(clock, int):
+            columns.insert(0, Column("time", "s", _place(block, clock)))
+            places.insert(0, clock)
+        yield Table(
+            f"{block.name}{part}",
+            tuple(columns),
+            partial(blocks, path, encoding, dialect, rows=block.rows, among=places),
+            clock if isinstance(clock, Clock) else None,
+            block.rows,
+            said,
+        )
+
+
+def _place(block: _Block, column: int) -> str:
+    return f"{block.name}, column {column + 1}"
 
 
 def _clocks(path: Path, block: _Block, decimal: str, count: int) -> list[Clock]:
@@ -163,18 +146,7 @@ def _clocks(path: Path, block: _Block, decimal: str, count: int) -> list[Clock]:
         return [Clock(step, start) for step, start in zip(steps, starts, strict=True)]
     except (KeyError, ValueError):
         message = "the heading of the block above states no X0 and Delta_X of each channel"
-        raise RecordingError([Problem(path, block.first, 1, message)]) from None
-
-
-def _chosen(
-    path: Path,
-    encoding: str,
-    dialect: Dialect,
-    rows: int,
-    of_file: Sequence[int],
-    places: Sequence[int],
-) -> Iterator[Array]:
-    return blocks(path, encoding, dialect, [of_file[place] for place in places], rows)
+        raise RecordingError.of(path, message, block.first) from None
 
 
 FORMAT = RecordingFormat(

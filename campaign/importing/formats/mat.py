@@ -16,14 +16,14 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from campaign.errors import Problem
-from campaign.importing.arrays import Named, named, table_of, tables_of
+from campaign.importing.arrays import OPAQUE, Named, named, table_of, tables_of
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 from campaign.importing.streaming import tables_streamed
 
@@ -32,11 +32,6 @@ MOST_TIMES = 100
 _COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
 """Structures within each other."""
-OPAQUE = (
-    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
-    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y')"
-)
-
 OBJECT = "an object of a MATLAB class, which other programs cannot read"
 """What is said of one that stands beside numbers."""
 NOTHING = "no variable of it is a series of numbers"
@@ -47,13 +42,9 @@ def tables(path: Path) -> Sequence[Table]:
     from scipy.io import loadmat
 
     _check_size(path)
-    try:
+    with read_by("scipy", path, "MAT file of version 4 to 7.2"):
         # mat_dtype: whole numbers were written as bytes; their differences would wrap around.
         found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
-    except Exception as error:  # noqa: BLE001 - scipy raises whatever a broken file leads it to
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        message = f"this is no MAT file of version 4 to 7.2 that can be read ({why})"
-        raise RecordingError([Problem(path, 0, 0, message)]) from None
     whole: list[Table] = []
     arrays: list[Named] = []
     said: dict[str, str] = {}
@@ -66,7 +57,7 @@ def tables(path: Path) -> Sequence[Table]:
     if not whole:
         shown = next((name for name in objects if not name.startswith(("None", "__"))), "")
         message = f"{shown or 'a variable'} {OPAQUE}" if objects else NOTHING
-        raise RecordingError([Problem(path, 0, 0, message)])
+        raise RecordingError.of(path, message)
     return whole
 
 
@@ -79,7 +70,7 @@ def _check_size(path: Path) -> None:
             unpacked += count
             if unpacked > most:
                 message = f"it unpacks to more than {most / 1e9:.3g} GB, which is too much"
-                raise RecordingError([Problem(path, 0, 0, message)])
+                raise RecordingError.of(path, message)
 
 
 def _unpacking(file: BinaryIO) -> Iterator[int]:

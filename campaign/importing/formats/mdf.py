@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import (
     ROWS,
     Array,
@@ -23,6 +21,7 @@ from campaign.importing.interface import (
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 from campaign.importing.streaming import tables_streamed
 
@@ -30,14 +29,6 @@ MAGIC = (b"MDF     3.", b"MDF     4.")
 UNFINISHED = b"UnFinMF "
 DENSEST = 1100
 """Times its size that compressed data can unpack to."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where a channel is; the clock of its group has no index of its own here."""
-
-    group: int
-    index: int | None
 
 
 def tables(path: Path) -> Sequence[Table]:
@@ -51,22 +42,22 @@ def tables(path: Path) -> Sequence[Table]:
             size = each.channel_group.samples_byte_nr + each.channel_group.invalidation_bytes_nr
             if rows * size > DENSEST * path.stat().st_size:
                 told = f"group {group + 1} says that it has {rows} samples of {size} bytes"
-                raise _error(path, f"{told}, more than are in a file of this size")
+                raise RecordingError.of(path, f"{told}, more than are in a file of this size")
             columns, places = _columns(file, group, each)
             if any(column.numeric for column in columns[1:]):
                 name = str(getattr(each.channel_group, "acq_name", "") or f"group {group + 1}")
-                read = partial(_read, path, places, rows)
+                read = partial(_read, path, group, places, rows)
                 found.append(Table(name, tuple(columns), read, rows=rows))
     if not found:
-        raise _error(path, "no group of it has a series of numbers")
+        raise RecordingError.of(path, "no group of it has a series of numbers")
     return found
 
 
-def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[_Place]]:
-    """The clock first, then the channels as they come; two may have one name."""
+def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[int | None]]:
+    """The clock first, then the channels as they come, by index; two may have one name."""
     where = f"group {group + 1}"
     columns = [Column("time", "s", f"{where}, its clock")]
-    places = [_Place(group, None)]
+    places: list[int | None] = [None]
     master = file.masters_db.get(group)
     for index, channel in enumerate(of.channels):
         if index == master:
@@ -75,35 +66,32 @@ def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[_Place]
         usable = first.samples.dtype.kind in "fiub" and first.samples.ndim == 1
         unit = str(first.unit or "")
         columns.append(Column(str(channel.name), unit, f"{where}, channel {index}", usable))
-        places.append(_Place(group, index))
+        places.append(index)
     return columns, places
 
 
 def _read(
-    path: Path, places: Sequence[_Place], rows: int, wanted: Sequence[int]
+    path: Path, group: int, places: Sequence[int | None], rows: int, wanted: Sequence[int]
 ) -> Iterator[Array]:
     with _opened(path) as file:
         for start in range(0, rows, ROWS):
             count = min(ROWS, rows - start)
-            chosen = (places[place] for place in wanted)
-            series = [_part(file, place, start, count) for place in chosen]
+            series = [_part(file, group, places[place], start, count) for place in wanted]
             there = min((len(each) for each in series), default=count)
             if there < count:
-                message = (
-                    f"group {places[0].group + 1} ends after {start + there} of {rows} samples"
-                )
-                raise _error(path, message)
+                message = f"group {group + 1} ends after {start + there} of {rows} samples"
+                raise RecordingError.of(path, message)
             yield np.column_stack(series) if series else np.empty((count, 0))
 
 
-def _part(file: Any, place: _Place, start: int, count: int) -> Array:
-    """Physical values; those that the file marks as invalid are lost."""
-    if place.index is None:
-        times = file.get_master(place.group, record_offset=start, record_count=count)
+def _part(file: Any, group: int, index: int | None, start: int, count: int) -> Array:
+    """Physical values of a channel, or the clock; those marked as invalid are lost."""
+    if index is None:
+        times = file.get_master(group, record_offset=start, record_count=count)
         return np.asarray(times, dtype=np.float64)
     signal = file.get(
-        group=place.group,
-        index=place.index,
+        group=group,
+        index=index,
         record_offset=start,
         record_count=count,
         ignore_invalidation_bits=False,
@@ -116,28 +104,19 @@ def _part(file: Any, place: _Place, start: int, count: int) -> Array:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    try:
+    with read_by("asammdf", path, "MDF file", "mdf"):
         from asammdf import MDF
-    except ImportError:
-        raise _error(path, "MDF needs asammdf: pip install 'campaign[mdf]'") from None
-    try:
+
         with MDF(path) as file:
             yield file
-    except RecordingError:
-        raise
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise _error(path, f"this MDF file cannot be read ({why[:300]})") from None
-
-
-def _error(path: Path, message: str) -> RecordingError:
-    return RecordingError([Problem(path, 0, 0, message)])
 
 
 def _tables(path: Path) -> Sequence[Table]:
     with path.open("rb") as file:
         if file.read(len(UNFINISHED)) == UNFINISHED:
-            raise _error(path, "its recording was never finished: let its program mend it first")
+            raise RecordingError.of(
+                path, "its recording was never finished: let its program mend it first"
+            )
     return tables_streamed(__name__, path)
 
 

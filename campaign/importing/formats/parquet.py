@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import (
     ROWS,
     Array,
@@ -17,54 +16,44 @@ from campaign.importing.interface import (
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 MAGIC = b"PAR1"
+_reading = partial(read_by, "pyarrow", what="Parquet file", extra="parquet")
 OURS = frozenset({"pandas", "ARROW:schema"})
 """What libraries say to each other in the file's metadata."""
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    try:
-        import pyarrow as pa
+    with _reading(path):
         from pyarrow import parquet
-    except ImportError:
-        message = "Parquet needs pyarrow: pip install 'campaign[parquet]'"
-        raise RecordingError([Problem(path, 0, 0, message)]) from None
-    try:
+
         with parquet.ParquetFile(path) as file:
             schema, rows = file.schema_arrow, file.metadata.num_rows
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise _broken(path, error) from None
     columns = tuple(
         Column(each.name, _unit(each), f"column {place}", _is_numeric(each))
         for place, each in enumerate(schema, start=1)
     )
     if not any(column.numeric for column in columns):
-        raise RecordingError([Problem(path, 0, 0, "no column of it holds numbers")])
+        raise RecordingError.of(path, "no column of it holds numbers")
     said = {name: text for name, text in _texts(schema.metadata).items() if name not in OURS}
     return [Table("", columns, partial(_read, path), rows=rows, said=said)]
 
 
 def _read(path: Path, places: Sequence[int]) -> Iterator[Array]:
-    import pyarrow as pa
-    from pyarrow import parquet
+    with _reading(path):
+        import pyarrow as pa
+        from pyarrow import parquet
 
-    try:
         with parquet.ParquetFile(path) as file:
             # By place: two columns may have one name.
             for batch in file.iter_batches(ROWS, use_threads=False):
                 columns = (batch.column(place).cast(pa.float64(), safe=False) for place in places)
                 yield np.column_stack([each.to_numpy(zero_copy_only=False) for each in columns])
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise _broken(path, error) from None
-
-
-def _broken(path: Path, error: Exception) -> RecordingError:
-    return RecordingError([Problem(path, 0, 0, f"this Parquet file cannot be read: {error}")])
 
 
 def _is_numeric(field: pa.Field) -> bool:

@@ -8,14 +8,14 @@ Sequence,Volt,Volt,-1.000e-03,2.000e-06
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from campaign.errors import Problem
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
-from campaign.importing.interface import Clock, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, encoding_of_file
+from campaign.importing.interface import Clock, RecordingError, RecordingFormat, Table
+from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file
 
 _INDEX = "X,"
 _CLOCK = ("Start", "Increment")
@@ -25,19 +25,14 @@ def _tables(path: Path) -> Sequence[Table]:
     encoding = encoding_of_file(path)
     with path.open(encoding=encoding) as file:
         lines = beginning(file, path, 3)
-    names, units, first = ([*split(line, ",")] for line in [*lines, "", ""][:3])
+    names, units, first = (split(line, ",") for line in [*lines, "", ""][:3])
     count = names.index(_CLOCK[0])
     clock = _clock(path, names, units)
-    width = len(first)
-    if width < count or not all(is_number(cell, ".") for cell in first[:count]):
-        raise RecordingError([Problem(path, 3, 1, "no row of numbers follows the heading")])
-    dialect = Dialect(
-        ",", ".", 3, width, tuple(names[:count]), ("",) * count, (True,) * count
-    )  # fmt: skip
-    columns = tuple(
-        Column(names[k], units[k] if k else "", f"column {k + 1}") for k in range(count)
-    )
-    return [Table("", columns, partial(blocks, path, encoding, dialect), clock)]
+    if len(first) < count or not all(is_number(cell, ".") for cell in first[:count]):
+        raise RecordingError.of(path, "no row of numbers follows the heading", 3)
+    dialect = Dialect.of_numbers(",", ".", 3, names[:count])
+    dialect = replace(dialect, units=("", *units[1:count]))
+    return [Table("", columns_of(dialect), partial(blocks, path, encoding, dialect), clock)]
 
 
 def _clock(path: Path, names: Sequence[str], units: Sequence[str]) -> Clock:
@@ -47,7 +42,7 @@ def _clock(path: Path, names: Sequence[str], units: Sequence[str]) -> Clock:
         start = step = float("nan")
     if not step > 0:
         message = f"below {' and '.join(_CLOCK)} there is no time of the first sample, and no step"
-        raise RecordingError([Problem(path, 2, 1, message)])
+        raise RecordingError.of(path, message, 2)
     return Clock(step, start)
 
 

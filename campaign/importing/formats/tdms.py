@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.interface import (
     ROWS,
     Array,
@@ -22,21 +21,20 @@ from campaign.importing.interface import (
     RecordingError,
     RecordingFormat,
     Table,
+    read_by,
 )
 from campaign.importing.streaming import tables_streamed
 
 MAGIC = b"TDSm"
+_reading = partial(read_by, "npTDMS", what="TDMS file", extra="tdms")
 
 
 def tables(path: Path) -> Sequence[Table]:
     """What is in a file, in the process that asks."""
-    try:
-        from nptdms import TdmsFile
-    except ImportError:
-        message = "TDMS needs npTDMS: pip install 'campaign[tdms]'"
-        raise RecordingError([Problem(path, 0, 0, message)]) from None
     alike: dict[tuple[str, int, Clock | None, str], list[tuple[str, Any]]] = {}
-    try:
+    with _reading(path):
+        from nptdms import TdmsFile
+
         with TdmsFile.open(path) as file:
             said = {str(name): str(value) for name, value in file.properties.items()}
             for group in file.groups():
@@ -47,10 +45,8 @@ def tables(path: Path) -> Sequence[Table]:
                         start = told.get("wf_start_time")
                         key = (group.name, len(channel), clock, str(start))
                         alike.setdefault(key, []).append((channel.name, told.get("unit_string")))
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        raise _broken(path, error) from None
     if not alike:
-        raise RecordingError([Problem(path, 0, 0, "no channel of it is a series of numbers")])
+        raise RecordingError.of(path, "no channel of it is a series of numbers")
     return [
         Table(
             str(group),
@@ -75,9 +71,9 @@ def _clock(told: Any) -> Clock | None:
 def _read(
     path: Path, group: str, names: Sequence[str], length: int, places: Sequence[int]
 ) -> Iterator[Array]:
-    from nptdms import TdmsFile
+    with _reading(path):
+        from nptdms import TdmsFile
 
-    try:
         with TdmsFile.open(path) as file:
             channels = [file[group][names[place]] for place in places]
             for start in range(0, length, ROWS):
@@ -86,13 +82,6 @@ def _read(
                     # Scaled, as the file says how; raw counts are nobody's quantity.
                     [np.asarray(channel[start:stop], dtype=np.float64) for channel in channels]
                 )
-    except Exception as error:  # noqa: BLE001 - whatever a broken file leads the library to
-        raise _broken(path, error) from None
-
-
-def _broken(path: Path, error: Exception) -> RecordingError:
-    why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return RecordingError([Problem(path, 0, 0, f"this TDMS file cannot be read ({why})")])
 
 
 FORMAT = RecordingFormat(

@@ -13,16 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.errors import Problem
 from campaign.importing.cells import NO_UNIT, is_lost, is_number, is_unit
 from campaign.importing.dialect import Dialect, split
-from campaign.importing.interface import (
-    Array,
-    Column,
-    RecordingError,
-    RecordingFormat,
-    Table,
-)
+from campaign.importing.interface import Array, Column, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import beginning, blocks, encoding_of_file
 
 NAME = "Name"
@@ -38,39 +31,30 @@ def _tables(path: Path) -> Sequence[Table]:
     separator = next((each for each in SEPARATORS if lines[0].startswith(f"{NAME}{each}")), "\t")
     rows = [split(line, separator) for line in lines]
     headed = next((k for k, cells in enumerate(rows) if k and cells[0] == NAME), None)
-    said = {cells[0]: cells[1] for cells in rows[:headed] if len(cells) > 1 and cells[0]}
     if headed is None:
-        raise RecordingError([Problem(path, 0, 0, f"no row of the channels begins with {NAME!r}")])
-    facts: dict[str, list[str]] = {}
-    first = None
-    for number, cells in enumerate(rows[headed:], start=headed + 1):
-        decimal = _decimal(cells)
-        if decimal:
-            first = number
-            break
-        if cells[0]:
-            facts[cells[0]] = cells
-    if first is None or decimal is None:
-        raise RecordingError([Problem(path, headed + 1, 1, "no row of numbers follows")])
-    names = facts[NAME]
-    width = len(names)
-    while width > 1 and not names[width - 1]:
-        width -= 1
-    dialect = Dialect(
-        separator, decimal, first, width, tuple(names[:width]), ("",) * width, (True,) * width,
-        comments=True,
-    )  # fmt: skip
+        raise RecordingError.of(path, f"no row of the channels begins with {NAME!r}")
+    said = {cells[0]: cells[1] for cells in rows[:headed] if len(cells) > 1 and cells[0]}
+    first = next((k for k in range(headed, len(rows)) if _decimal(rows[k])), None)
+    if first is None:
+        raise RecordingError.of(path, "no row of numbers follows", headed + 1)
+    names = rows[headed]
+    while not names[-1]:
+        names.pop()
+    facts = {
+        cells[0]: [*cells, *[""] * len(names)][: len(names)]
+        for cells in rows[headed:first]
+        if cells[0]
+    }
+    dialect = Dialect.of_numbers(separator, _decimal(rows[first]), first + 1, names)
     return list(_by_clock(path, encoding, dialect, facts, said))
 
 
-def _decimal(cells: Sequence[str]) -> str | None:
-    """The decimal sign of a row of numbers; None for any other row."""
+def _decimal(cells: Sequence[str]) -> str:
+    """The decimal sign of a row of numbers; "" for any other row."""
     given = [cell for cell in cells if not is_lost(cell)]
-    for decimal in ",.":
-        if given and all(is_number(cell, decimal) for cell in given):
-            # Without any decimals either will do; times of whole milliseconds say nothing.
-            return "," if any("," in cell for cell in given) else "."
-    return None
+    # Without any decimals either will do; times of whole milliseconds say nothing.
+    decimal = "," if any("," in cell for cell in given) else "."
+    return decimal if given and all(is_number(cell, decimal) for cell in given) else ""
 
 
 def _by_clock(
@@ -78,55 +62,44 @@ def _by_clock(
 ) -> Iterator[Table]:
     starts = [place for place, name in enumerate(dialect.names) if name == NAME]
     for start, end in zip(starts, [*starts[1:], dialect.width], strict=True):
-        places = range(start, end)
-        if len(places) < 2:
+        channels = range(start + 1, end)
+        if not channels:
             continue
         columns = (
             Column("time", "ms", f"column {start + 1}"),
-            *(_channel(facts, place) for place in places[1:]),
+            *(Column(dialect.names[k], _unit(facts, k), f"column {k + 1}") for k in channels),
         )
-        read = partial(_rows, path, encoding, dialect, list(places))
-        name = "" if len(starts) == 1 else ", ".join(dialect.names[k] for k in places[1:])
-        yield Table(name, columns, read, said=_said(facts, said, places[1:]))
+        # Whether values are scaled is not told.
+        of_channels = {
+            f"{row} of {dialect.names[k]}": cells[k]
+            for row, cells in facts.items()
+            for k in channels
+            if row != NAME and cells[k]
+        }
+        read = partial(_rows, path, encoding, dialect, range(start, end))
+        name = "" if len(starts) == 1 else ", ".join(dialect.names[k] for k in channels)
+        yield Table(name, columns, read, said={**said, **of_channels})
 
 
-def _channel(facts: dict[str, list[str]], place: int) -> Column:
-    def fact(name: str) -> str:
-        cells = facts.get(name, [])
-        return cells[place] if place < len(cells) else ""
-
-    # `Nm (Torque)`: the unit, and what it is of.
-    unit = fact("Unit").split(" (")[0].strip()
-    usable = unit.lower() not in NO_UNIT and is_unit(unit)
-    return Column(fact(NAME), unit if usable else "", f"column {place + 1}")
-
-
-def _said(
-    facts: dict[str, list[str]], said: dict[str, str], places: Sequence[int]
-) -> dict[str, str]:
-    """What the file says of itself, and of its channels; whether values are scaled is not told."""
-    of_channels = {
-        f"{row} of {facts[NAME][place]}": cells[place]
-        for row, cells in facts.items()
-        for place in places
-        if row != NAME and place < len(cells) and cells[place]
-    }
-    return {**said, **of_channels}
+def _unit(facts: dict[str, list[str]], place: int) -> str:
+    """Of a channel; `Nm (Torque)` is the unit, and what it is of."""
+    unit = facts["Unit"][place].split(" (")[0].strip() if "Unit" in facts else ""
+    return unit if unit.lower() not in NO_UNIT and is_unit(unit) else ""
 
 
 def _rows(
-    path: Path, encoding: str, dialect: Dialect, of_file: list[int], places: Sequence[int]
+    path: Path, encoding: str, dialect: Dialect, among: Sequence[int], places: Sequence[int]
 ) -> Iterator[Array]:
     """A clock that ends before others leaves its cells empty, from there to the end of the file."""
     over, row = False, dialect.first
-    for block in blocks(path, encoding, dialect, [of_file[0], *(of_file[p] for p in places)]):
+    for block in blocks(path, encoding, dialect, [0, *places], among=among):
         timed = np.isfinite(block[:, 0])
         count = 0 if over else len(timed) if timed.all() else int(np.argmin(timed))
         left = np.flatnonzero(np.isfinite(block[count:]).any(axis=1))
         if len(left):
             at = row + count + int(left[0])
             message = "values without a time beside them, or after an end of their times"
-            raise RecordingError([Problem(path, at, 1, message)])
+            raise RecordingError.of(path, message, at)
         over = over or count < len(timed)
         yield block[:count, 1:]
         row += len(block)

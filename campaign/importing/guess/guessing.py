@@ -14,6 +14,7 @@ import numpy as np
 
 from campaign.importing.cutting import restarts
 from campaign.importing.defects.clock import ticks
+from campaign.importing.formats import open_recordings
 from campaign.importing.guess import numbers
 from campaign.importing.guess.axes import axes
 from campaign.importing.guess.columns import Basis, ColumnGuess, Guess, TableGuess
@@ -21,7 +22,6 @@ from campaign.importing.guess.names import BY_UNIT, common_path, named
 from campaign.importing.guess.relations import Series, with_roles, with_units
 from campaign.importing.guess.words import INDEX, TIME, UNKNOWN
 from campaign.importing.interface import Array, Column, Table
-from campaign.importing.opening import open_recordings
 from campaign.unit_grammar import parse_unit
 
 SAMPLE = 200_000
