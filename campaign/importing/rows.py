@@ -117,28 +117,25 @@ def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> A
     text = "".join(lines)
     separator = None if dialect.separator == " " else dialect.separator
     if separator is None:
-        cells = sum(map(len, map(str.split, lines)))
+        cells = [len(line.split()) for line in lines]
     else:
-        cells = text.count(separator) + len(lines)
-    # Cells that are too many would be dropped; points beside decimal commas may group thousands.
-    grouped = dialect.decimal == "," and "." in text
-    even = cells == dialect.width * len(lines)
-    if not (even or dialect.comments) or '"' in text or grouped:
+        cells = [line.count(separator) + 1 for line in lines]
+    # Cells that are too many would be dropped, and lacking ones not be missed.
+    odd = min(cells) < dialect.width or (max(cells) > dialect.width and not dialect.comments)
+    # Points beside decimal commas may group thousands.
+    if odd or '"' in text or (dialect.decimal == "," and "." in text):
         return None
-    # A row may go on after its cells, but must have them all.
-    wanted = places if even else [*places, dialect.width - 1]
     try:
         values = np.loadtxt(
             StringIO(text.replace(",", ".") if dialect.decimal == "," else text),
             delimiter=separator,
-            usecols=wanted,
+            usecols=places,
             comments=None,
             ndmin=2,
         )
     except ValueError:
         return None
-    whole = np.isfinite(values).all() and len(values) == len(lines)
-    return values[:, : len(places)] if whole else None
+    return values if np.isfinite(values).all() and len(values) == len(lines) else None
 
 
 def _row_by_row(
