@@ -53,13 +53,12 @@ class RecordingReader:
         """Samples [first, stop) of some channels, shape (channels, stop - first)."""
         return np.array([self._channel(self._made[name], first, stop) for name in names])
 
-    def recording(self, names: Collection[str] | None = None) -> Recording:
-        """All samples of some channels, or of all."""
+    def recording(self, names: Collection[str]) -> Recording:
+        """All samples of some channels."""
         count = self.described.samples
-        chosen = self._made if names is None else {n: self._made[n] for n in names}
+        samples = zip(names, self.samples(names, 0, count), strict=True)
         channels: dict[str, Channel] = {
-            name: made.info.with_samples(self._channel(made, 0, count))
-            for name, made in chosen.items()
+            name: self._made[name].info.with_samples(values) for name, values in samples
         }
         return Recording(np.arange(count) / self.described.sample_rate, channels)
 

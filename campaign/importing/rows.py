@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from io import StringIO
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -35,28 +34,28 @@ def encoding_of_file(path: Path) -> str:
         return encoding_of(head, whole=not raw.read(1))
 
 
-def lines_of(file: TextIO, path: Path) -> Iterator[str]:
+def lines_of(path: Path) -> Iterator[str]:
     """Lines of a bounded length. Raises RecordingError for others, and for what is no text."""
     number = 0
-    try:
-        while line := file.readline(LONGEST):
-            number += 1
-            if len(line) == LONGEST:
-                raise RecordingError.of(
-                    path, f"a line of over {LONGEST} characters: no table", number
-                )
-            if "\0" in line:
-                at = line.index("\0") + 1
-                raise RecordingError.of(path, "a zero byte: this is no text", number, at)
-            yield line
-    except UnicodeDecodeError as error:
-        message = f"the text is not {error.encoding}: {error.reason}"
-        raise RecordingError.of(path, message, number + 1, 0) from None
+    with path.open(encoding=encoding_of_file(path)) as file:
+        try:
+            while line := file.readline(LONGEST):
+                number += 1
+                if len(line) == LONGEST:
+                    message = f"a line of over {LONGEST} characters: no table"
+                    raise RecordingError.of(path, message, number)
+                if "\0" in line:
+                    at = line.index("\0") + 1
+                    raise RecordingError.of(path, "a zero byte: this is no text", number, at)
+                yield line
+        except UnicodeDecodeError as error:
+            message = f"the text is not {error.encoding}: {error.reason}"
+            raise RecordingError.of(path, message, number + 1, 0) from None
 
 
-def beginning(file: TextIO, path: Path, count: int) -> list[str]:
+def beginning(path: Path, count: int) -> list[str]:
     """The first lines of a file, fewer where they are long. Raises RecordingError as `lines_of`."""
-    return _up_to(lines_of(file, path), count, SAMPLE)
+    return _up_to(lines_of(path), count, SAMPLE)
 
 
 def _up_to(lines: Iterator[str], count: int, size: int) -> list[str]:
@@ -82,7 +81,6 @@ def columns_of(dialect: Dialect) -> tuple[Column, ...]:
 
 def blocks(
     path: Path,
-    encoding: str,
     dialect: Dialect,
     places: Sequence[int],
     rows: int | None = None,
@@ -95,10 +93,9 @@ def blocks(
         among: columns of the file that the table has; absent: all.
     """
     places = places if among is None else [among[place] for place in places]
-    with path.open(encoding=encoding) as file:
-        last = None if rows is None else dialect.first - 1 + rows
-        lines = islice(lines_of(file, path), dialect.first - 1, last)
-        yield from blocks_of(lines, path, dialect, places)
+    last = None if rows is None else dialect.first - 1 + rows
+    lines = islice(lines_of(path), dialect.first - 1, last)
+    yield from blocks_of(lines, path, dialect, places)
 
 
 def blocks_of(
@@ -120,28 +117,25 @@ def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> A
     text = "".join(lines)
     separator = None if dialect.separator == " " else dialect.separator
     if separator is None:
-        cells = sum(map(len, map(str.split, lines)))
+        cells = [len(line.split()) for line in lines]
     else:
-        cells = text.count(separator) + len(lines)
-    # Cells that are too many would be dropped; points beside decimal commas may group thousands.
-    grouped = dialect.decimal == "," and "." in text
-    even = cells == dialect.width * len(lines)
-    if not (even or dialect.comments) or '"' in text or grouped:
+        cells = [line.count(separator) + 1 for line in lines]
+    # Cells that are too many would be dropped, and lacking ones not be missed.
+    odd = min(cells) < dialect.width or (max(cells) > dialect.width and not dialect.comments)
+    # Points beside decimal commas may group thousands.
+    if odd or '"' in text or (dialect.decimal == "," and "." in text):
         return None
-    # A row may go on after its cells, but must have them all.
-    wanted = places if even else [*places, dialect.width - 1]
     try:
         values = np.loadtxt(
             StringIO(text.replace(",", ".") if dialect.decimal == "," else text),
             delimiter=separator,
-            usecols=wanted,
+            usecols=places,
             comments=None,
             ndmin=2,
         )
     except ValueError:
         return None
-    whole = np.isfinite(values).all() and len(values) == len(lines)
-    return values[:, : len(places)] if whole else None
+    return values if np.isfinite(values).all() and len(values) == len(lines) else None
 
 
 def _row_by_row(

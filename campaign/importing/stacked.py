@@ -13,7 +13,7 @@ from pathlib import Path
 from campaign.importing.cells import is_lost, is_number, name_and_unit
 from campaign.importing.dialect import Dialect, said_above
 from campaign.importing.heading import heading
-from campaign.importing.rows import lines_of
+from campaign.importing.rows import encoding_of_file, lines_of
 
 ABOVE = 100
 """Lines above a heading that are kept for what they say."""
@@ -31,7 +31,7 @@ class Block:
     rows: int | None = None
 
 
-def stacked(path: Path, encoding: str, dialect: Dialect, sample: Sequence[str]) -> list[Block]:
+def stacked(path: Path, dialect: Dialect, sample: Sequence[str]) -> list[Block]:
     """The tables below each other, or the only one, given how the first is read.
 
     Args:
@@ -40,8 +40,8 @@ def stacked(path: Path, encoding: str, dialect: Dialect, sample: Sequence[str]) 
     Raises RecordingError for what is no text.
     """
     title = _title(dialect, sample)
-    again = title and _again(path, encoding, title)
-    found = list(_blocks(path, encoding, dialect, title)) if again else []
+    again = title and _again(path, title)
+    found = list(_blocks(path, dialect, title)) if again else []
     return found if len(found) > 1 else [Block(dialect)]
 
 
@@ -56,9 +56,9 @@ def _title(dialect: Dialect, sample: Sequence[str]) -> str:
     return ""
 
 
-def _again(path: Path, encoding: str, title: str) -> bool:
+def _again(path: Path, title: str) -> bool:
     """Whether a line begins as that heading twice; found without reading lines."""
-    codec = encoding.removesuffix("-sig")
+    codec = encoding_of_file(path).removesuffix("-sig")
     if codec.startswith("utf-16"):
         return False
     needle = title.encode(codec)
@@ -67,26 +67,25 @@ def _again(path: Path, encoding: str, title: str) -> bool:
         return first >= 0 and content.find(b"\n" + needle, first) >= 0
 
 
-def _blocks(path: Path, encoding: str, dialect: Dialect, title: str) -> Iterator[Block]:
+def _blocks(path: Path, dialect: Dialect, title: str) -> Iterator[Block]:
     above: list[str] = []
     titles: list[str] = []
     own, first, last, rows = dialect, 0, 0, 0
-    with path.open(encoding=encoding) as file:
-        for number, line in enumerate(lines_of(file, path), start=1):
-            bare = line.rstrip("\r\n")
-            if bare != title and titles and _is_row(dialect, line):
-                if not first:
-                    own, first = _headed(dialect, titles, above, number), number
-                last, rows = number, rows + 1
-            elif bare == title or (first and bare.strip()):
-                if first:
-                    yield Block(own, last - first + 1, rows)
-                    above, first, rows = [], 0, 0
-                titles = [bare] if bare == title else []
-                above += [] if titles else [line]
-            elif bare.strip():
-                (titles if titles else above).append(bare)
-                del above[:-ABOVE]
+    for number, line in enumerate(lines_of(path), start=1):
+        bare = line.rstrip("\r\n")
+        if bare != title and titles and _is_row(dialect, line):
+            if not first:
+                own, first = _headed(dialect, titles, above, number), number
+            last, rows = number, rows + 1
+        elif bare == title or (first and bare.strip()):
+            if first:
+                yield Block(own, last - first + 1, rows)
+                above, first, rows = [], 0, 0
+            titles = [bare] if bare == title else []
+            above += [] if titles else [line]
+        elif bare.strip():
+            (titles if titles else above).append(bare)
+            del above[:-ABOVE]
     if first:
         yield Block(own, last - first + 1, rows)
 

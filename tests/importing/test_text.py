@@ -176,3 +176,12 @@ def test_broken_rows_at_the_beginning_are_no_heading(path, broken):
     rows = [(broken if k < 100 else "{k},{k},{k}").format(k=k) for k in range(400)]
     with pytest.raises(RecordingError, match=rf"{path}:2:"):
         table(path, "t,a,b\n" + "\n".join(rows) + "\n").whole()
+
+
+def test_a_row_too_long_does_not_make_up_for_one_too_short(path):
+    rows = [f"{k / 100},{k},1" for k in range(100)]
+    rows[60:62] = ["0.6,60,1,1", "0.61,61"]
+    found = table(path, "\n".join(["time [s],rate [deg/s],torque [N m]", *rows, ""]))
+    with pytest.raises(RecordingError) as refused:
+        found.whole([0, 1])
+    assert [problem.line for problem in refused.value.problems] == [62, 63]

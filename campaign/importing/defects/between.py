@@ -29,17 +29,15 @@ _LIKE = 0.98
 _UNEXPLAINED = 0.1
 """How far a factor may be from 1 before it needs an explanation: filters and noise cost some."""
 
-DEG = 180 / math.pi
+_TURN = {"rad": 2 * math.pi, "deg": 360.0, "turns": 1.0}
+_TURN_PER_S = {"rad/s": 2 * math.pi, "deg/s": 360.0, "rpm": 60.0, "turns per s": 1.0}
 FACTORS = (
-    (DEG, "the rate is in deg/s, the angle in rad"),
-    (1 / DEG, "the rate is in rad/s, the angle in deg"),
-    (30 / math.pi, "the rate is in rpm, the angle in rad"),
-    (1 / 6, "the rate is in rpm, the angle in deg"),
-    (60.0, "the rate is in rpm, the angle in turns"),
-    (2 * math.pi, "the rate is in rad/s, the angle in turns"),
-    (1 / (2 * math.pi), "the rate is in turns per s, the angle in rad"),
-    (360.0, "the rate is in deg/s, the angle in turns"),
-    (1 / 360.0, "the rate is in turns per s, the angle in deg"),
+    *(
+        (per_s / turn, f"the rate is in {rate}, the angle in {angle}")
+        for angle, turn in _TURN.items()
+        for rate, per_s in _TURN_PER_S.items()
+        if per_s != turn
+    ),
     (1000.0, "time is in ms, or the rate in thousandths of the angle's unit"),
     (1e-3, "the angle is in thousandths of the rate's unit"),
 )

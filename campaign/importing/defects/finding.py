@@ -71,10 +71,9 @@ def find(
         found += own
         scale = next((each.size for each in own if each.kind == "wraparound"), None)
         sound[name] = values if scale is None else continuous(values, scale)
-    found += frozen({name: v for name, v in sound.items() if name not in TOLD})
-    for name in DRIVES:
-        if name in sound:
-            found += of_drive(name, sound[name])
+    for name, values in sound.items():
+        found += frozen(name, values) if name not in TOLD else ()
+        found += of_drive(name, values) if name in DRIVES else ()
     if len(time) > 1:
         found += _between(time, sound, gear)
     return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))

@@ -56,35 +56,34 @@ def _rhythm(places: NDArray[np.intp], length: int) -> int:
     return period if phases.max() >= _REGULAR * len(places) and happened > 0.2 else 0
 
 
-def frozen(channels: dict[str, Array]) -> Iterator[Defect]:
-    """Channels with noise that stand still for a while, and then jump: nothing came from them.
+def frozen(name: str, values: Array) -> Iterator[Defect]:
+    """Where a channel with noise stands still for a while, and then jumps: nothing came from it.
 
     Noise seldom repeats itself; how seldom, the rest of the channel tells.
     """
-    for name, values in channels.items():
-        if len(values) < 100 or not np.isfinite(values).all():
-            continue
-        same = np.diff(values) == 0
-        share = float(same.mean())
-        if share > 0.2:
-            continue
-        size = np.abs(np.diff(values))
-        usual = float(np.median(size[size > 0])) if (size > 0).any() else 0.0
-        peak = float(np.abs(values).max())
-        found = []
-        for first, last in runs(same):
-            length = last - first + 1
-            # Chance of such a run anywhere, were repetitions independent of each other.
-            chance = len(values) * max(share, 1.0 / len(values)) ** length
-            leap = float(size[last + 1]) if last + 1 < len(size) else 0.0
-            # A filter that has run out rests at next to nothing, and not in the middle of motion.
-            rests = abs(values[first]) <= 1e-6 * peak
-            moved = first >= 4 and not same[first - 4 : first].any() and not rests
-            if length >= 4 and moved and chance < 1e-6 and leap > 5 * usual:
-                found.append((first + 1, last + 1))
-        # What happens all the time is how the channel is made: a rate from counts, say.
-        if len(found) <= MOST:
-            yield from dropouts(name, found, "stands still")
+    if len(values) < 100 or not np.isfinite(values).all():
+        return
+    size = np.abs(np.diff(values))
+    same = size == 0
+    share = float(same.mean())
+    if share > 0.2:
+        return
+    usual = float(np.median(size[size > 0]))
+    peak = float(np.abs(values).max())
+    found = []
+    for first, last in runs(same):
+        length = last - first + 1
+        # Chance of such a run anywhere, were repetitions independent of each other.
+        chance = len(values) * max(share, 1.0 / len(values)) ** length
+        leap = float(size[last + 1]) if last + 1 < len(size) else 0.0
+        # A filter that has run out rests at next to nothing, and not in the middle of motion.
+        rests = abs(values[first]) <= 1e-6 * peak
+        moved = first >= 4 and not same[first - 4 : first].any() and not rests
+        if length >= 4 and moved and chance < 1e-6 and leap > 5 * usual:
+            found.append((first + 1, last + 1))
+    # What happens all the time is how the channel is made: a rate from counts, say.
+    if len(found) <= MOST:
+        yield from dropouts(name, found, "stands still")
 
 
 def _ordinal(number: int) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
 from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file
+from campaign.importing.rows import beginning, blocks, columns_of
 from campaign.importing.stacked import stacked
 
 SAMPLE = 400
@@ -17,20 +17,18 @@ SAMPLE = 400
 
 def tables(path: Path) -> Sequence[Table]:
     """The table of a text file, or those below each other. Raises RecordingError."""
-    encoding = encoding_of_file(path)
-    with path.open(encoding=encoding) as file:
-        sample = beginning(file, path, SAMPLE)
+    sample = beginning(path, SAMPLE)
     dialect = dialect_of(sample)
     if dialect is None:
         separators = ", ".join(SEPARATORS.values())
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError.of(path, message)
-    found = stacked(path, encoding, dialect, sample)
+    found = stacked(path, dialect, sample)
     return tuple(
         Table(
             f"block {number}" if len(found) > 1 else "",
             columns_of(each.dialect),
-            partial(blocks, path, encoding, each.dialect, rows=each.lines),
+            partial(blocks, path, each.dialect, rows=each.lines),
             rows=each.rows,
             said=each.dialect.said,
             doubts=dialect.doubts,

@@ -16,7 +16,7 @@ from pathlib import Path
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import Clock, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import blocks, encoding_of_file, lines_of
+from campaign.importing.rows import blocks, lines_of
 
 MARK = "LabVIEW Measurement"
 END = "***End_of_Header***"
@@ -37,12 +37,10 @@ class _Block:
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    encoding = encoding_of_file(path)
-    with path.open(encoding=encoding) as file:
-        lines = enumerate(lines_of(file, path), start=1)
-        said = _said(lines)
-        separator = SEPARATORS.get(said.get("Separator", "Tab").lower(), "\t")
-        found = _blocks(path, lines, separator)
+    lines = enumerate(lines_of(path), start=1)
+    said = _said(lines)
+    separator = SEPARATORS.get(said.get("Separator", "Tab").lower(), "\t")
+    found = _blocks(path, lines, separator)
     decimal = said.get("Decimal_Separator", ".")
     if decimal not in (".", ","):
         message = f"Decimal_Separator is {decimal!r}, and not a point or a comma"
@@ -54,7 +52,7 @@ def _tables(path: Path) -> Sequence[Table]:
         if not block.rows:
             raise RecordingError.of(path, "a block without any row", block.first)
         dialect = Dialect.of_numbers(separator, decimal, block.first, block.titles)
-        tables += _of_block(path, encoding, dialect, said, block)
+        tables += _of_block(path, dialect, said, block)
     return tables
 
 
@@ -100,9 +98,7 @@ def _is_row(cells: Sequence[str]) -> bool:
     return all(is_number(cell, ".") or is_number(cell, ",") for cell in cells if cell)
 
 
-def _of_block(
-    path: Path, encoding: str, dialect: Dialect, said: dict[str, str], block: _Block
-) -> Iterator[Table]:
+def _of_block(path: Path, dialect: Dialect, said: dict[str, str], block: _Block) -> Iterator[Table]:
     """The tables of one block: one, but for channels with clocks of their own."""
     titles, times = block.titles, said.get("X_Columns", "One").lower()
     channels = list(range(1, len(titles), 2 if times == "multi" else 1))
@@ -125,7 +121,7 @@ def _of_block(
         yield Table(
             f"{block.name}{part}",
             tuple(columns),
-            partial(blocks, path, encoding, dialect, rows=block.rows, among=places),
+            partial(blocks, path, dialect, rows=block.rows, among=places),
             clock if isinstance(clock, Clock) else None,
             block.rows,
             said,

@@ -15,16 +15,14 @@ from pathlib import Path
 from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import Clock, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file
+from campaign.importing.rows import beginning, blocks, columns_of
 
 _INDEX = "X,"
 _CLOCK = ("Start", "Increment")
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    encoding = encoding_of_file(path)
-    with path.open(encoding=encoding) as file:
-        lines = beginning(file, path, 3)
+    lines = beginning(path, 3)
     names, units, first = (split(line, ",") for line in [*lines, "", ""][:3])
     count = names.index(_CLOCK[0])
     clock = _clock(path, names, units)
@@ -32,7 +30,7 @@ def _tables(path: Path) -> Sequence[Table]:
         raise RecordingError.of(path, "no row of numbers follows the heading", 3)
     dialect = Dialect.of_numbers(",", ".", 3, names[:count])
     dialect = replace(dialect, units=("", *units[1:count]))
-    return [Table("", columns_of(dialect), partial(blocks, path, encoding, dialect), clock)]
+    return [Table("", columns_of(dialect), partial(blocks, path, dialect), clock)]
 
 
 def _clock(path: Path, names: Sequence[str], units: Sequence[str]) -> Clock:

@@ -16,7 +16,7 @@ import numpy as np
 from campaign.importing.cells import NO_UNIT, is_lost, is_number, is_unit
 from campaign.importing.dialect import Dialect, split
 from campaign.importing.interface import Array, Column, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, encoding_of_file
+from campaign.importing.rows import beginning, blocks
 
 NAME = "Name"
 SEPARATORS = "\t;,"
@@ -25,9 +25,7 @@ LONGEST_HEADING = 200
 
 
 def _tables(path: Path) -> Sequence[Table]:
-    encoding = encoding_of_file(path)
-    with path.open(encoding=encoding) as file:
-        lines = beginning(file, path, LONGEST_HEADING)
+    lines = beginning(path, LONGEST_HEADING)
     separator = next((each for each in SEPARATORS if lines[0].startswith(f"{NAME}{each}")), "\t")
     rows = [split(line, separator) for line in lines]
     headed = next((k for k, cells in enumerate(rows) if k and cells[0] == NAME), None)
@@ -46,7 +44,7 @@ def _tables(path: Path) -> Sequence[Table]:
         if cells[0]
     }
     dialect = Dialect.of_numbers(separator, _decimal(rows[first]), first + 1, names)
-    return list(_by_clock(path, encoding, dialect, facts, said))
+    return list(_by_clock(path, dialect, facts, said))
 
 
 def _decimal(cells: Sequence[str]) -> str:
@@ -58,7 +56,7 @@ def _decimal(cells: Sequence[str]) -> str:
 
 
 def _by_clock(
-    path: Path, encoding: str, dialect: Dialect, facts: dict[str, list[str]], said: dict[str, str]
+    path: Path, dialect: Dialect, facts: dict[str, list[str]], said: dict[str, str]
 ) -> Iterator[Table]:
     starts = [place for place, name in enumerate(dialect.names) if name == NAME]
     for start, end in zip(starts, [*starts[1:], dialect.width], strict=True):
@@ -76,7 +74,7 @@ def _by_clock(
             for k in channels
             if row != NAME and cells[k]
         }
-        read = partial(_rows, path, encoding, dialect, range(start, end))
+        read = partial(_rows, path, dialect, range(start, end))
         name = "" if len(starts) == 1 else ", ".join(dialect.names[k] for k in channels)
         yield Table(name, columns, read, said={**said, **of_channels})
 
@@ -88,11 +86,11 @@ def _unit(facts: dict[str, list[str]], place: int) -> str:
 
 
 def _rows(
-    path: Path, encoding: str, dialect: Dialect, among: Sequence[int], places: Sequence[int]
+    path: Path, dialect: Dialect, among: Sequence[int], places: Sequence[int]
 ) -> Iterator[Array]:
     """A clock that ends before others leaves its cells empty, from there to the end of the file."""
     over, row = False, dialect.first
-    for block in blocks(path, encoding, dialect, [0, *places], among=among):
+    for block in blocks(path, dialect, [0, *places], among=among):
         timed = np.isfinite(block[:, 0])
         count = 0 if over else len(timed) if timed.all() else int(np.argmin(timed))
         left = np.flatnonzero(np.isfinite(block[count:]).any(axis=1))
