@@ -368,3 +368,14 @@ def test_starts_are_spread_over_the_travel_and_runs_end_within_it() -> None:
     assert np.max(np.diff(np.sort([0.0, *shares, 1.0]))) < 0.1, "and leave no gap between them"
     plain = requests("velocity_map", bench, warm_up_cycles=0)
     assert {request.task.start_angle for request in plain} == {-half}
+
+
+def test_a_sweep_leaves_torque_for_friction_that_nobody_described() -> None:
+    """Half of it; and friction's harmonics do not fold onto the sine."""
+    bare = load_bench("platform").model_copy(update={"friction": {}})
+    options, told = fitted("frequency_response", bare)
+    rig = Rig(bare)
+    largest = getattr(options, "max_acceleration")  # noqa: B009 - of its own options
+    assert largest <= 0.5 * rig.accelerated_by(rig.torque)
+    assert "unknown friction" in told["max_acceleration"] or largest <= bare.limits.acceleration
+    assert getattr(options, "samples_per_cycle") == 100  # noqa: B009

@@ -202,3 +202,14 @@ def test_the_interval_of_a_deviation_holds(apart: float, shared: float) -> None:
         assert told.high is not None
         held.append(told.low <= truth <= told.high)
     assert rejected({"scatter": held}, "less") == {}
+
+
+def test_the_mean_is_that_over_the_way() -> None:
+    """Where friction is large the load is slow: over time it is larger than over whole periods."""
+    wave = 2.0 * np.pi * 5.0 * TIME / 4.0  # whole periods
+    rate = SPEED * (1.0 - 0.1 * np.sin(wave))
+    angle = SPEED * (TIME + 0.1 * 4.0 / (2.0 * np.pi * 5.0) * np.cos(wave))
+    torque = 20.0 * (1.0 + 0.05 * np.sin(wave))
+    assert np.mean(torque * rate) / np.mean(rate) == pytest.approx(20.0 * (1.0 - 0.0025))
+    found = steady_sliding(TIME, rate, torque, angle, 0.0)
+    assert found.torque.value == pytest.approx(20.0 * (1.0 - 0.0025), rel=2e-4)

@@ -12,6 +12,7 @@ from campaign.identification.both_directions import fitted_nominal
 from campaign.identification.stribeck import PARAMETERS, Problem, fit_stribeck
 from campaign.identification.velocity_map import (
     CONTRADICTED,
+    EXPONENT_ENDED,
     NO_EFFECT,
     DirectionFit,
     Model,
@@ -245,3 +246,37 @@ def test_a_parameter_at_its_bound_says_that_its_model_is_contradicted() -> None:
     told = direction_estimates(fit, "2")["viscous_friction"]
     assert told.origin is Origin.CONTRADICTED
     assert told.reason in CONTRADICTED["2"]
+
+
+def lines(count: int) -> list[DirectionFit]:
+    """Maps of 20 points of Coulomb and viscous friction alone, which scatter by 0.2 %."""
+    random = np.random.default_rng(11)
+    speed = np.geomspace(0.003, 1.5, 20)
+    line = equation_4_6(speed, static_torque=TRUE["coulomb_torque"])
+    scatter = 1.0 + 2e-3 * random.standard_normal((count, 20))
+    return [fit_direction(speed, line * each, np.full(20, 1e-3)) for each in scatter]
+
+
+def test_a_line_shows_no_stribeck_effect_and_its_intervals_hold() -> None:
+    """Ts and Tc of the curve are apart by their interval in 6 of 100. Of the fit with delta = 2,
+    which bends somewhere, the intervals alone hold Tc and viscous friction in 86 of 100.
+    """
+    fits = lines(200)
+    assert sum(fit.shows_stribeck_effect for fit in fits) <= 1
+    for name in ("coulomb_torque", "viscous_friction"):
+        told = [direction_estimates(fit, "2")[name].combined for fit in fits]
+        ends = [(low, high) for low, high in told if low is not None and high is not None]
+        held = sum(low <= TRUE[name] <= high for low, high in ends)
+        assert held >= 0.93 * len(ends)
+        assert len(ends) > 150
+
+
+def test_what_rests_on_an_exponent_at_its_limit_is_left_open() -> None:
+    """A step where the search allows no more than an exponent of 5."""
+    torque = equation_4_6(SPEED, stribeck_exponent=12.0)
+    torque *= 1.0 + 1e-3 * np.random.default_rng(3).standard_normal(len(SPEED))
+    told = direction_estimates(fit_direction(SPEED, torque, np.full(len(SPEED), 1e-3)), "free")
+    for name in ("static_torque", "stribeck_velocity"):
+        assert told[name].origin is Origin.NOT_DETERMINED
+        assert told[name].reason in EXPONENT_ENDED
+    assert told["coulomb_torque"].origin is Origin.MEASURED
