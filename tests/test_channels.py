@@ -125,15 +125,6 @@ def test_only_a_channel_with_a_rate_of_its_own_says_so_in_an_archive(tmp_path: P
     assert served.recording(ending).channels["temperature"].info == SLOW
 
 
-def test_an_archive_from_before_reads_as_one_without_such_channels() -> None:
-    run = open_run(Path(__file__).parent / "archive" / "kept" / "format-2.nxs")
-    item = run.trials[0]
-    assert item.trial.requires == item.trial.can_use == ()
-    assert all(channel.own_rate is None for channel in item.channels())
-    assert item.channel_names() == set(RECORDED) | {"command"}
-    assert json.loads(item.trial.model_dump_json())["requires"] == []
-
-
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_rate_of_its_own_is_a_rate(tmp_path: Path, rate: float) -> None:
     trial = plan_of(tmp_path).trials[0]

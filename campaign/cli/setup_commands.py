@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from campaign.cli.completion import complete_kind
-from campaign.cli.parameters import output_option
 from campaign.cli.rig_commands import app
 
 __all__ = ["app"]
@@ -70,23 +69,3 @@ def init(
     from campaign.cli.archives import init_folder
 
     init_folder(folder)
-
-
-@app.command()
-def migrate(
-    files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE...", help="Protocols and benches.", show_default=False),
-    ],
-    output: Annotated[
-        Path | None,
-        output_option("FILE", "A new file to write it to, instead of the one that is read."),
-    ] = None,
-    check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; exit code 1 if anything would change.")
-    ] = False,
-) -> None:
-    """Bring protocols and benches of an older schema forward, or say what a person must decide."""
-    from campaign.cli.migrate import migrate_files
-
-    raise typer.Exit(migrate_files(files, output, check=check))

@@ -19,7 +19,7 @@ from campaign.physics.compensation import compensation_methods
 from campaign.physics.engine_version import ENGINE
 from campaign.physics.friction import friction_models
 from campaign.plugins import Kinds
-from campaign.protocol.files import NEWEST
+from campaign.protocol.files import SCHEMA
 from campaign.source_hash import digest, sources_of
 from campaign.trial import Tree, Trial
 from campaign.wire.codes import VERSION
@@ -37,8 +37,8 @@ def own_versions() -> dict[str, str]:
         "engine": ENGINE,
         "format": FORMAT,
         "wire": VERSION,
-        "bench schema": NEWEST["bench"],
-        "protocol schema": NEWEST["protocol"],
+        "bench schema": SCHEMA["bench"],
+        "protocol schema": SCHEMA["protocol"],
     }
     return {name: str(number) for name, number in numbers.items()}
 

@@ -54,8 +54,8 @@ def check_resumable(run: RunReader) -> None:
         )
     if run.header.seed is None:
         raise UsageError(
-            f"{run.name}: was begun by an earlier program, which did not keep the seed; start a "
-            "new run"
+            f"{run.name}: does not say its seed, without which its plan cannot be made again; "
+            "start a new run"
         )
 
 

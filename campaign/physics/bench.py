@@ -23,13 +23,13 @@ from pydantic import (
 
 from campaign.axis_kind import AxisKind, Sides, sides_in, speaking_of
 from campaign.options import Options
-from campaign.physics.bench_paths import in_former_spelling, wrong_paths
+from campaign.physics.bench_paths import wrong_paths
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
 from campaign.physics.friction.interface import FrictionOptions
 from campaign.physics.friction_paths import invalid
 from campaign.physics.gear import GearOptions
-from campaign.physics.known import KnownOptions, in_one_place, known_in_si
+from campaign.physics.known import KnownOptions, known_in_si
 from campaign.physics.preload import loading, with_preload
 from campaign.physics.scatter import VariationOptions, acting
 from campaign.physics.sensors import SensorsOptions
@@ -254,6 +254,11 @@ class LimitsOptions(Options):
         return UNLIMITED if math.isinf(angle) else angle
 
 
+def _archived(info: ValidationInfo) -> bool:
+    """Whether what is validated is of an archive, and not of a file."""
+    return isinstance(info.context, Mapping) and bool(info.context.get("si"))
+
+
 class Bench(Options):
     """A platform under test: what is known of it. `complete` says what a simulation needs more."""
 
@@ -298,8 +303,13 @@ class Bench(Options):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_in_one_place(cls, tree: Any) -> Any:
-        return in_one_place(tree)
+    def _known_in_one_place(cls, tree: Any, info: ValidationInfo) -> Any:
+        """The first archives of format 3 have `given` and `fitted` beside what is `known`."""
+        if not _archived(info) or not isinstance(tree, Mapping):
+            return tree
+        beside = {name: tree[name] for name in ("given", "fitted") if name in tree}
+        rest = {name: value for name, value in tree.items() if name not in beside}
+        return {"known": beside, **rest} if beside else tree
 
     @field_validator("sensors")
     @classmethod
@@ -339,13 +349,9 @@ class Bench(Options):
     def _paths_lead_somewhere(
         cls, tree: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
     ) -> Self:
-        """Scatter, preload and what is known name what is there; all else would silently not be.
-
-        In the archive of a program that did not look, it was not: it is left out.
-        """
+        """Scatter, preload and what is known name what is there; all else would silently not be."""
         with speaking_of(sides_in(tree)):
             bench = handler(tree)
-        archived = isinstance(info.context, Mapping) and info.context.get("si")
         preload = None if bench.gear is None else bench.gear.preload
         wrong = list(wrong_paths(tree, bench.friction, bench.variation, preload))
         if bench.gear is not None and bench.gear.lead is not None and not bench.is_linear:
@@ -353,12 +359,10 @@ class Bench(Options):
             wrong.append((("gear", "lead"), message))
         if bench.is_linear and bench.limits and math.isinf(bench.limits.angle):
             wrong.append((("limits", "angle"), "a linear axis has ends: write how far it may go"))
-        if wrong and archived and in_former_spelling(tree):
-            return bench.with_friction(bench.friction)
         if wrong:
             raise invalid(wrong)
         # What is archived is SI, and an experiment's own bench may lack what is known of the whole.
-        return bench if archived else bench.model_copy(update={"known": known_in_si(bench)})
+        return bench if _archived(info) else bench.model_copy(update={"known": known_in_si(bench)})
 
     @property
     def is_linear(self) -> bool:

@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from campaign.physics.friction_paths import Keys, as_written
-from campaign.physics.preload import FORMER as FORMER_PRELOAD
 from campaign.physics.preload import PreloadOptions, wrong_shares
-from campaign.physics.scatter import FORMER as FORMER_VARIATION
 from campaign.physics.scatter import VariationOptions, wrong_scatter
 
 _VARIATION: Keys = ("variation",)
@@ -25,17 +23,11 @@ def wrong_paths(
     if variation is not None:
         raw = _at(tree, _VARIATION)
         for wrong in wrong_scatter(variation, friction):
-            yield (*_VARIATION, *as_written(raw, wrong.keys, FORMER_VARIATION)), wrong.message
+            yield (*_VARIATION, *as_written(raw, wrong.keys)), wrong.message
     if preload is not None:
         raw = _at(tree, _PRELOAD)
         for wrong in wrong_shares(preload, friction):
-            yield (*_PRELOAD, *as_written(raw, wrong.keys, FORMER_PRELOAD)), wrong.message
-
-
-def in_former_spelling(tree: Any) -> bool:
-    """Whether scatter or preload are written as they were before there were paths."""
-    written = {*_at(tree, _VARIATION), *_at(tree, _PRELOAD)}
-    return bool(written & {*FORMER_VARIATION, *FORMER_PRELOAD})
+            yield (*_PRELOAD, *as_written(raw, wrong.keys)), wrong.message
 
 
 def _at(tree: Any, keys: Keys) -> Mapping[str, Any]:

@@ -141,11 +141,8 @@ def without(tree: Mapping[str, Any], keys: Sequence[str | int]) -> dict[str, Any
     return copy
 
 
-def as_written(raw: Any, keys: Keys, old: Mapping[str, Keys]) -> Keys:
-    """Where `keys` of a normalised table stand in what was written, with pydantic's labels.
-
-    `old`: names of the former spelling, and what each stands for now.
-    """
+def as_written(raw: Any, keys: Keys) -> Keys:
+    """Where `keys` of a normalised table stand in what was written, with pydantic's labels."""
     if not isinstance(raw, Mapping):
         return keys
     table, *rest = keys
@@ -159,8 +156,7 @@ def as_written(raw: Any, keys: Keys, old: Mapping[str, Keys]) -> Keys:
     if len(rest) == 1 and rest[0] not in written and EVERY in written:
         return table, EVERY, INTERFACE, rest[0]
     if not rest or rest[0] not in written:
-        former = next((name for name, now in old.items() if keys[: len(now)] == now), None)
-        return (former,) if former is not None and former in raw else keys
+        return keys
     label = () if len(rest) == 1 else (INTERFACE if len(rest) == 2 else "Scatter",)
     return (table, rest[0], *label, *rest[1:])
 

@@ -8,7 +8,7 @@ on; `fingerprint` says of which bench they are true (`bench_fingerprint`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
@@ -23,8 +23,6 @@ from campaign.options import Options, spelled
 from campaign.physics.friction_paths import Keys, invalid
 from campaign.units import Quantity, split_quantity
 
-FORMER = ("given", "fitted")
-"""What stood at the top level of a bench before `known` was there."""
 NORMAL_95 = 1.959963984540054
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 Number = float | str
@@ -145,28 +143,6 @@ def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:
             yield hint
         else:
             yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))
-
-
-def in_one_place(tree: Any) -> Any:
-    """A bench's tree with the former fields `given` and `fitted` as part of `known`.
-
-    Raises pydantic's error for what is no list of cells, and for what is given twice.
-    """
-    former = [name for name in FORMER if isinstance(tree, Mapping) and name in tree]
-    if not former:
-        return tree
-    known = tree.get("known", {})
-    for name in former:
-        if isinstance(known, Mapping) and name in known and tree[name]:
-            message = f"'{name}' is the former spelling of 'known.{name}', which is given"
-            raise invalid([((name,), f"{message} as well; say it there")])
-        if isinstance(tree[name], str) or not isinstance(tree[name], Sequence):
-            raise invalid([((name,), "not a list of published cells")])
-    given = {name: tree[name] for name in former if tree[name]}
-    rest = {key: value for key, value in tree.items() if key not in former}
-    if not given or not isinstance(known, Mapping):
-        return rest
-    return {**rest, "known": {**known, **given}}
 
 
 def known_in_si(bench: Any) -> KnownOptions:

@@ -6,17 +6,15 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator
 
 from campaign.axis_kind import unit_here
 from campaign.options import Options
 from campaign.physics.friction_paths import (
     INTERFACE,
-    Keys,
     Wrong,
     changeable,
     choices,
-    invalid,
     matched,
     nested,
     split,
@@ -26,10 +24,6 @@ from campaign.physics.friction_paths import (
 )
 from campaign.units import Torque
 
-FORMER: dict[str, Keys] = {
-    "static_share": ("shares", "static_torque"),
-    "coulomb_share": ("shares", "coulomb_torque"),
-}
 SLOWEST = 1e-9
 """rad/s; an interface without a static torque holds with its friction of sliding this slowly."""
 
@@ -60,24 +54,6 @@ class PreloadOptions(Options):
     shares: Shares = {"static_torque": 1.0}
     """Share of the difference that a torque gains, seen at the load, by its path: `static_torque`
     of all preloaded interfaces together, or `mesh.static_torque`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_spelling(cls, tree: Any) -> Any:
-        """The former fields `static_share` (1 when absent) and `coulomb_share` as a table."""
-        if not isinstance(tree, Mapping):
-            return tree
-        former = [name for name in FORMER if name in tree]
-        if not former:
-            return tree
-        new = {key: value for key, value in tree.items() if key not in FORMER}
-        if "shares" in tree:
-            now = ".".join(str(key) for key in FORMER[former[0]])
-            message = f"'{former[0]}' is the former spelling of '{now}', and 'shares' is given"
-            raise invalid([((former[0],), f"{message} as well; say it there")])
-        given = {"static_share": 1.0, **{name: tree[name] for name in former}}
-        # What gained nothing was written as zero.
-        return {**new, "shares": {str(FORMER[name][1]): v for name, v in given.items() if v != 0}}
 
     @field_validator("shares", mode="before")
     @classmethod

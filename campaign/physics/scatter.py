@@ -23,25 +23,14 @@ from campaign.physics.friction_paths import (
     Wrong,
     changeable,
     choices,
-    invalid,
     nested,
     plain,
     why_not,
     without,
 )
 
-CLASSIC = (
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "viscous_friction",
-    "bristle_stiffness",
-)
-"""What could scatter from day to day when each had a field of its own."""
 TORQUES = "torques"
-"""What the former `trial` is called: one draw of Tc and Ts."""
-FORMER: dict[str, Keys] = {name: ("day_to_day", name) for name in CLASSIC}
-FORMER["trial"] = ("trial_to_trial", TORQUES)
+"""What a bench calls one draw of Coulomb and static torque together."""
 
 
 class Scatter(Options):
@@ -121,26 +110,6 @@ class VariationOptions(Options):
     `load.coulomb_torque`: its relative standard deviation, or a table."""
     trial_to_trial: Scatters = {}
     """How a parameter scatters from trial to trial, in the same form."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_spelling(cls, tree: Any) -> Any:
-        """The former fields (`coulomb_torque = 0.003`, `trial = 0.002`) as tables by path."""
-        if not isinstance(tree, Mapping):
-            return tree
-        new = {key: value for key, value in tree.items() if key not in FORMER}
-        for old, (table, name) in FORMER.items():
-            if old not in tree:
-                continue
-            lines = new.get(str(table), {})
-            if not isinstance(lines, Mapping) or name in lines:
-                message = f"'{old}' is the former spelling of '{table}.{name}', which is given"
-                raise invalid([((old,), f"{message} as well; say it there")])
-            if tree[old] == 0:
-                continue  # what did not scatter was written as zero
-            joint = {"paths": list(CLASSIC[:2]), "relative": tree[old]}
-            new[str(table)] = {**lines, str(name): joint if old == "trial" else tree[old]}
-        return new
 
     @field_validator("day_to_day", "trial_to_trial", mode="before")
     @classmethod

@@ -16,7 +16,7 @@ import numpy as np
 from campaign.physics.bench import Bench
 from campaign.physics.friction_paths import changeable, matched
 from campaign.physics.preload import changed, with_preload
-from campaign.physics.scatter import CLASSIC, TORQUES, Line
+from campaign.physics.scatter import TORQUES, Line
 
 _Bench = TypeVar("_Bench", bound=Bench)
 SMALLEST_FACTOR = 0.05
@@ -54,17 +54,24 @@ def preloaded(bench: _Bench) -> _Bench:
     return bench.model_copy(update={"friction": friction})
 
 
-# The five classic parameters are drawn together, in their order, and Tc and Ts share the first
-# number of a trial's stream: so it was before there were paths, and an archive must be simulated
-# again to the bit. Every other path has a stream of its own, which its name seeds; a line that is
-# added to or removed from a bench then changes no draw of another, nor does their order.
+# Five parameters are drawn together, in this order, and the common draw `torques` is the first
+# number of a trial's stream: an archive must be simulated again to the bit. Every other path has a
+# stream of its own, which its name seeds; a line that is added to or removed from a bench then
+# changes no draw of another, nor does their order.
+_TOGETHER = (
+    "coulomb_torque",
+    "static_torque",
+    "stribeck_velocity",
+    "viscous_friction",
+    "bristle_stiffness",
+)
 
 
 def _draw_of_day(seed: int, day: int, name: str) -> float:
     """The standard normal number of a day for the line called `name`."""
-    if name in CLASSIC:
-        draws = np.random.Generator(np.random.PCG64([seed, day])).standard_normal(len(CLASSIC))
-        return float(draws[CLASSIC.index(name)])
+    if name in _TOGETHER:
+        draws = np.random.Generator(np.random.PCG64([seed, day])).standard_normal(len(_TOGETHER))
+        return float(draws[_TOGETHER.index(name)])
     return _draw([seed, day, _DAY, _number(name)])
 
 

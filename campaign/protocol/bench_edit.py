@@ -10,7 +10,6 @@ from typing import Any
 from campaign.errors import UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import fingerprint
-from campaign.physics.known import FORMER as FORMER_KNOWN
 from campaign.protocol.positions import Positions
 from campaign.protocol.problems import find_faults
 
@@ -72,14 +71,10 @@ def _edited(text: str, entries: Mapping[str, Any]) -> str:
 
     newline = "\r\n" if "\r\n" in text else "\n"
     document = tomlkit.parse(text.replace("\r\n", "\n"))
-    left = dict(entries)
-    for key in FORMER_KNOWN:
-        if key in left and key in document:
-            document[key] = left.pop(key)
     if "known" in document:
-        _put(document["known"], left, in_line=_HEADER.search(text) is None)
+        _put(document["known"], entries, in_line=_HEADER.search(text) is None)
         return document.as_string().replace("\n", newline)
-    return _with_table(document.as_string(), left).replace("\n", newline)
+    return _with_table(document.as_string(), entries).replace("\n", newline)
 
 
 def _put(known: Any, entries: Mapping[str, Any], *, in_line: bool = False) -> None:

@@ -48,7 +48,7 @@ def checked(source: Source) -> Bench:
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)
     origin, folder = Within(source), source.file.parent
-    problems = list(cell_problems(bench.known, source.tree, origin, folder, must_be_there=True))
+    problems = list(cell_problems(bench.known, origin, folder, must_be_there=True))
     if problems:
         raise ProtocolError(problems)
     return bench

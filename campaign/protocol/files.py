@@ -22,9 +22,9 @@ DEEPEST_NESTING = 32
 """levels of tables and lists; deeper text only serves to exhaust a parser."""
 
 Kind = Literal["protocol", "bench"]
-NEWEST: Mapping[Kind, int] = {"protocol": 2, "bench": 3}
-"""The present schema; raised when a key is renamed, removed or means something else. `migrations`
-has how to follow."""
+SCHEMA: Mapping[Kind, int] = {"protocol": 2, "bench": 3}
+"""The present one, which alone is read; raised when a key is renamed, removed or means something
+else."""
 MARKS: Mapping[Kind, frozenset[str]] = {
     "protocol": frozenset({"test", "include"}),
     "bench": frozenset({"axis", "motor", "limits", "friction"}),
@@ -140,7 +140,7 @@ def read_source(file: Path, name: str, kind: Kind | None = None) -> Source | lis
     if any(len(keys) > DEEPEST_NESTING for keys, _ in _leaves(tree)):
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
     source = Source(file, name, text, tree)
-    if kind and (problem := _other_kind(source, kind) or _other_schema(source, NEWEST[kind])):
+    if kind and (problem := _other_kind(source, kind) or _other_schema(source, kind)):
         return [problem]
     oversized = [
         source.problem(keys, "value", "an integer of more than 64 bits")
@@ -159,18 +159,16 @@ def _other_kind(source: Source, kind: Kind) -> Problem | None:
     return Problem(source.file, 0, 0, told)
 
 
-def _other_schema(source: Source, newest: int) -> Problem | None:
-    """Take `schema` out of the tree; the problem of one that this program does not know."""
-    given = source.tree.pop("schema", 1)
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        message = f"{given!r} is no schema; they are whole numbers, the present one is {newest}"
-    elif given > newest:
-        message = (
-            f"written for schema {given}; campaign {campaign.__version__} reads up to {newest}: "
-            "install a newer campaign (`campaign --version` names what it reads)"
-        )
-    else:
+def _other_schema(source: Source, kind: Kind) -> Problem | None:
+    """Take `schema` out of the tree; the problem of one that is not the present one."""
+    given = source.tree.pop("schema", SCHEMA[kind])
+    if type(given) is int and given == SCHEMA[kind]:
         return None
+    message = (
+        f"{given!r} is not the schema of a {kind} that campaign {campaign.__version__} reads; it "
+        f"is {SCHEMA[kind]}. Use the program that the file was written for, or write the keys of "
+        "today and leave this line out"
+    )
     return source.problem(("schema",), "value", message)
 
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from campaign.errors import Problem, UsageError
-from campaign.physics.known import FORMER as FORMER_KNOWN
 from campaign.physics.known import KnownOptions
 from campaign.protocol.files import Origin, UnreadableError, looked_for, read_text
-from campaign.protocol.positions import Keys
 from campaign.protocol.problems import nearest, shown
 from campaign.published.patterns import covers
 from campaign.published.values import THESIS, Published, read_published, thesis
@@ -18,7 +15,6 @@ from campaign.published.values import THESIS, Published, read_published, thesis
 
 def cell_problems(
     known: KnownOptions,
-    written: Mapping[str, Any],
     origin: Origin,
     folder: Path,
     *,
@@ -30,7 +26,6 @@ def cell_problems(
     uses the bench, where its file is not at hand: a bench travels without it.
 
     Args:
-        written: the bench as written, where the patterns may stand at the top level.
         folder: of the bench's file.
         must_be_there: whether a document that is not is a problem, too.
     """
@@ -48,13 +43,13 @@ def cell_problems(
         return
     paths = [cell.path for table in published.values() for cell in table.cells]
     for name in ("given", "fitted", "seen"):
-        at: Keys = (name,) if name in FORMER_KNOWN and written.get(name) else ("known", name)
         for index, pattern in enumerate(getattr(known, name)):
             if not any(covers(pattern, path) for path in paths):
                 message = f"{shown(pattern)} is no cell of {shown(known.document)}"
                 table = [path for path in paths if path.startswith(f"{pattern.split('/')[0]}/")]
                 names = table or [*published, *paths]
-                yield origin.problem((*at, index), "value", message + nearest(pattern, names))
+                message += nearest(pattern, names)
+                yield origin.problem(("known", name, index), "value", message)
 
 
 def _published(document: str, folder: Path) -> Published:

@@ -203,7 +203,7 @@ class _Loader:
         known = valid.model_dump(mode="json") if isinstance(valid, Bench) else None
         if isinstance(valid, Bench) and bench is not None:
             folder = bench.file.parent
-            self._report(*cell_problems(valid.known, bench.tree, bench_origin, folder))
+            self._report(*cell_problems(valid.known, bench_origin, folder))
         options = self._attached(draft, experiment, options)
         with speaking_of(sides_in(tree)):
             axes = self._axes(draft, experiment, options, known)

@@ -33,7 +33,7 @@ from campaign.errors import ArchiveError
 from campaign.recording import Outcome, SafeState
 
 AT = "2026-11-21T09:37:00Z"
-STARTED = RunStarted(at=AT, run="r", format=2, trials=3)
+STARTED = RunStarted(at=AT, run="r", format=3, trials=3)
 RESUMED = RunResumed(at=AT)
 ENDED = RunEnded(at=AT, status=RunStatus.INTERRUPTED, reason="", safe_state=SafeState.CONFIRMED)
 
@@ -42,7 +42,8 @@ def finished(trial: int, attempt: int = 1, **changes: Any) -> TrialFinished:
     name = f"trial-{trial:05d}{f'-{attempt}' if attempt > 1 else ''}.nxs"
     settings = {
         "at": AT, "trial": trial, "attempt": attempt, "file": name, "sha256": "0" * 64,
-        "bytes": 10, "outcome": Outcome.COMPLETED, "reason": "", "safe_state": SafeState.CONFIRMED,
+        "record": "1" * 64, "bytes": 10, "outcome": Outcome.COMPLETED, "reason": "",
+        "safe_state": SafeState.CONFIRMED,
     }  # fmt: skip
     return TrialFinished.model_validate({**settings, **changes})
 

@@ -267,18 +267,6 @@ def test_what_has_ended_or_is_no_run_is_refused(tmp_path, kit):
         RunWriter.resume(kit.run(tmp_path), **RESUMED)
     with pytest.raises(UsageError, match="is no run"):
         RunWriter.resume(tmp_path / "nothing.partial", **RESUMED)
-    kept = Path(__file__).parent / "kept"
-    for version in (1, 2):
-        sealed, folder = f"format-{version}.nxs", f"format-{version}.partial"
-        earlier = rf"earlier program.*\(format {version}\).*; start a new run"
-        shutil.copytree(kept / folder, tmp_path / folder)
-        with pytest.raises(UsageError, match=earlier):
-            RunWriter.resume(tmp_path / folder, **RESUMED)
-        shutil.rmtree(tmp_path / folder)
-        shutil.copy(kept / sealed, tmp_path / sealed)
-        with pytest.raises(UsageError, match=earlier):
-            RunWriter.resume(tmp_path / sealed, **RESUMED)
-        assert (tmp_path / sealed).read_bytes() == (kept / sealed).read_bytes()
 
 
 def test_one_process_at_a_time_writes_a_run(tmp_path, kit):

@@ -10,12 +10,11 @@ import pytest
 
 from campaign.archive import RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.verifying.result import PER_DATASET, STRUCTURE, UNFINISHED
+from campaign.archive.verifying.result import STRUCTURE, UNFINISHED
 from campaign.archive.verifying.verification import verify_run
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 
-KEPT = Path(__file__).parent / "kept"
 PROTOCOL = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}], "published": "x"}
 FINGERPRINT = hashlib.sha256(
     b'{"tests":[{"name":"map","numbers":[1,1.0,1e-300,null,true]}]}'
@@ -46,16 +45,6 @@ def folder(tmp_path, kit):
 
 def places(path):
     return [damage.place for damage in verify_run(path).problems]
-
-
-@pytest.mark.parametrize(
-    "name", ["format-1.nxs", "format-1.partial", "format-2.nxs", "format-2.partial"]
-)
-def test_an_archive_of_an_earlier_format_is_sound_as_far_as_that_can_tell(name):
-    found = verify_run(KEPT / name)
-    assert found.problems == ()
-    assert PER_DATASET in [remark.reason for remark in found.remarks]
-    assert found.root == ""
 
 
 def datasets(path: Path) -> dict[str, h5py.Dataset]:

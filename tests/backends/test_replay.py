@@ -146,39 +146,6 @@ def test_an_option_younger_than_the_archive_has_its_default(tmp_path, trial):
     assert backend.refuses(trial) is None
 
 
-def test_a_bench_in_the_former_spelling_is_the_bench_that_it_was(tmp_path, trial):
-    gear = {**trial.bench["gear"]}
-    preload = {"torque": 50.0, "nominal": 33.0}
-    shares = {"static_share": 1.0, "coulomb_share": 0.25}
-    days = dict.fromkeys(("coulomb_torque", "static_torque", "stribeck_velocity"), 0.01)
-    none = {"viscous_friction": 0.0, "bristle_stiffness": 0.0}
-    then = {
-        **trial.bench,
-        "gear": {**gear, "preload": {**preload, **shares}},
-        "variation": {"seed": 4, "day": 2, **days, **none, "trial": 0.1},
-    }
-    joint = {"paths": ["coulomb_torque", "static_torque"], "relative": 0.1}
-    now = {
-        **trial.bench,
-        "gear": {
-            **gear,
-            "preload": {**preload, "shares": {"static_torque": 1.0, "coulomb_torque": 0.25}},
-        },
-        "variation": {
-            "seed": 4,
-            "day": 2,
-            "day_to_day": days,
-            "trial_to_trial": {"torques": joint},
-        },
-    }
-    backend = replay(archived(tmp_path, [(changed(trial, bench=then), marked(1))]))
-    wanted = changed(trial, bench=now)
-    assert backend.refuses(wanted) is None
-    assert mark_of(served(backend, wanted)) == 1
-    later = {**now, "variation": {**now["variation"], "day": 3}}
-    assert "bench.variation.day: 2 there, 3 here" in backend.refuses(changed(trial, bench=later))
-
-
 def test_endings_are_copied_but_nothing_moves(tmp_path, trial):
     ending = Ending(
         Outcome.FAULT, "too hot", SafeState.NOT_CONFIRMED, Fault.OVER_TEMPERATURE, {"resends": 3}

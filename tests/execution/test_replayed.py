@@ -7,19 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from campaign.archive import ArchivedTrial, RunHeader, RunWriter, open_run
 from campaign.backends.replay import BACKEND, ReplayOptions
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
-from campaign.physics.bench import Bench
 from campaign.recording import Channel, Ending, Event, Outcome, Recording
 from campaign.trial import Trial
 from tests.archives import archived, simulated_run
-
-KEPT = Path(__file__).parents[1] / "archive" / "kept"
 
 
 def replayed(archive: Path, trials: list[Trial], folder: Path) -> tuple[ArchivedTrial, ...]:
@@ -50,22 +46,6 @@ def test_a_clean_archive_comes_out_as_it_went_in(tmp_path: Path) -> None:
     after = replayed(archive, [each.trial for each in before], tmp_path / "again")
     for was, now in zip(before, after, strict=True):
         assert_equal(was.recording(), now.recording())
-
-
-@pytest.mark.parametrize("name", ["format-1.nxs", "format-2.nxs"])
-def test_archives_of_earlier_programs_answer_the_trials_of_today(tmp_path: Path, name: str) -> None:
-    """Their benches do not say over how long a rate is judged; today's do."""
-    before = open_run(KEPT / name).trials[:2]
-    trials = []
-    for each in before:
-        assert "rate_time" not in each.trial.bench["limits"]  # type: ignore[operator]
-        bench = Bench.model_validate(each.trial.bench, context={"si": True})
-        tree = bench.model_dump(mode="json")
-        trials.append(each.trial.model_copy(update={"bench": tree}))
-    for was, now in zip(before, replayed(KEPT / name, trials, tmp_path), strict=True):
-        ours, theirs = now.recording(), was.recording()
-        assert_equal(replace(theirs, ending=ours.ending), ours)
-        assert ours.ending.outcome is theirs.ending.outcome
 
 
 def test_what_breaks_a_limit_is_said_and_served(tmp_path: Path) -> None:

@@ -26,7 +26,8 @@ def three(tree: dict[str, Any]) -> None:
 
 def scattering(tree: dict[str, Any]) -> None:
     three(tree)
-    tree["variation"] = {"seed": 3, "trial": 0.07}
+    together = {"paths": ["coulomb_torque", "static_torque"], "relative": 0.07}
+    tree["variation"] = {"seed": 3, "trial_to_trial": {"torques": together}}
 
 
 def result_of(edit: Any, **options: Any) -> Result:

@@ -87,7 +87,9 @@ def test_the_mistake_is_shown_at_its_table(tmp_path: Path) -> None:
 
 def test_the_scatter_of_a_trial_is_one_factor_on_coulomb_and_static_torque_alone() -> None:
     plain = bench().friction["load"]
-    varied = as_it_is(bench(lambda tree: tree.update(variation={"trial": 0.1})), seed=5)
+    together = {"paths": ["coulomb_torque", "static_torque"], "relative": 0.1}
+    scatter = {"trial_to_trial": {"torques": together}}
+    varied = as_it_is(bench(lambda tree: tree.update(variation=scatter)), seed=5)
     found = varied.friction["load"]
     changed = {
         name: getattr(found, name) / value for name, value in plain if value != getattr(found, name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,6 @@ PLATFORM = "1e5b0a23510bbb530736c275e6bd566d37207d0912e6c3667f0e8038b464b549"
 SIMULINK = "f77a99ae99f6e9af74d7e6df0791387053e401ca6dbfb174451a6e26ff21b3bd"
 TRIAL_ONLY = "42ec1a623a1d1a0029e78a5ba2716da65ec903f249c7b20be4089adbb7373ad5"
 
-PLATFORM_FORMER = {
-    "seed": 44,
-    "coulomb_torque": 0.003,
-    "static_torque": 0.02,
-    "stribeck_velocity": 0.005,
-    "viscous_friction": 0.01,
-    "bristle_stiffness": 0.03,
-    "trial": 0.002,
-}
 WIDE = {
     "coulomb_torque": 0.02,
     "static_torque": 0.04,
@@ -67,25 +57,18 @@ def test_the_platform_has_the_friction_that_it_always_had() -> None:
     assert digest(tree) == PLATFORM
 
 
-def test_the_former_spelling_is_read_as_what_it_meant() -> None:
-    new = written("platform")
-    former = copy.deepcopy(new)
-    former["variation"] = dict(PLATFORM_FORMER)
-    former["gear"]["preload"] = {**NOMINAL, "static_share": 1.0, "coulomb_share": 0.0}
-    assert Bench.model_validate(former) == Bench.model_validate(new)
-    assert digest(former) == PLATFORM
-
-
 @pytest.mark.parametrize(
     ("variation", "preload"),
     [
-        ({**WIDE, "trial": 0.1}, {"static_share": 0.7, "coulomb_share": 0.4}),
         (
             {"day_to_day": WIDE, "trial_to_trial": {"torques": TOGETHER}},
             {"shares": {"static_torque": 0.7, "coulomb_torque": 0.4}},
         ),
         (
-            {"trial": 0.1, "day_to_day": {f"*.{name}": r for name, r in WIDE.items()}},
+            {
+                "day_to_day": {f"*.{name}": r for name, r in WIDE.items()},
+                "trial_to_trial": {"torques": TOGETHER},
+            },
             {"shares": {"*": {"static_torque": 0.7}, "coulomb_torque": 0.4}},
         ),
     ],
@@ -94,19 +77,9 @@ def test_every_spelling_has_the_same_draws(variation: Any, preload: Any) -> None
     assert digest(lopsided(variation, preload)) == SIMULINK
 
 
-@pytest.mark.parametrize(
-    "variation",
-    [
-        {"trial": 0.25},
-        {**dict.fromkeys(WIDE, 0.0), "trial": 0.25},
-        {"trial_to_trial": {"torques": {**TOGETHER, "relative": 0.25}}},
-    ],
-)
-def test_a_trial_scatters_as_it_did(variation: Any) -> None:
-    tree = lopsided(variation, {})
+def test_a_trial_scatters_as_it_did() -> None:
+    tree = lopsided({"trial_to_trial": {"torques": {**TOGETHER, "relative": 0.25}}}, {})
     assert digest(tree) == TRIAL_ONLY
-    # Zeros of the former spelling are no lines: whoever wrote them out meant the same bench.
-    assert Bench.model_validate(tree) == Bench.model_validate(lopsided({"trial": 0.25}, {}))
 
 
 def test_a_normalised_bench_reads_back_as_it_is() -> None:

@@ -240,41 +240,12 @@ def test_a_model_without_the_parameter_is_passed_over_when_another_has_it() -> N
             "day_to_day/*.coulomb_torque",
             "'coulomb_torque' stands there twice; write it once, without quotes",
         ),
-        (
-            {"day_to_day": {"coulomb_torque": 0.1}, "coulomb_torque": 0.1},
-            "coulomb_torque",
-            "'coulomb_torque' is the former spelling of 'day_to_day.coulomb_torque'",
-        ),
     ],
 )
 def test_a_path_that_leads_nowhere_is_refused(variation: Tree, where: str, message: str) -> None:
     found, text = refusal(variation)
     assert found == f"variation/{where}"
     assert message in text
-
-
-def test_former_scatter_of_nothing_is_refused_in_a_file_and_read_in_an_archive() -> None:
-    def edit(tree: Tree) -> None:
-        tree["friction"] = {"load": stribeck(32.0, 26.0)}
-
-    plain = bench(edit)
-    former = {"seed": 5, "day": 2, "coulomb_torque": 0.02, "bristle_stiffness": 0.03, "trial": 0.1}
-
-    def scatter(tree: Tree) -> None:
-        edit(tree)
-        tree["variation"] = former
-
-    with pytest.raises(ValidationError, match=r"variation\.bristle_stiffness\n +no friction inter"):
-        bench(scatter)
-    archived = plain.model_dump(mode="json") | {"variation": former}
-    read = Bench.model_validate(archived, context={"si": True})
-    assert read.variation is not None
-    assert set(read.variation.day_to_day) == {"coulomb_torque"}
-    assert set(read.variation.trial_to_trial) == {"torques"}
-    now = {**former, "day_to_day": {"bristle_stiffness": 0.03}}
-    del now["bristle_stiffness"], now["coulomb_torque"], now["trial"]
-    with pytest.raises(ValidationError, match="bristle_stiffness"):
-        Bench.model_validate({**archived, "variation": now}, context={"si": True})
 
 
 @pytest.mark.parametrize(

@@ -268,7 +268,8 @@ def test_the_friction_is_that_of_the_day_and_of_its_side_of_the_gear() -> None:
     """Stuck on day 7 the bristles are those that `of_its_day` gives; N times counts at the load."""
 
     def day(tree: Tree) -> None:
-        tree["variation"] = {"seed": 3, "day": 7, "bristle_stiffness": 0.3, "viscous_friction": 0.3}
+        days = {"bristle_stiffness": 0.3, "viscous_friction": 0.3}
+        tree["variation"] = {"seed": 3, "day": 7, "day_to_day": days}
 
     today = bench_friction(of_its_day(bench(day)), "stuck")
     assert today.stiffness != pytest.approx(18000 + RATIO * 1000, rel=1e-3)

@@ -24,9 +24,16 @@ NAMES = (
 SCATTER = dict(zip(NAMES, (0.02, 0.04, 0.06, 0.05, 0.03), strict=True))
 
 
+def torques(relative: float) -> Tree:
+    """One draw a trial of Coulomb and static torque together."""
+    return {"torques": {"paths": list(NAMES[:2]), "relative": relative}}
+
+
 def scattering(day: int = 1, seed: int = 5, trial: float = 0.0, **also: Any) -> Bench:
     def edit(tree: Tree) -> None:
-        tree["variation"] = {"seed": seed, "day": day, "trial": trial, **SCATTER}
+        tree["variation"] = {
+            "seed": seed, "day": day, "day_to_day": SCATTER, "trial_to_trial": torques(trial),
+        }  # fmt: skip
         tree["friction"]["load"].update(also)
 
     return bench(edit)
@@ -36,7 +43,9 @@ def preloaded(
     torque: str, edit: Callable[[Tree], object] = lambda tree: None, **shares: float
 ) -> Bench:
     def change(tree: Tree) -> None:
-        tree["gear"]["preload"] = {"torque": torque, "nominal": "33 N m", **shares}
+        tree["gear"]["preload"] = {"torque": torque, "nominal": "33 N m"}
+        if shares:
+            tree["gear"]["preload"]["shares"] = shares
         edit(tree)
 
     return bench(change)
@@ -97,7 +106,8 @@ def test_both_directions_scatter_together() -> None:
 
 def test_the_widest_scatter_leaves_friction() -> None:
     def wild(tree: Tree) -> None:
-        tree["variation"] = {"day": 1, "viscous_friction": 0.3, "trial": 0.3}
+        days = {"viscous_friction": 0.3}
+        tree["variation"] = {"day": 1, "day_to_day": days, "trial_to_trial": torques(0.3)}
 
     # About one in 1300 is beyond 3.2 sigma, where nothing would be left of 26 N m.
     on = bench(wild)
@@ -112,7 +122,7 @@ def test_a_preload_raises_the_breakaway_torque_of_the_axis() -> None:
         load, motor = on.friction["load"], on.friction["motor"]
         return float(getattr(load, name) + RATIO * getattr(motor, name))
 
-    changed = as_it_is(preloaded("50 N m", static_share=1.0, coulomb_share=0.5), 1)
+    changed = as_it_is(preloaded("50 N m", static_torque=1.0, coulomb_torque=0.5), 1)
     gain = at_load(changed, "static_torque") - at_load(bench(), "static_torque")
     assert gain == pytest.approx(17.0)
     gain = at_load(changed, "coulomb_torque") - at_load(bench(), "coulomb_torque")
@@ -136,7 +146,7 @@ def test_an_interface_can_be_spared_from_the_preload() -> None:
 
 def test_a_preload_that_takes_all_friction_away_is_refused() -> None:
     with pytest.raises(ValidationError, match=r"leaves friction\.load with a coulomb_torque of -"):
-        preloaded("1 N m", static_share=0.5, coulomb_share=1.0)
+        preloaded("1 N m", static_torque=0.5, coulomb_torque=1.0)
 
 
 def test_limits_know_day_preload_and_position() -> None:

@@ -253,7 +253,11 @@ PRELOAD = "[gear.preload]\ntorque = '2 N m'\nnominal = '1 N m'\n"
         ),
         (
             "[variation]\n§static_torque = 0.1\nday_to_day.static_torque = 0.1\n",
-            ["former spelling of 'day_to_day.static_torque', which is given as well; say it there"],
+            ["unknown key 'static_torque'; allowed are seed, day, day_to_day, trial_to_trial"],
+        ),
+        (
+            PRELOAD + "§static_share = 1.0\n",
+            ["unknown key 'static_share'; allowed are torque, nominal, shares"],
         ),
         (
             PRELOAD + "shares = { §stribeck_velocity = 1.0 }\n",

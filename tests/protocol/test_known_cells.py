@@ -26,19 +26,17 @@ column.value = {}
 [table.cells]
 x = [1]
 """
-NAME = 'name = "simulink"'
 
 
 @pytest.fixture
 def known(desk, simulink: str):
-    """Problems of a protocol whose bench has these lines under [known], or at its top level."""
+    """Problems of a protocol whose bench has these lines under [known]."""
 
-    def problems(*lines: str, former: str = "") -> list[str]:
+    def problems(*lines: str) -> list[str]:
         plain = re.sub(r"\[known\]\n(?:[a-z]+ = .*\n)+", "", simulink)
         assert "[known]" not in plain
         table = "\n".join(("[known]", *lines)) + "\n"
-        text = plain.replace(NAME, f"{NAME}\n{former}") + "\n" + table
-        desk.write("own.toml", text)
+        desk.write("own.toml", plain + "\n" + table)
         return desk.problems(GOOD)
 
     return problems
@@ -65,11 +63,6 @@ def test_where_it_stands(desk, known, lines: tuple[str, ...], message: str) -> N
     desk.write("wrong.toml", "")
     (problem,) = known(*lines)
     assert re.search(message, problem.message)
-
-
-def test_in_the_former_place_too(known) -> None:
-    (problem,) = known('document = "thesis"', former='fitted = ["5.10", §"5.99"]')
-    assert "'5.99' is no cell" in problem.message
 
 
 def test_a_document_that_is_not_at_hand_is_missed_by_who_looks_at_the_bench(

@@ -93,10 +93,9 @@ def test_text_that_would_smuggle_in_more_toml_is_text(desk) -> None:
     assert plan(desk, 'title="a"\noperator="b"').title == '"a"\noperator="b"'
 
 
-def test_scatter_by_path_and_in_the_former_spelling(desk) -> None:
-    for text in ("day_to_day.coulomb_torque=0.1", "coulomb_torque=0.1"):
-        [trial, _] = plan(desk, f"swing.bench.variation.{text}").trials
-        assert trial.bench["variation"]["day_to_day"] == {"coulomb_torque": 0.1}
+def test_scatter_by_path(desk) -> None:
+    [trial, _] = plan(desk, "swing.bench.variation.day_to_day.coulomb_torque=0.1").trials
+    assert trial.bench["variation"]["day_to_day"] == {"coulomb_torque": 0.1}
     [trial, _] = plan(desk, "swing.bench.variation.day_to_day.load.static_torque=0.1").trials
     assert trial.bench["variation"]["day_to_day"] == {"load": {"static_torque": 0.1}}
     text = "swing.bench.variation.day_to_day.load.static_torqe=0.1"
@@ -104,14 +103,3 @@ def test_scatter_by_path_and_in_the_former_spelling(desk) -> None:
         ProtocolError, match=r"^--set .*no parameter 'static_torqe'.*'static_torque"
     ):
         plan(desk, text)
-
-
-def test_a_former_path_beside_the_new_one_says_where_it_went(desk) -> None:
-    on_platform = TEST.replace('"simulink"', '"platform"')
-    for path, now in (
-        ("variation.static_torque", "day_to_day.static_torque"),
-        ("variation.trial", "trial_to_trial.torques"),
-        ("gear.preload.static_share", "shares.static_torque"),
-    ):
-        with pytest.raises(ProtocolError, match=rf"^--set .*former spelling of '{now}'"):
-            desk.load(on_platform, f"swing.bench.{path}=0.1")

@@ -208,6 +208,7 @@ def finished(trial: int, attempt: int) -> TrialFinished:
         attempt=attempt,
         file=f"trial-0000{trial}.nxs",
         sha256="0" * 64,
+        record="1" * 64,
         bytes=1,
         outcome=Outcome.COMPLETED,
         reason="",

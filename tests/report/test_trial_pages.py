@@ -355,6 +355,7 @@ def test_metrics_attempts_and_decisions_are_told(made_up: ModuleType, tmp_path: 
             attempt=attempt,
             file="trial-00001.nxs",
             sha256="0" * 64,
+            record="1" * 64,
             bytes=1,
             outcome=Outcome.FAULT if attempt == 1 else Outcome.COMPLETED,
             reason="the cable" if attempt == 1 else "",

@@ -29,7 +29,6 @@ from campaign.recording import Channel, Ending, Outcome, Recording
 from tests.system import told_damage as told
 
 FIGURE = "stabilization/position-error"
-KEPT = Path(__file__).parents[1] / "archive" / "kept"
 
 
 @pytest.fixture(scope="module")
@@ -375,12 +374,3 @@ def test_a_plan_that_a_damaged_run_cannot_answer_is_not_called_a_mistake(archive
     done = replayed(archive, tmp_path)
     assert told.code_of(done) == 4
     assert "it may have been lost" in str(done.exception)
-
-
-@pytest.mark.parametrize("name", ["format-1.nxs", "format-2.nxs"])
-def test_what_earlier_programs_sealed_is_read_without_a_word(name: str, tmp_path: Path):
-    shutil.copy(KEPT / name, tmp_path / name)
-    campaign.open(tmp_path / name)
-    for command in (("show",), ("export", "--to", "csv"), ("report",)):
-        done = told.run_campaign(command[0], tmp_path / name, *command[1:])
-        assert (done.exit_code, told.TOLD in done.stderr) == (0, False)

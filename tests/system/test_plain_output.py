@@ -154,8 +154,6 @@ COMMANDS = [
     ("status", "--port", EVIL),
     ("stop", "--port", EVIL),
     ("device", "--bench", EVIL),
-    ("migrate", "evil.toml", "broken.toml"),
-    ("migrate", FILE),
     (EVIL,),
     (f"--{EVIL}",),
     ("plan", f"--{EVIL}"),

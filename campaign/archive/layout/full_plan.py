@@ -44,7 +44,7 @@ class FullPlan:
 
     Attributes:
         path: of the run, for messages.
-        texts: reads the two files; empty texts in an archive of format 1. Raises ArchiveError.
+        texts: reads the two files. Raises ArchiveError.
         stages: of the journal; their trials come after those of the two files.
     """
 

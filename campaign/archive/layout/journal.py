@@ -128,7 +128,7 @@ class TrialsFollowed(_Line):
 class TrialFinished(_Line):
     """A trial ended, however it ended, and its file is on the disk under its real name.
 
-    `record` is the digest of the trial's record; before format 3 there was none.
+    `record` is the digest of the trial's record.
     """
 
     event: Literal["trial finished"] = "trial finished"
@@ -137,7 +137,7 @@ class TrialFinished(_Line):
     attempt: int = Field(default=1, ge=1)
     file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs$")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
-    record: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
+    record: str = Field(pattern=r"^[0-9a-f]{64}$")
     bytes: int = Field(ge=0)
     outcome: Outcome
     reason: str

@@ -22,18 +22,9 @@ def read_header(folder: Path) -> RunHeader:
     """The header of a run in progress. Raises ArchiveError when there is none."""
     path = folder / HEADER
     try:
-        document = json.loads(_read(path))
+        document = json.loads(read_text(path))
         check_format(path, int(document["format"]))
         return RunHeader.model_validate(document["header"])
-    except (ValueError, LookupError, TypeError, RecursionError) as error:
-        raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
-
-
-def read_format(folder: Path) -> int:
-    """The version of the format in which a run was begun."""
-    path = folder / HEADER
-    try:
-        return int(json.loads(_read(path))["format"])
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise ArchiveError(f"{path}: is not the header of a run: {first_line(error)}") from None
 
@@ -41,16 +32,6 @@ def read_format(folder: Path) -> int:
 def header_document(header: RunHeader) -> str:
     """The content of `run.json`."""
     return canonical_json({"format": FORMAT, "header": header.model_dump(mode="json")}) + "\n"
-
-
-def read_plan_text(folder: Path) -> str:
-    """The plan as JSON lines."""
-    return _read(folder / PLAN)
-
-
-def read_optional(path: Path) -> str:
-    """A text file that earlier formats do not have; then empty."""
-    return _read(path) if path.exists() else ""
 
 
 def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
@@ -65,10 +46,11 @@ def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
 
 
 def check_format(path: Path, version: int) -> None:
-    """ArchiveError when the archive is newer than this program."""
-    if not 1 <= version <= FORMAT:
+    """ArchiveError when the archive is of another format than this program's."""
+    if version != FORMAT:
         raise ArchiveError(
-            f"{path}: has format {version}; this program reads up to {FORMAT}. Use a newer one"
+            f"{path}: has format {version}, and this program reads format {FORMAT} alone; read it "
+            "with the program that wrote it"
         )
 
 
@@ -80,7 +62,8 @@ def first_line(error: Exception) -> str:
     return why(error)
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """One of the files, whole. Raises ArchiveError when there is none, or it is no text."""
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:

@@ -14,10 +14,8 @@ from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
 from campaign.archive.layout.run_folder import (
     PLAN,
     parse_plan,
-    read_format,
     read_header,
-    read_optional,
-    read_plan_text,
+    read_text,
 )
 from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
@@ -35,13 +33,12 @@ def open_folder(folder: Path) -> RunReader:
     header = read_header(folder)
     damaged = DamageList(folder)
     story = _story(folder, damaged)
-    old = read_format(folder) <= 2
     measured = measured_in(story.entries)
     trials: list[ArchivedTrial] = []
     earlier: dict[int, list[ArchivedTrial]] = {}
     for entry, finished in entry_names(story.attempts).items():
         with damaged.noting():
-            archived = _read_trial(folder / finished.file, finished, entry, old)
+            archived = read_trial_file(folder / finished.file, finished, entry)
             archived = with_metrics(archived, measured.get(finished.record))
             if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
                 earlier.setdefault(finished.trial, []).append(archived)
@@ -49,7 +46,7 @@ def open_folder(folder: Path) -> RunReader:
                 trials.append(archived)
     ended = story.ended
     planned: tuple[PlannedTrial, ...] = damaged.read(
-        lambda: parse_plan(folder / PLAN, read_plan_text(folder)), ()
+        lambda: parse_plan(folder / PLAN, read_text(folder / PLAN)), ()
     )
     stages = stages_in(story.entries)
     return RunReader(
@@ -86,16 +83,8 @@ def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") ->
         return archived_trial(path, name, record, trees, not_kept, sealed_as)
 
 
-def _read_trial(path: Path, finished: TrialFinished, entry: str, old: bool) -> ArchivedTrial:
-    if not old:
-        return read_trial_file(path, finished, entry)
-    from campaign.archive.reading.format_2.trials import read_trial_file as read_old_trial_file
-
-    return read_old_trial_file(path, finished.trial)
-
-
 def _plan_texts(folder: Path) -> tuple[str, str]:
-    return read_optional(folder / PLAN_TRIALS), read_optional(folder / PLAN_TREES)
+    return read_text(folder / PLAN_TRIALS), read_text(folder / PLAN_TREES)
 
 
 def _story(folder: Path, damaged: DamageList) -> Lines:

@@ -43,25 +43,23 @@ def _open_folder(folder: Path) -> RunReader:
 
 
 def read_sealed(path: Path) -> RunReader:
-    """Read a sealed file of any format, whatever its name."""
-    if sealed_format(path) <= 2:
-        from campaign.archive.reading.format_2.sealed import read_sealed as read
-    else:
-        from campaign.archive.reading.sealed import read_sealed as read
-    return read(path)
+    """Read a sealed file, whatever its name."""
+    from campaign.archive.reading import sealed
+
+    check_sealed(path)
+    return sealed.read_sealed(path)
 
 
 def read_glance(path: Path) -> Glance:
     """A sealed file at a glance, without its trials. Raises ArchiveError."""
-    if sealed_format(path) <= 2:
-        from campaign.archive.reading.format_2.sealed import read_glance as read
-    else:
-        from campaign.archive.reading.sealed import read_glance as read
-    return read(path)
+    from campaign.archive.reading import sealed
+
+    check_sealed(path)
+    return sealed.read_glance(path)
 
 
-def sealed_format(path: Path) -> int:
-    """The format of a sealed file. Raises ArchiveError when it is none that this program reads."""
+def check_sealed(path: Path) -> None:
+    """ArchiveError when a file is no sealed run of the format that this program reads."""
     from campaign.archive.reading import guarded
 
     with guarded.open_file(path) as file, guarded.guarded(path, "/run/provenance/format"):
@@ -75,4 +73,3 @@ def sealed_format(path: Path) -> int:
             raise ArchiveError(f"{path}: /run: is not the archive of a run{IMPORT}")
         version = guarded.integer_at(provenance, "format")
     check_format(path, version)
-    return version

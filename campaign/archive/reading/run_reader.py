@@ -15,7 +15,6 @@ from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
 from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
-from campaign.errors import ArchiveError
 from campaign.recording import SafeState
 from campaign.trial import Tree, Trial
 
@@ -57,7 +56,7 @@ class RunReader:
         plan: every planned trial, executed or not; those that followed come last.
         trials: the executed ones, in plan order, failed ones included.
         journal: verbatim.
-        full_plan: every planned trial, whole; empty in an archive of format 1.
+        full_plan: every planned trial, whole.
         damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a
             trial from `trials`, a line from `plan`, a field of the header is as if it had not been
             given. Samples are looked at only when they are read, and by `problems`.
@@ -66,7 +65,7 @@ class RunReader:
         stages: trials that followed from what others found, as the journal tells; empty before
             there were stages. The header counts the trials of the plan without them.
         root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
-            is in progress, and in archives of formats 1 and 2.
+            is in progress.
     """
 
     path: Path
@@ -135,18 +134,9 @@ class RunReader:
     def planned(self, number: int) -> Trial:
         """The trial `number` of the plan, executed or not, ready to be executed.
 
-        Raises ArchiveError when there is none, or when the archive is of format 1, which kept the
-        executed ones only.
+        Raises ArchiveError when there is none.
         """
-        if len(self.full_plan):
-            return self.full_plan.trial(number)
-        executed = {archived.trial.number: archived.trial for archived in self.trials}
-        if number not in executed:
-            raise ArchiveError(
-                f"{self.path}: has no trial {number}; an archive of format 1 holds only those that "
-                "were executed"
-            )
-        return executed[number]
+        return self.full_plan.trial(number)
 
     def unchanged(self) -> bool:
         """Whether every byte of the sealed file is as it was written (reads it all)."""

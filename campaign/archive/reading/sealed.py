@@ -1,4 +1,4 @@
-"""Reading a sealed run of format 3: from its index, without opening a trial."""
+"""Reading a sealed run: from its index, without opening a trial."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
 
 
 def read_sealed(path: Path) -> RunReader:
-    """A sealed file of format 3, whatever its name; samples are held against it when read."""
+    """A sealed file, whatever its name; samples are held against it when read."""
     damaged = DamageList(path)
     with guarded.open_file(path) as file, guarded.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)

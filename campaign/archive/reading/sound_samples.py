@@ -72,8 +72,8 @@ def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
     """
     from campaign.archive.reading import guarded
 
-    # Empty before format 3. Of a damaged journal some are missing, and that is told already.
-    digests = {each.trial: each.record for each in run.story.finished.values() if each.record}
+    # Of a damaged journal some are missing, and that is told already.
+    digests = {each.trial: each.record for each in run.story.finished.values()}
     wanted = [t for t in trials if t.trial.number in digests and not t.not_kept]
     if not run.sealed or not wanted:
         return ()

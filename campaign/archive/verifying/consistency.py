@@ -146,15 +146,8 @@ def check_full_plan(
     plan: tuple[PlannedTrial, ...],
     place: str,
     found: DamageList,
-    *,
-    may_be_absent: bool = False,
 ) -> None:
-    """The whole description of each planned trial is that of which the plan has the fingerprint.
-
-    Format 1 has none: it `may_be_absent`.
-    """
-    if not len(full) and may_be_absent:
-        return
+    """The whole description of each planned trial is that of which the plan has the fingerprint."""
     if len(full) != len(plan):
         found.add(place, f"has {len(full)} trials, and the plan has {len(plan)}")
         return

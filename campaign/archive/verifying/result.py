@@ -14,10 +14,6 @@ Progress = Callable[[int], object]
 STRUCTURE = "structure: not as it was sealed, though everything in it reads as it should"
 UNREADABLE_HASH = "structure: has no hash of its own that could be read"
 UNFINISHED = "structure: is not the file that the journal says was written"
-PER_DATASET = (
-    "was sealed in an earlier format: checked per dataset; nothing there binds one to another, so "
-    "what was exchanged whole is not found"
-)
 
 
 @dataclass(frozen=True)

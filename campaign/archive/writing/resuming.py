@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from campaign.archive.layout.files import PART, sha256_of, why
-from campaign.archive.layout.header import FORMAT, PARTIAL, SEALED, RunStatus
+from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
 from campaign.archive.layout.journal import JOURNAL, Journal, Story, read_journal
-from campaign.archive.layout.run_folder import read_format
+from campaign.archive.layout.run_folder import read_header
 from campaign.archive.layout.signature_file import set_aside_signature
-from campaign.archive.reading.opening import read_sealed, sealed_format
+from campaign.archive.reading.opening import read_sealed
 from campaign.archive.writing.remnants import clear_beginning, is_own
 from campaign.archive.writing.run_lock import RunLock
 from campaign.errors import ArchiveError, UsageError
@@ -66,7 +66,6 @@ def _locked(folder: Path) -> Iterator[RunLock]:
 
 
 def _check_sealed(sealed: Path) -> None:
-    _check_format(sealed, sealed_format(sealed))
     run = read_sealed(sealed)
     if run.status not in RESUMABLE:
         raise UsageError(
@@ -74,17 +73,9 @@ def _check_sealed(sealed: Path) -> None:
         )
 
 
-def _check_format(path: Path, version: int) -> None:
-    if version < FORMAT:
-        raise UsageError(
-            f"{path}: was begun by an earlier program (format {version}), and can be gone on with "
-            "by that one only; start a new run"
-        )
-
-
 def _read_folder(folder: Path) -> Story:
     """What is in the folder, checked. Raises ArchiveError naming the trial file that is wrong."""
-    _check_format(folder, read_format(folder))
+    read_header(folder)  # or it is of another format
     story = read_journal(folder / JOURNAL)
     for finished in story.files:
         path = folder / finished.file

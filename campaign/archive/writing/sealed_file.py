@@ -20,7 +20,7 @@ from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
 from campaign.archive.layout.record import TrialRecord, parse_trees, trees_text
-from campaign.archive.layout.run_folder import PLAN, parse_plan, read_optional, read_plan_text
+from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
 from campaign.archive.reading import guarded
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.recorded import PLOTTED, TIME, check_unit, parse_record, series_of
@@ -94,7 +94,7 @@ class SealedFile:
     def finish(self, folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> None:
         """Write everything but the trials, and close the file."""
         texts = _texts(folder, header, story, ended)
-        planned = parse_trees(read_optional(folder / PLAN_TREES))
+        planned = parse_trees(read_text(folder / PLAN_TREES))
         texts["trees/data"] = trees_text(planned | self._trees)
         entries = sorted(self._lines, key=_by_number)
         texts["index/data"] = "".join(f"{self._lines[entry]}\n" for entry in entries)
@@ -208,8 +208,8 @@ def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> di
         for number, (name, text) in enumerate(sorted(header.sources.items()), start=1)
     } | {
         "journal": _note(lines, JOURNAL, story.text),
-        "plan": _note(lines, PLAN, read_plan_text(folder)),
-        "plan_trials": _note(lines, PLAN_TRIALS, read_optional(folder / PLAN_TRIALS)),
+        "plan": _note(lines, PLAN, read_text(folder / PLAN)),
+        "plan_trials": _note(lines, PLAN_TRIALS, read_text(folder / PLAN_TRIALS)),
         "trees": _note(lines, PLAN_TREES, ""),
         "index": _note(lines, "index.jsonl", ""),
     }
@@ -249,7 +249,7 @@ def _by_number(entry: str) -> tuple[int, float]:
 
 def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:
     """What a viewer opens first: see `default_plot`."""
-    plan = parse_plan(folder, read_plan_text(folder))
+    plan = parse_plan(folder, read_text(folder / PLAN))
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
     with_samples = [
         n
