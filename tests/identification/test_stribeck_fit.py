@@ -19,6 +19,8 @@ from campaign.identification.velocity_map import (
     direction_estimates,
     doubts,
     fit_direction,
+    fitted_estimates,
+    is_bent,
     passed,
 )
 
@@ -269,6 +271,24 @@ def test_a_line_shows_no_stribeck_effect_and_its_intervals_hold() -> None:
         held = sum(low <= TRUE[name] <= high for low, high in ends)
         assert held >= 0.93 * len(ends)
         assert len(ends) > 150
+    for fit in fits[:20]:  # the mean of two alike has their part, too
+        one, mean = direction_estimates(fit, "2"), fitted_nominal(fit, fit, "2")
+        if one["coulomb_torque"].origin is Origin.MEASURED:
+            expected = one["coulomb_torque"].systematic_uncertainty
+            assert expected > 0.0
+            assert mean["coulomb_torque"].systematic_uncertainty == pytest.approx(expected)
+
+
+def test_the_mean_of_a_bent_curve_has_the_mean_of_both_ends() -> None:
+    """By profile on either side: no covariance tells how lopsided it is."""
+    speed = np.geomspace(0.02, 1.5, 20)
+    scatter = 1.0 + 4e-3 * np.random.default_rng(5).standard_normal((2, 20))
+    one, other = (fit_direction(speed, equation_4_6(speed) * s, np.full(20, 1e-3)) for s in scatter)
+    found = [fitted_estimates(fit, "free")["static_torque"] for fit in (one, other)]
+    assert is_bent(one, "free", "static_torque")
+    mean = fitted_nominal(one, other, "free")["static_torque"]
+    assert mean.low == pytest.approx(np.mean([each.low for each in found]))
+    assert mean.high == pytest.approx(np.mean([each.high for each in found]))
 
 
 def test_what_rests_on_an_exponent_at_its_limit_is_left_open() -> None:
