@@ -47,13 +47,14 @@ def bench_text(found: Identification, command: str) -> str:
             if section is not sliding and _tells_sliding(filled):
                 # A curve whose numbers are of two models is the curve of neither.
                 filled = {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+            elif section is sliding and not _tells_curve(section):
+                filled = {n: each for n, each in filled.items() if not _bends(each.bench)}
             for parameter in filled.values():
                 values[parameter.bench] = _written(parameter.estimate)
                 known[parameter.bench] = known_of(parameter.estimate)
             correlations += _correlations(section, filled)
             if filled and section.identified is not None:
-                settings = _settings(section.identified, filled, found.bench)
-                for path, (value, unit, _) in settings.items():
+                for path, (value, unit, _) in _settings(section, found.bench).items():
                     if _is_friction(path) and section is not sliding:
                         continue
                     values[path] = _value(value, unit)
@@ -101,9 +102,13 @@ def _of_sliding(sections: Sequence[Section]) -> Section | None:
     """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
     directions apart, as for what one number leaves to an offset a bench has no key; then the last.
     """
+
+    def tells(section: Section) -> tuple[bool, bool]:
+        both = _tells_sliding(_filled(section), "negative.coulomb_torque")
+        return _tells_curve(section), both
+
     told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
-    keys = ("static_torque", "negative.coulomb_torque")
-    return max(told, key=lambda s: [_tells_sliding(_filled(s), k) for k in keys], default=None)
+    return max(told, key=tells, default=None)
 
 
 def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
@@ -114,24 +119,31 @@ def _is_friction(path: str) -> bool:
     return path.startswith(FRICTION)
 
 
-def _settings(
-    identified: Identified, filled: Mapping[str, Parameter], bench: Bench
-) -> dict[str, tuple[Any, str, str]]:
+def _tells_curve(section: Section) -> bool:
+    """Whether a Stribeck curve is measured, whole: what the motion leaves open is no fact."""
+    settings = section.identified.settings if section.identified is not None else {}
+    left_open = any(path.endswith(("static_torque", "stribeck_velocity")) for path in settings)
+    return _tells_sliding(_filled(section), "static_torque") and not left_open
+
+
+def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]:
     """Its settings; bristles of the bench stay where the curve that slides over them is told.
 
-    Where no number of what bends friction is told and the bench has no bristles, friction is
-    Coulomb and viscous friction: what the motion leaves open is no fact of the rig.
+    Where no curve is told and the bench has no bristles, friction is Coulomb and viscous friction;
+    with bristles the rest of the bench's curve stays.
     """
-    settings = dict(identified.settings)
+    settings = dict(section.identified.settings) if section.identified is not None else {}
     model, load = f"{FRICTION}model", bench.friction.get("load")
     if model not in settings:
         return settings
-    if load is not None and load.model == "lugre":
-        if settings[model][0] == "stribeck":
-            settings[model] = ("lugre", *settings[model][1:])
-    elif not any(_is_friction(each.bench) and _bends(each.bench) for each in filled.values()):
+    bristles = load is not None and load.model == "lugre"
+    if not _tells_curve(section):
         settings = {path: each for path, each in settings.items() if not _bends(path)}
         settings[model] = ("coulomb", "", "nothing else of the curve is told")
+        if bristles:
+            del settings[model]
+    elif bristles and settings[model][0] == "stribeck":
+        settings[model] = ("lugre", *settings[model][1:])
     return settings
 
 
