@@ -82,12 +82,13 @@ def identify_run(
         text = bench_text(found, command)
     written = bench.name if bench is not None and text is not None else ""
     made = write_identification(found, output, templates_folder(), command, written)
+    if bench is not None and text is not None:
+        _write_bench(bench, text)  # first: whoever reads what is printed may end early
     _say(found)
     if bench is not None:
         if text is None:
             print_note(f"page: {made}")
             raise UsageError("--output: nothing that was found has a place in a bench file")
-        _write_bench(bench, text)
         print_note(f"bench: {bench}")
     if open_it and not webbrowser.open(made.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")

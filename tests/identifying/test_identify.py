@@ -249,6 +249,20 @@ def test_an_earlier_bench_is_replaced(results: Path, run: str, tmp_path: Path) -
     assert "made up" in bench.read_text(encoding="utf-8")
 
 
+def test_a_bench_is_written_before_anything_is_printed(
+    results: Path, run: str, found: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def closed(text: str) -> None:  # as of `| head`
+        raise BrokenPipeError
+
+    monkeypatch.setattr("campaign.cli.identify.identify", lambda *a, **more: found)
+    monkeypatch.setattr("campaign.cli.identify.print_line", closed)
+    bench, page = tmp_path / "bench.toml", tmp_path / "page"
+    with pytest.raises(BrokenPipeError):
+        identify_run(f"{run}:monday", results, page=page, bench=bench)
+    assert "axis" in tomllib.loads(bench.read_text(encoding="utf-8"))
+
+
 def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -> None:
     table = parameters_table(found.sections)
     [row] = [each for each in table.rows if each["parameter"] == "delay"]
