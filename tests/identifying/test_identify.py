@@ -13,12 +13,12 @@ import pytest
 from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.estimate import Systematic
+from campaign.estimate import Estimate, Systematic
 from campaign.identifying import methods
 from campaign.identifying.identification import Identification, identify
 from campaign.identifying.material import choose
-from campaign.identifying.method import Unseen
-from campaign.identifying.page import write_identification
+from campaign.identifying.method import Parameter, Unseen
+from campaign.identifying.page import _advice, write_identification
 from campaign.identifying.tables import parameters_table
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
@@ -261,6 +261,14 @@ def test_a_bench_is_written_before_anything_is_printed(
     with pytest.raises(BrokenPipeError):
         identify_run(f"{run}:monday", results, page=page, bench=bench)
     assert "axis" in tomllib.loads(bench.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("source", ["slow", "instruments", "loop"])
+def test_what_makes_a_part_smaller_is_a_sentence(source: str) -> None:
+    part = Systematic(source, 0.5)
+    one = Estimate("viscous", 2.0, "N m s/rad", 1.9, 2.1, 0.95, systematic=(part,))
+    assert f"({source})" in (told := _advice(Parameter(one, "")))
+    assert "know the" not in told
 
 
 def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -> None:
