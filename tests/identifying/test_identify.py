@@ -7,6 +7,8 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -15,7 +17,7 @@ from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.identifying import methods
-from campaign.identifying.identification import Identification, identify
+from campaign.identifying.identification import Identification, _section, identify
 from campaign.identifying.material import choose
 from campaign.identifying.method import Parameter, Unseen
 from campaign.identifying.page import _advice, write_identification
@@ -269,6 +271,14 @@ def test_what_makes_a_part_smaller_is_a_sentence(source: str) -> None:
     one = Estimate("viscous", 2.0, "N m s/rad", 1.9, 2.1, 0.95, systematic=(part,))
     assert f"({source})" in (told := _advice(Parameter(one, "")))
     assert "know the" not in told
+
+
+def test_a_method_that_nothing_suits_is_counted_as_well() -> None:
+    said: list[str] = []
+    method = cast("Any", SimpleNamespace(name="ramps", suits=lambda trials: ((), "no trial")))
+    chosen = cast("Any", SimpleNamespace(name="run", trials=()))
+    section = _section(method, None, cast("Any", None), chosen, None, said.append)
+    assert (section.problem, said) == ("no trial", ["ramps, run"])
 
 
 def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -> None:
