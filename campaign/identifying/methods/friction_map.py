@@ -18,6 +18,7 @@ from pydantic import Field
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
+from campaign.experiments.conclusions.parts import count
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.gate import admitted_together, mattering
@@ -293,12 +294,13 @@ def _figure(points: Sequence[Point], mapped: Mapped) -> Figure:
         else:
             continue
         curves.append(Curve(sign * sweep, sign * curve, f"{name}, fitted", name, "thin"))
-    count, plain = len(points), quantity is FRICTION
+    shown = count(len(points), "steady stretch", "steady stretches")
+    plain = quantity is FRICTION
     what = "Friction torque" if plain else "Friction coefficient"
     return Figure(
         key="map" if plain else "coefficient",
         title="Friction over rate" if plain else "Friction coefficient over rate",
-        caption=f"{what} of {count} steady stretches with their 95 % intervals, and what "
+        caption=f"{what} of {shown} with their 95 % intervals, and what "
         "was fitted to each direction, over the rates that were slid at.",
         alt=f"{what} over rate in both directions, with fitted curves.",
         panels=(Panel(Axis("Rate", "rad/s", "deg/s"), Axis(*quantity.axis), tuple(curves)),),
