@@ -43,12 +43,7 @@ def bench_text(found: Identification, command: str) -> str:
     sliding = _of_sliding(found.sections)
     with speaking_of(found.bench.sides):
         for section in found.sections:
-            filled = _filled(section)
-            if section is not sliding and _tells_sliding(filled):
-                # A curve whose numbers are of two models is the curve of neither.
-                filled = {n: each for n, each in filled.items() if not _is_friction(each.bench)}
-            elif section is sliding and not _tells_curve(section):
-                filled = {n: each for n, each in filled.items() if not _bends(each.bench)}
+            filled = _going(section, sliding)
             for parameter in filled.values():
                 values[parameter.bench] = _written(parameter.estimate)
                 known[parameter.bench] = known_of(parameter.estimate)
@@ -75,6 +70,17 @@ def bench_text(found: Identification, command: str) -> str:
     return with_known(_edited(text, values, stale), entries, name)
 
 
+def keys_by_method(found: Identification) -> dict[str, list[str]]:
+    """Names of methods, and keys of the bench file whose values are theirs."""
+    sliding = _of_sliding(found.sections)
+    method = {
+        parameter.bench: section.method.name
+        for section in found.sections
+        for parameter in _going(section, sliding).values()
+    }  # of a key that several fill in, the last
+    return {name: [k for k in method if method[k] == name] for name in method.values()}
+
+
 def nothing_to_write(found: Identification) -> bool:
     """Whether no parameter has a place in a bench file."""
     filled = any(_filled(section) for section in found.sections)
@@ -96,6 +102,17 @@ def _filled(section: Section) -> dict[str, Parameter]:
     if section.identified is None:
         return {}
     return {each.estimate.name: each for each in section.identified.parameters if each.bench}
+
+
+def _going(section: Section, sliding: Section | None) -> dict[str, Parameter]:
+    """What of a method goes into the file, by name; friction is that of `sliding`."""
+    filled = _filled(section)
+    if section is not sliding and _tells_sliding(filled):
+        # A curve whose numbers are of two models is the curve of neither.
+        return {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+    if section is sliding and not _tells_curve(section):
+        return {n: each for n, each in filled.items() if not _bends(each.bench)}
+    return filled
 
 
 def _of_sliding(sections: Sequence[Section]) -> Section | None:

@@ -12,7 +12,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.identifying import methods
-from campaign.identifying.bench_document import bench_text
+from campaign.identifying.bench_document import bench_text, keys_by_method
 from campaign.identifying.identification import Identification, Section, _with_place
 from campaign.identifying.material import Chosen, choose
 from campaign.identifying.method import Identified, Parameter
@@ -82,7 +82,13 @@ def write(results: Path):  # type: ignore[no-untyped-def]
         found = Identification(
             Chosen(cast("Any", run), "monday", chosen.trials), None, None, bench, made
         )
-        return bench_of(bench_text(found, "campaign identify"))
+        bench = bench_of(bench_text(found, "campaign identify"))
+        keys = {key for each in keys_by_method(found).values() for key in each}
+        told = bench.known.values.items()
+        assert keys == {
+            k for k, v in told if v.origin == "measured" and not k.startswith("compensation")
+        }
+        return bench
 
     return written
 

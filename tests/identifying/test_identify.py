@@ -111,8 +111,9 @@ def test_the_command_writes_a_page_its_data_and_a_bench(
         f"{run}:monday", results, models=PLAIN, bench=bench, page=tmp_path / "page"
     )
     assert code is ExitCode.DONE
-    told = capsys.readouterr().out
+    told, noted = capsys.readouterr()
     assert "inertia" in told
+    assert re.search(r"\n  inverse_dynamics: .*axis\.inertia", noted.partition("bench: ")[2])
     html = page.read_text(encoding="utf-8")
     assert "deg" not in html.split("</style>")[1].replace("degrees", "")
     data = json.loads((page.parent / "identification.json").read_text(encoding="utf-8"))
