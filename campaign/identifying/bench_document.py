@@ -11,7 +11,7 @@ from campaign.errors import CampaignError
 from campaign.estimate import Estimate
 from campaign.identifying.compensations import identified_compensations, without_identified
 from campaign.identifying.identification import Identification, Section
-from campaign.identifying.method import Identified, Parameter
+from campaign.identifying.method import Parameter
 from campaign.identifying.written import amount, known_of
 from campaign.physics.bench import Bench
 from campaign.physics.friction import coulomb, friction_models

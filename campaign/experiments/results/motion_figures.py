@@ -124,7 +124,8 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
     return Figure(
         key=f"friction{suffix}",
         title=f"Friction over rate of {motion.data.trial.label}",
-        caption=f"Mean torque of {_stretches(motion)} over the mean rate. {lines}bars: 95 % of each stretch alone, without what differs between them.",
+        caption=f"Mean torque of {_stretches(motion)} over the mean rate. {lines}bars: "
+        "95 % of each stretch alone, without what differs between them.",
         alt="Friction torque over rate: a dot for each steady stretch, in both directions, and a "
         "straight line through those of each.",
         panels=tuple(panels),

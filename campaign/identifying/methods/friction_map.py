@@ -163,12 +163,12 @@ def _left_out(
         numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
         yield NO_STRETCH(count=len(without), total=len(material.trials), numbers=numbers)
     unsteady = Counter(point.own.unsteady.code for point in found if point.own.unsteady)
-    for code, count in unsteady.items():
-        yield UNSTEADY(count=count, total=len(found), why=code)
+    for code, stretches in unsteady.items():
+        yield UNSTEADY(count=stretches, total=len(found), why=code)
     if options.slowest is None:
-        count = slower(material.trials, material.bench, options.shortest, found)
-        if count:
-            yield TOO_SLOW(count=count)
+        still = slower(material.trials, material.bench, options.shortest, found)
+        if still:
+            yield TOO_SLOW(count=still)
 
 
 def _over_a_turn(held: OverATurn) -> str:
