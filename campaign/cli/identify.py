@@ -18,7 +18,7 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
 from campaign.identifying import methods
-from campaign.identifying.bench_document import bench_text, nothing_to_write
+from campaign.identifying.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identifying.identification import Identification, Section, identify
 from campaign.identifying.material import Chosen, choose
 from campaign.identifying.page import next_measurement, refuse_foreign, write_identification
@@ -82,13 +82,16 @@ def identify_run(
         text = bench_text(found, command)
     written = bench.name if bench is not None and text is not None else ""
     made = write_identification(found, output, templates_folder(), command, written)
+    if bench is not None and text is not None:
+        _write_bench(bench, text)  # first: whoever reads what is printed may end early
     _say(found)
     if bench is not None:
         if text is None:
             print_note(f"page: {made}")
             raise UsageError("--output: nothing that was found has a place in a bench file")
-        _write_bench(bench, text)
         print_note(f"bench: {bench}")
+        for method, keys in keys_by_method(found).items():
+            print_note(f"  {method}: {', '.join(keys)}")
     if open_it and not webbrowser.open(made.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
     return made, worst_exit_code([*map(_say_damaged, sides)])

@@ -11,7 +11,7 @@ from campaign.errors import CampaignError
 from campaign.estimate import Estimate
 from campaign.identifying.compensations import identified_compensations, without_identified
 from campaign.identifying.identification import Identification, Section
-from campaign.identifying.method import Identified, Parameter
+from campaign.identifying.method import Parameter
 from campaign.identifying.written import amount, known_of
 from campaign.physics.bench import Bench
 from campaign.physics.friction import coulomb, friction_models
@@ -43,17 +43,13 @@ def bench_text(found: Identification, command: str) -> str:
     sliding = _of_sliding(found.sections)
     with speaking_of(found.bench.sides):
         for section in found.sections:
-            filled = _filled(section)
-            if section is not sliding and _tells_sliding(filled):
-                # A curve whose numbers are of two models is the curve of neither.
-                filled = {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+            filled = _going(section, sliding)
             for parameter in filled.values():
                 values[parameter.bench] = _written(parameter.estimate)
                 known[parameter.bench] = known_of(parameter.estimate)
             correlations += _correlations(section, filled)
             if filled and section.identified is not None:
-                settings = _settings(section.identified, filled, found.bench)
-                for path, (value, unit, _) in settings.items():
+                for path, (value, unit, _) in _settings(section, found.bench).items():
                     if _is_friction(path) and section is not sliding:
                         continue
                     values[path] = _value(value, unit)
@@ -72,6 +68,17 @@ def bench_text(found: Identification, command: str) -> str:
     if correlations:
         entries["correlations"] = kept + correlations
     return with_known(_edited(text, values, stale), entries, name)
+
+
+def keys_by_method(found: Identification) -> dict[str, list[str]]:
+    """Names of methods, and keys of the bench file whose values are theirs."""
+    sliding = _of_sliding(found.sections)
+    method = {
+        parameter.bench: section.method.name
+        for section in found.sections
+        for parameter in _going(section, sliding).values()
+    }  # of a key that several fill in, the last
+    return {name: [k for k in method if method[k] == name] for name in method.values()}
 
 
 def nothing_to_write(found: Identification) -> bool:
@@ -97,13 +104,28 @@ def _filled(section: Section) -> dict[str, Parameter]:
     return {each.estimate.name: each for each in section.identified.parameters if each.bench}
 
 
+def _going(section: Section, sliding: Section | None) -> dict[str, Parameter]:
+    """What of a method goes into the file, by name; friction is that of `sliding`."""
+    filled = _filled(section)
+    if section is not sliding and _tells_sliding(filled):
+        # A curve whose numbers are of two models is the curve of neither.
+        return {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+    if section is sliding and not _tells_curve(section):
+        return {n: each for n, each in filled.items() if not _bends(each.bench)}
+    return filled
+
+
 def _of_sliding(sections: Sequence[Section]) -> Section | None:
     """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
     directions apart, as for what one number leaves to an offset a bench has no key; then the last.
     """
+
+    def tells(section: Section) -> tuple[bool, bool]:
+        both = _tells_sliding(_filled(section), "negative.coulomb_torque")
+        return _tells_curve(section), both
+
     told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
-    keys = ("static_torque", "negative.coulomb_torque")
-    return max(told, key=lambda s: [_tells_sliding(_filled(s), k) for k in keys], default=None)
+    return max(told, key=tells, default=None)
 
 
 def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
@@ -114,24 +136,31 @@ def _is_friction(path: str) -> bool:
     return path.startswith(FRICTION)
 
 
-def _settings(
-    identified: Identified, filled: Mapping[str, Parameter], bench: Bench
-) -> dict[str, tuple[Any, str, str]]:
+def _tells_curve(section: Section) -> bool:
+    """Whether a Stribeck curve is measured, whole: what the motion leaves open is no fact."""
+    settings = section.identified.settings if section.identified is not None else {}
+    left_open = any(path.endswith(("static_torque", "stribeck_velocity")) for path in settings)
+    return _tells_sliding(_filled(section), "static_torque") and not left_open
+
+
+def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]:
     """Its settings; bristles of the bench stay where the curve that slides over them is told.
 
-    Where no number of what bends friction is told and the bench has no bristles, friction is
-    Coulomb and viscous friction: what the motion leaves open is no fact of the rig.
+    Where no curve is told and the bench has no bristles, friction is Coulomb and viscous friction;
+    with bristles the rest of the bench's curve stays.
     """
-    settings = dict(identified.settings)
+    settings = dict(section.identified.settings) if section.identified is not None else {}
     model, load = f"{FRICTION}model", bench.friction.get("load")
     if model not in settings:
         return settings
-    if load is not None and load.model == "lugre":
-        if settings[model][0] == "stribeck":
-            settings[model] = ("lugre", *settings[model][1:])
-    elif not any(_is_friction(each.bench) and _bends(each.bench) for each in filled.values()):
+    bristles = load is not None and load.model == "lugre"
+    if not _tells_curve(section):
         settings = {path: each for path, each in settings.items() if not _bends(path)}
         settings[model] = ("coulomb", "", "nothing else of the curve is told")
+        if bristles:
+            del settings[model]
+    elif bristles and settings[model][0] == "stribeck":
+        settings[model] = ("lugre", *settings[model][1:])
     return settings
 
 

@@ -209,13 +209,13 @@ def _section(
     validation: Chosen | None,
     say: Callable[[str], None],
 ) -> Section:
+    told = f"{method.name}, {chosen.name}"
+    say(told)
     trials, why = method.suits(chosen.trials)
     if not trials:
         return Section(method, options, problem=why)
     numbers = tuple(each.trial.number for each in trials)
     unseen = validation.trials if validation is not None else ()
-    told = f"{method.name}, {chosen.name}"
-    say(told)
     material = Material(bench, tuple(trials), tuple(unseen), lambda text: say(f"{told}: {text}"))
     try:
         with speaking_of(bench.sides):

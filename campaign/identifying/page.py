@@ -37,6 +37,9 @@ CURES = {
     "what the model misses": "the model lacks something; look at what is left over",
     "friction, at this excitation": "excite with more torque, of which friction is less, "
     "and with a second amplitude, half of it",
+    "slow": "record more motion at low speeds",
+    "instruments": "reduce the noise of the measured motion, or accelerate more",
+    "loop": "record the wanted motion as well (channel `reference`)",
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
 """What makes a systematic part smaller, by its source."""

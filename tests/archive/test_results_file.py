@@ -263,8 +263,9 @@ def test_the_run_itself_is_not_touched_and_is_told_apart(sealed):
     assert [each.path for each in list_runs(sealed.parent)] == [sealed]
     assert find_run(sealed.parent) == sealed
     assert find_run(sealed.parent, "2026") == sealed  # what begins both means the run
-    with pytest.raises(ArchiveError, match="holds no run but what was found in one"):
+    with pytest.raises(ArchiveError, match="holds no run but what was found in one") as refused:
         open_run(path)
+    assert str(refused.value).endswith(f"; name the run, {sealed}")
 
 
 def test_results_are_no_run_when_their_run_is_gone_and_a_run_may_be_called_so(sealed):

@@ -229,6 +229,14 @@ def test_every_number_has_an_interval_or_says_why_not(tmp_path: Path):
         assert title in titles
 
 
+def test_one_stretch_is_one_in_captions(tmp_path: Path):
+    rate = strokes([0.2])
+    told = result(recorded(tmp_path, rate, friction(rate)))
+    captions = " ".join(figure.caption for figure in told.figures)
+    assert captions.count("1 steady stretch") == 2
+    assert "stretches" not in captions
+
+
 def test_what_is_not_recorded_is_left_out(tmp_path: Path):
     """Only a rate and a torque: no position, no tracking error, no load, and nothing fails."""
     rate = strokes(EVERY * 2)

@@ -12,7 +12,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.identifying import methods
-from campaign.identifying.bench_document import bench_text
+from campaign.identifying.bench_document import bench_text, keys_by_method
 from campaign.identifying.identification import Identification, Section, _with_place
 from campaign.identifying.material import Chosen, choose
 from campaign.identifying.method import Identified, Parameter
@@ -82,7 +82,13 @@ def write(results: Path):  # type: ignore[no-untyped-def]
         found = Identification(
             Chosen(cast("Any", run), "monday", chosen.trials), None, None, bench, made
         )
-        return bench_of(bench_text(found, "campaign identify"))
+        bench = bench_of(bench_text(found, "campaign identify"))
+        keys = {key for each in keys_by_method(found).values() for key in each}
+        told = bench.known.values.items()
+        assert keys == {
+            k for k, v in told if v.origin == "measured" and not k.startswith("compensation")
+        }
+        return bench
 
     return written
 
@@ -110,8 +116,13 @@ OPEN = {
 
 
 @pytest.mark.parametrize("before", ["", SMOOTH])
-def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(write, before: str) -> None:  # type: ignore[no-untyped-def]
-    bench = write(HEAD + before, whole_model=Identified(CURVE[:1], Result(), settings=OPEN))
+@pytest.mark.parametrize("measured", [1, 2])
+def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(  # type: ignore[no-untyped-def]
+    write, before: str, measured: int
+) -> None:
+    """Nor does static friction of one direction, or without its Stribeck velocity."""
+    found = Identified(CURVE[:measured], Result(), settings=OPEN)
+    bench = write(HEAD + before, whole_model=found)
     load = bench.friction["load"]
     assert load.model == "coulomb"
     assert (load.coulomb_torque, load.viscous_friction) == (10.0, 2.0)
@@ -121,10 +132,20 @@ def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(write, before: str)
     }
 
 
-def test_what_a_curve_needs_beside_a_number_of_it_is_assumed(write) -> None:  # type: ignore[no-untyped-def]
-    bench = write(HEAD, whole_model=Identified(CURVE[:2], Result(), settings=OPEN))
-    assert bench.friction["load"].model == "lugre"
-    assert bench.known.values["friction.load.stribeck_velocity"].origin == "assumed"
+def test_what_a_motion_leaves_open_stays_as_a_bench_with_bristles_has_it(write) -> None:  # type: ignore[no-untyped-def]
+    bench = write(HEAD + LUGRE, whole_model=Identified(CURVE[:2], Result(), settings=OPEN))
+    load = bench.friction["load"]
+    assert (load.model, load.coulomb_torque, load.viscous_friction) == ("lugre", 10.0, 2.0)
+    assert (load.static_torque, load.bristle_stiffness) == (20.0, 15000.0)
+
+
+def test_a_whole_curve_comes_before_a_later_one_that_is_open(write) -> None:  # type: ignore[no-untyped-def]
+    bench = write(
+        HEAD,
+        friction_map=Identified(CURVE, Result(), settings=STRIBECK),
+        whole_model=Identified(CURVE[:2], Result(), settings=OPEN),
+    )
+    assert bench.friction["load"].model == "stribeck"
 
 
 def test_a_bench_gets_no_friction_of_which_nothing_is_told(write) -> None:  # type: ignore[no-untyped-def]

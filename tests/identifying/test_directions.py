@@ -81,7 +81,7 @@ def test_what_else_is_in_a_force_is_not_told_where_neither_inertia_nor_friction_
 
 
 def test_a_curve_gets_what_was_fitted_beside_what_was_measured() -> None:
-    """A Stribeck velocity that is not determined goes into the file as it was fitted, assumed."""
+    """A Stribeck velocity that is not determined is told as it was fitted, and not measured."""
     names = ("coulomb_torque", "static_torque", "stribeck_velocity")
     values = {"coulomb_torque": 3.0, "static_torque": 4.0, "stribeck_velocity": 1.2}
     found, parameters = {}, []

@@ -250,6 +250,7 @@ def test_a_motor_sensor_that_nobody_can_use_is_told() -> None:
     trial = SimpleNamespace(channel_names=lambda: {"motor_rate", "relative_rate", "drive_torque"})
     (told,) = unused([trial], SimpleNamespace(ratio=None))  # type: ignore[list-item,arg-type]
     assert "motor_rate" in told
+    assert "without `[gear]` motor and load move as one" in told, "as docs/import.md has it"
     assert "[gear] ratio" in told
     assert not list(unused([trial], SimpleNamespace(ratio=2.0)))  # type: ignore[list-item,arg-type]
 

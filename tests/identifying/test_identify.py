@@ -7,18 +7,20 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.estimate import Systematic
+from campaign.estimate import Estimate, Systematic
 from campaign.identifying import methods
-from campaign.identifying.identification import Identification, identify
+from campaign.identifying.identification import Identification, _section, identify
 from campaign.identifying.material import choose
-from campaign.identifying.method import Unseen
-from campaign.identifying.page import write_identification
+from campaign.identifying.method import Parameter, Unseen
+from campaign.identifying.page import _advice, write_identification
 from campaign.identifying.tables import parameters_table
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
@@ -109,8 +111,9 @@ def test_the_command_writes_a_page_its_data_and_a_bench(
         f"{run}:monday", results, models=PLAIN, bench=bench, page=tmp_path / "page"
     )
     assert code is ExitCode.DONE
-    told = capsys.readouterr().out
+    told, noted = capsys.readouterr()
     assert "inertia" in told
+    assert re.search(r"\n  inverse_dynamics: .*axis\.inertia", noted.partition("bench: ")[2])
     html = page.read_text(encoding="utf-8")
     assert "deg" not in html.split("</style>")[1].replace("degrees", "")
     data = json.loads((page.parent / "identification.json").read_text(encoding="utf-8"))
@@ -247,6 +250,36 @@ def test_an_earlier_bench_is_replaced(results: Path, run: str, tmp_path: Path) -
     bench.write_text('name = "older"\n[axis]\nname = "x"\n', encoding="utf-8")
     identify_run(f"{run}:monday", results, models=PLAIN, page=page, bench=bench)
     assert "made up" in bench.read_text(encoding="utf-8")
+
+
+def test_a_bench_is_written_before_anything_is_printed(
+    results: Path, run: str, found: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def closed(text: str) -> None:  # as of `| head`
+        raise BrokenPipeError
+
+    monkeypatch.setattr("campaign.cli.identify.identify", lambda *a, **more: found)
+    monkeypatch.setattr("campaign.cli.identify.print_line", closed)
+    bench, page = tmp_path / "bench.toml", tmp_path / "page"
+    with pytest.raises(BrokenPipeError):
+        identify_run(f"{run}:monday", results, page=page, bench=bench)
+    assert "axis" in tomllib.loads(bench.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("source", ["slow", "instruments", "loop"])
+def test_what_makes_a_part_smaller_is_a_sentence(source: str) -> None:
+    part = Systematic(source, 0.5)
+    one = Estimate("viscous", 2.0, "N m s/rad", 1.9, 2.1, 0.95, systematic=(part,))
+    assert f"({source})" in (told := _advice(Parameter(one, "")))
+    assert "know the" not in told
+
+
+def test_a_method_that_nothing_suits_is_counted_as_well() -> None:
+    said: list[str] = []
+    method = cast("Any", SimpleNamespace(name="ramps", suits=lambda trials: ((), "no trial")))
+    chosen = cast("Any", SimpleNamespace(name="run", trials=()))
+    section = _section(method, None, cast("Any", None), chosen, None, said.append)
+    assert (section.problem, said) == ("no trial", ["ramps, run"])
 
 
 def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from campaign.archive.layout.files import PART, why
 from campaign.archive.layout.header import SEALED
-from campaign.archive.layout.results import ENTRY
+from campaign.archive.layout.results import ENDING, ENTRY
 from campaign.archive.layout.run_folder import check_format
 from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.run_reader import Glance, RunReader
@@ -64,9 +64,9 @@ def check_sealed(path: Path) -> None:
 
     with guarded.open_file(path) as file, guarded.guarded(path, "/run/provenance/format"):
         if ENTRY in file and "run" not in file:
-            raise ArchiveError(
-                f"{path}: holds no run but what was found in one; the run itself is beside it"
-            )
+            run_path = path.with_name(path.name.removesuffix(ENDING) + SEALED)
+            told = f"; name the run, {run_path}" if run_path.is_file() else ""
+            raise ArchiveError(f"{path}: holds no run but what was found in one{told}")
         run = guarded.member(file, "run")
         provenance = guarded.member(run, "provenance") if run is not None else None
         if provenance is None:

@@ -12,6 +12,7 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
+from campaign.experiments.conclusions.parts import count
 from campaign.experiments.results.motion_account import Motion
 from campaign.experiments.shared.captions import amount, sentence
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, ends_of
@@ -51,8 +52,7 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     if NORMAL_LOAD in recording.channels:
         load = Curve(time, recording[NORMAL_LOAD], "", "measured")
         panels.append(Panel(TIME, Axis("Normal load", "N", "N"), [load], "Normal load"))
-    count = len(motion.stretches)
-    steady = f"shaded: {count} steady stretches" if count else "nowhere is it steady"
+    steady = f"shaded: {_stretches(motion)}" if motion.stretches else "nowhere is it steady"
     top = amount(motion.found["top_rate"].value, "rad/s", "deg/s")
     return Figure(
         key=f"motion{suffix}",
@@ -124,14 +124,18 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
     return Figure(
         key=f"friction{suffix}",
         title=f"Friction over rate of {motion.data.trial.label}",
-        caption=f"Mean torque of each of {len(motion.stretches)} steady stretches over its "
-        f"mean rate. {lines}bars: 95 % of each stretch alone, without what differs between them.",
+        caption=f"Mean torque of {_stretches(motion)} over the mean rate. {lines}bars: "
+        "95 % of each stretch alone, without what differs between them.",
         alt="Friction torque over rate: a dot for each steady stretch, in both directions, and a "
         "straight line through those of each.",
         panels=tuple(panels),
         across=2,
         trials=(motion.data.trial.number,),
     )
+
+
+def _stretches(motion: Motion) -> str:
+    return count(len(motion.stretches), "steady stretch", "steady stretches")
 
 
 def _distances(motion: Motion) -> list[float]:

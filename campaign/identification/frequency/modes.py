@@ -20,6 +20,7 @@ LEAST_IMAGINARY = 1e-6
 SAME = 0.1
 """Distance in the logarithm of frequency within which modes of two orders are the same."""
 METHOD = "root of a rational function with a delay, delta method"
+NOTHING_CHANGES_IT = Cause("value at bound", "it is at its bound: no parameter changes it there")
 OUTSIDE = Cause("outside of the band", "it lies outside of the measured frequencies")
 
 
@@ -118,7 +119,13 @@ def _mode(
 def of_fit(
     name: str, value: float, unit: str, error: float, misfit: Reason, method: str
 ) -> Estimate:
-    """An estimate by a fit; without an interval where the fit is no model of the response."""
+    """An estimate by a fit; without an interval where the fit is no model of the response, or no
+    parameter of it changes the value: it is at its bound, as of a resonance that nothing swings.
+    """
     if misfit:
         return Estimate.without_interval(name, value, unit, MODEL_MISFIT(why=misfit), method=method)
+    if error == 0.0:
+        return Estimate.without_interval(
+            name, value, unit, NOTHING_CHANGES_IT(), method=method, origin=Origin.AT_BOUND
+        )
     return admitted(with_error(name, value, unit, error, math.inf, method))

@@ -42,6 +42,6 @@ def unused(trials: Sequence[ArchivedTrial], bench: Bench) -> Iterator[str]:
     if names := [name for name in SENSORS["motor"] if name in there]:
         verb = "is" if len(names) == 1 else "are"
         yield (
-            f"{' and '.join(names)} {verb} not used: the bench states no gear. Write "
-            "`[gear] ratio` into it; 1 where the motor drives directly."
+            f"{' and '.join(names)} {verb} not used: without `[gear]` motor and load move as one. "
+            "Where they do not, write `[gear] ratio` into the bench."
         )

@@ -97,8 +97,8 @@ def signals(trial: ArchivedTrial, bench: Bench, excited: Excited) -> Signals:
         )
     if reference is None and excited == "auto" and task.mode == "recorded":
         raise ValueError(
-            "it does not say what was excited: import the command (channel `command`), or, where "
-            "no loop made the torque, use --set frequency_response.excited=input"
+            "it does not say what was excited: import the command (channel `command`). Only where "
+            "the torque itself was commanded (open loop) use --set frequency_response.excited=input"
         )
     n = len(recording.time)
     duration = float(np.ptp(recording.time)) if n > 1 else 0.0

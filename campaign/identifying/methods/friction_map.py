@@ -18,6 +18,7 @@ from pydantic import Field
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
+from campaign.experiments.conclusions.parts import count
 from campaign.experiments.shared.elsewhere import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.gate import admitted_together, mattering
@@ -162,12 +163,12 @@ def _left_out(
         numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
         yield NO_STRETCH(count=len(without), total=len(material.trials), numbers=numbers)
     unsteady = Counter(point.own.unsteady.code for point in found if point.own.unsteady)
-    for code, count in unsteady.items():
-        yield UNSTEADY(count=count, total=len(found), why=code)
+    for code, stretches in unsteady.items():
+        yield UNSTEADY(count=stretches, total=len(found), why=code)
     if options.slowest is None:
-        count = slower(material.trials, material.bench, options.shortest, found)
-        if count:
-            yield TOO_SLOW(count=count)
+        still = slower(material.trials, material.bench, options.shortest, found)
+        if still:
+            yield TOO_SLOW(count=still)
 
 
 def _over_a_turn(held: OverATurn) -> str:
@@ -293,12 +294,13 @@ def _figure(points: Sequence[Point], mapped: Mapped) -> Figure:
         else:
             continue
         curves.append(Curve(sign * sweep, sign * curve, f"{name}, fitted", name, "thin"))
-    count, plain = len(points), quantity is FRICTION
+    shown = count(len(points), "steady stretch", "steady stretches")
+    plain = quantity is FRICTION
     what = "Friction torque" if plain else "Friction coefficient"
     return Figure(
         key="map" if plain else "coefficient",
         title="Friction over rate" if plain else "Friction coefficient over rate",
-        caption=f"{what} of {count} steady stretches with their 95 % intervals, and what "
+        caption=f"{what} of {shown} with their 95 % intervals, and what "
         "was fitted to each direction, over the rates that were slid at.",
         alt=f"{what} over rate in both directions, with fitted curves.",
         panels=(Panel(Axis("Rate", "rad/s", "deg/s"), Axis(*quantity.axis), tuple(curves)),),

@@ -236,3 +236,10 @@ def test_mode_damping_is_that_of_the_poles() -> None:
         ]
     )
     assert mode_damping(point) == pytest.approx(-drive.pole.real / abs(drive.pole))
+
+
+def test_a_resonance_that_nothing_swings_has_no_damping_without_uncertainty() -> None:
+    drive = Drive(2.0, 1.0, 4000.0, 300.0, 9.0)
+    found = two_mass_fit({"motor": measured(drive, "motor", 1)}, grounded=False).resonance_damping
+    assert found.value == 1.0
+    assert (found.origin, found.has_interval) == (Origin.AT_BOUND, False)
