@@ -17,7 +17,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.compiled import compiled
 from campaign.physics.friction import friction_models
 from campaign.physics.lanes import Lane
-from campaign.physics.machine_code import LANES, WIDTHS, Part, is_made, make, note_made, parts
+from campaign.physics.machine_code import WIDTHS, Part, is_made, make, note_made, parts
 from campaign.physics.simulate import simulate_together
 from campaign.physics.step_function import compiled_step
 from campaign.physics.vector import LANES
