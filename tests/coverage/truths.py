@@ -197,7 +197,8 @@ def loop_numbers(case: Case, options: Tree) -> dict[str, float]:
         if name == "phase_margin":
             found[name] = min(math.pi + float(np.angle(loop)) for loop in loops)
         else:
-            found[name] = min(-20.0 * math.log10(abs(loop)) for loop in loops if loop)
+            gains = [abs(loop) for loop in loops if loop]
+            found |= {name: -20.0 * math.log10(max(gains))} if gains else {}
     return found
 
 

@@ -353,21 +353,29 @@ def test_a_loop_that_answers_one_count_with_all_of_its_torque_is_refused(kind: s
         fitted(kind, rig.model_copy(update={"controller": controller}))
 
 
-def test_starts_are_spread_over_the_travel_and_runs_end_within_it() -> None:
-    bench = load_bench("platform")
+def unbounded(bench: Bench) -> Bench:
+    limits = bench.limits.model_copy(update={"angle": math.inf})
+    return bench.model_copy(update={"limits": limits})
+
+
+@pytest.mark.parametrize("endless", [False, True])
+def test_starts_are_spread_over_half_of_the_limits_and_runs_end_within_it(endless: bool) -> None:
+    """Fast runs that take the whole of max_travel began at one place: a ripple bent the curve."""
+    bench = unbounded(load_bench("platform")) if endless else load_bench("platform")
     spread = requests("velocity_map", bench, spread_starts=True, warm_up_cycles=0)
     options, _ = fitted("velocity_map", bench, spread_starts=True, warm_up_cycles=0)
-    half = 0.5 * options.max_travel
+    half = 0.25 * math.pi if endless else 0.5 * bench.limits.angle
+    half = max(half, 0.5 * options.max_travel)
     places = [request.task.start_angle for request in spread]
     runs = [plan_run(float(str(request.point["speed"])), options) for request in spread]
     ends = [at + run.speed * (run.ramp + run.cruise) for at, run in zip(places, runs, strict=True)]
     assert min(places) >= -half - 1e-9
     assert max(ends) <= half + 1e-9
-    room = [options.max_travel - end + at for at, end in zip(places, ends, strict=True)]
+    room = [2.0 * half - end + at for at, end in zip(places, ends, strict=True)]
     shares = [(at + half) / left for at, left in zip(places, room, strict=True) if left > 0.1]
     assert np.max(np.diff(np.sort([0.0, *shares, 1.0]))) < 0.1, "and leave no gap between them"
     plain = requests("velocity_map", bench, warm_up_cycles=0)
-    assert {request.task.start_angle for request in plain} == {-half}
+    assert {request.task.start_angle for request in plain} == {-0.5 * options.max_travel}
 
 
 def test_a_sweep_leaves_torque_for_friction_that_nobody_described() -> None:

@@ -87,8 +87,8 @@ class VelocityMapOptions(Options):
     period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
 
     spread_starts: bool = False
-    """Whether each run begins at another angle within max_travel, by the golden ratio: a ripple of
-    friction over position then scatters between the points, and bends no curve."""
+    """Whether each run begins at another angle, by the golden ratio: a ripple of friction over
+    position then scatters between the points, and bends no curve."""
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -312,7 +312,7 @@ def run_requests(
     told = f"window {run.window:.3g} s, {angle_here(run.window * run.speed)}: {run.rule}"
     advice = settling_advice(rig, run.speed, run.speed * run.settle)
     many = bool(options.start_angles)
-    for start_angle in _starts(options, run, number):
+    for start_angle in _starts(options, run, number, rig.limits.angle):
         yield TrialRequest(
             Task(
                 mode="rate",
@@ -330,14 +330,19 @@ def run_requests(
 
 
 def _starts(
-    options: VelocityMapOptions, run: Run | None = None, number: int = 0
+    options: VelocityMapOptions, run: Run | None = None, number: int = 0, limit: float = 0.0
 ) -> tuple[float, ...]:
-    """Angles to start from (rad): of the warm-up, or of a run."""
+    """Angles to start from (rad): of the warm-up, or of a run on an axis with that limit.
+
+    Starts are spread over half of what the limits leave, a quarter of a turn where there are none:
+    over the way of the fastest run alone, all fast runs would see a long ripple at one place.
+    """
     lowest = -0.5 * options.max_travel
     if options.start_angles or run is None or not options.spread_starts:
         return options.start_angles or (lowest,)
-    room = max(options.max_travel - run.speed * (run.ramp + run.cruise), 0.0)
-    return (lowest + number / GOLDEN % 1.0 * room,)
+    room = max(options.max_travel, limit if math.isfinite(limit) else 0.5 * math.pi)
+    left = max(room - run.speed * (run.ramp + run.cruise), 0.0)
+    return (-0.5 * room + number / GOLDEN % 1.0 * left,)
 
 
 def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:
