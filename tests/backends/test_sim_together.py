@@ -12,8 +12,8 @@ import pytest
 from campaign.archive import open_run
 from campaign.backends.interface import ExecutesTogether, KnowsCost
 from campaign.backends.sim import BACKEND, SimBackend, SimOptions
-from campaign.cli.prepare import Request
 from campaign.cli import compiling
+from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
