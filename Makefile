@@ -22,9 +22,16 @@ help:
 	@echo "make format   put the code into the project's format"
 	@echo "make clean    remove the environment and everything built (results/ stays)"
 
+# What the report answers first: for each test its title, the numbers, and how they meet the truth.
+ANSWERS := import json, sys; \
+	found = json.load(open(sys.argv[1], encoding="utf-8"))["opening"]["answers"]; \
+	print(*(f"{line}\n" for each in found for line in (each["title"].upper(), *each["sentences"], each["truth"]) if line), sep="")
+
 demo: $(VENV)/installed
-	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) \
-		&& echo "archive  $$run" && echo "report   $${run%.nxs}-report/report.html"
+	@echo "running protocols/quickstart.toml on the simulated bench"
+	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) && report=$${run%.nxs}-report \
+		&& echo && $(BIN)/python -c '$(ANSWERS)' "$$report/report.json" \
+		&& echo "archive  $$run" && echo "report   $$report/report.html"
 
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 # A test that hangs tells where after 20 minutes, and ends its worker.
@@ -61,8 +68,11 @@ clean:
 
 # Build tools are pinned as well, hence no isolated (unpinned) build environment.
 $(VENV)/installed: $(VENV)/made pyproject.toml constraints.txt
-	$(PIP) install $(PINNED) hatchling editables
-	$(PIP) install $(PINNED) --no-build-isolation --editable .
+	@echo "installing what builds the package: hatchling, editables"
+	@$(PIP) install $(PINNED) hatchling editables
+	@echo "installing campaign and what it needs (numpy, scipy, numba, h5py, matplotlib and others)"
+	@$(PIP) install $(PINNED) --no-build-isolation --editable .
+	@echo "installed in $(VENV)"
 	@touch $@
 
 $(VENV)/installed-test: $(VENV)/installed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -59,6 +60,10 @@ class SimBackend:
 
     Trials of one structure go side by side through the engine: each one's samples are, to the bit,
     what they are when it is simulated alone.
+
+    Attributes:
+        has_blocks: whether trials go side by side at all: not where the engine for that was never
+            compiled, and compiling it would take longer.
     """
 
     fewest_together = 4
@@ -72,6 +77,7 @@ class SimBackend:
         self._known: dict[str, _Known] = {}
         self._groups: dict[Hashable, Hashable] = {}
         self.timing: Timing = UNTIMED
+        self.has_blocks = True
 
     def __enter__(self) -> SimBackend:
         return self
@@ -84,7 +90,7 @@ class SimBackend:
         """Lanes of a block."""
         from campaign.physics.vector import LANES
 
-        return LANES
+        return LANES if self.has_blocks else 1
 
     def simulate_instead(self, truths: Mapping[str, Tree]) -> None:
         """Told the plants of truths, by the digest that trials have of theirs."""
@@ -117,6 +123,20 @@ class SimBackend:
     def cost(self, trial: Trial) -> TrialCost:
         """The step that was chosen for a trial, and how many there are."""
         return self._look_at(trial).cost
+
+    def steps_together(self, trials: Sequence[Trial]) -> int:
+        """Steps of all trials that would be executed together."""
+        steps: defaultdict[Hashable, list[int]] = defaultdict(list)
+        for trial in trials:
+            steps[self.group(trial)].append(self.cost(trial).steps)
+        return sum(sum(each) for each in steps.values() if len(each) >= self.fewest_together)
+
+    def make_ready(self, trials: Sequence[Trial]) -> None:
+        """Compile the friction models of these trials, for lanes as they are executed."""
+        from campaign.physics.lanes import together
+
+        for trial in {self.group(trial): trial for trial in trials}.values():
+            together([self._lane(trial)], self.most_together)
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""

@@ -93,7 +93,7 @@ def resume_run(
         if sign is not None:
             rehearse_signing(sign)
         backend = open_backend(remade.kind, remade.options, left, remade.truths)
-        wait_until_compiled(compiling)
+        wait_until_compiled(compiling, backend, left)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
     if remade.kind.by_hand:
         say_by_hand(remade.options)

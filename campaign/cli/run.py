@@ -69,7 +69,7 @@ def run_protocol(
                 rehearse_signing(sign)
             backend = prepared.open_backend()
         with timing.span(Work.COMPILING):
-            wait_until_compiled(compiling)
+            wait_until_compiled(compiling, backend, plan.trials)
         timing.add(Work.COMPILING, compiling.processor if compiling else 0.0)
     if prepared.kind.by_hand:
         say_by_hand(prepared.options)

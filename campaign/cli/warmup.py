@@ -12,7 +12,7 @@ def warm_up() -> ExitCode:
     """Make all machine code that the shipped benches need; say what, how long, and where it is."""
     from campaign.execution.first_start import Helpers, make_all
     from campaign.physics.compiled import distrusted
-    from campaign.physics.machine_code import Made, all_made, folder
+    from campaign.physics.machine_code import WIDTHS, Made, folder, is_made
 
     compiled: list[Made] = []
     kept = 0
@@ -26,7 +26,7 @@ def warm_up() -> ExitCode:
             kept += 1
 
     began = time.monotonic()
-    if all_made():
+    if all(map(is_made, WIDTHS)):
         make_all(tell)
     else:
         print_note("compiling the engine (once per installation)")

@@ -1,7 +1,7 @@
 """Compiling the engine once per installation, while there is something else to do.
 
-In one process numba compiles one function at a time, so each further width has a process of its
-own, which fills the cache: `python -m campaign.execution.first_start WIDTH`.
+In one process numba compiles one function at a time, so what is made beside that has a process of
+its own, which fills the cache: `python -m campaign.execution.first_start WIDTH [engine]`.
 """
 
 from __future__ import annotations
@@ -14,23 +14,26 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict
 
 from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.machine_code import (
     WIDTHS,
     Made,
-    all_made,
+    engine,
     folder,
+    is_made,
     make,
-    note_all_made,
+    note_made,
     parts,
 )
 from campaign.protocol.bench_file import load_bench
 from campaign.resources import shipped_benches
 
 Told = Callable[[Made], None]
+LONGEST = 600.0
+"""s; longer nothing compiles, even on a machine that has much else to do."""
 
 
 def make_all(told: Told, helpers: Helpers | None = None) -> None:
@@ -42,12 +45,13 @@ def make_all(told: Told, helpers: Helpers | None = None) -> None:
     first, *others = WIDTHS
     for part in parts(first, benches):
         told(make(part))
+    note_made(first)
     elsewhere = helpers.wait() if helpers is not None else {}
     for width in others:
         for part in parts(width, benches):
             loaded = make(part)
             told(elsewhere.get(loaded.name, loaded))
-    note_all_made()
+        note_made(width)
 
 
 class Helpers:
@@ -56,9 +60,9 @@ class Helpers:
     None are started where they could keep nothing for us, or would only wait for our processor.
     """
 
-    def __init__(self, widths: Sequence[int] = WIDTHS[1:]) -> None:
+    def __init__(self, widths: Sequence[int] = WIDTHS[1:], *only: str) -> None:
         useful = folder() is not None and (os.cpu_count() or 1) > 1
-        self._processes = [self._start(width) for width in widths] if useful else []
+        self._processes = [self._start(width, *only) for width in widths] if useful else []
 
     def __enter__(self) -> Helpers:
         return self
@@ -72,15 +76,17 @@ class Helpers:
 
     def wait(self) -> dict[str, Made]:
         """What they have made, by name, when they have ended; one that failed made less."""
+        for process in self._processes:
+            process.wait(LONGEST)
         lines = [line for each in self._processes for line in each.stdout or ()]
         made = [Made(**json.loads(line)) for line in lines]
         return {each.name: each for each in made}
 
     @staticmethod
-    def _start(width: int) -> subprocess.Popen[str]:
+    def _start(width: int, *only: str) -> subprocess.Popen[str]:
         # -P: nothing in the user's folder can stand in for a module of ours.
         return subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-P", "-m", __name__, str(width)],
+            [sys.executable, "-P", "-m", __name__, str(width), *only],
             stdin=subprocess.PIPE,  # which closes, however we end
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -88,12 +94,8 @@ class Helpers:
         )
 
 
-LONGEST = 600.0
-"""s; longer nothing compiles, even on a machine that has much else to do."""
-
-
 class FirstStart:
-    """Makes the machine code in the background where it is not there; a context manager.
+    """Makes the engine in another process where it is not there; a context manager.
 
     Who simulates needs the same code, and so should `wait` first. What goes wrong here costs time
     only: what is missing is compiled where it is used, and there it is said what is wrong.
@@ -104,44 +106,54 @@ class FirstStart:
 
     def __init__(self) -> None:
         self.processor = 0.0
-        self._helpers: Helpers | None = None
-        self._thread: threading.Thread | None = None
+        self._widths: list[int] = []
+        self._helpers: list[Helpers] = []
+        self._leaving = ExitStack()
 
     def __enter__(self) -> FirstStart:
-        if not all_made():
-            with suppress(OSError):  # no more processes: this one compiles all
-                self._helpers = Helpers()
-            # As a daemon it keeps no program that ends.
-            self._thread = threading.Thread(target=self._make, name="compile", daemon=True)
-            self._thread.start()
+        self.need(1)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._helpers is not None:
-            self._helpers.__exit__()
+        self._leaving.close()
+
+    def need(self, width: int) -> None:
+        """Begin to make the engine for so many lanes."""
+        if not is_made(width):
+            self._widths.append(width)
+            with suppress(OSError):  # no more processes: this one compiles it
+                self._helpers.append(self._leaving.enter_context(Helpers([width], "engine")))
 
     @property
     def is_busy(self) -> bool:
-        """Whether there would be something to wait for."""
-        return self._thread is not None and self._thread.is_alive()
+        """Whether there is something to wait for."""
+        return bool(self._widths)
 
-    def wait(self) -> None:
-        """Until everything is there, or something hangs."""
-        if self._thread is not None:
-            self._thread.join(LONGEST)
-
-    def _make(self) -> None:
+    def wait(self, meanwhile: Callable[[], None]) -> None:
+        """Until everything is there, or something hangs; `meanwhile` is done first."""
+        began = time.thread_time()
         with suppress(Exception):  # see the class
-            make_all(lambda made: None, self._helpers)
-        self.processor = time.thread_time()
+            meanwhile()
+            for helper in self._helpers:
+                helper.wait()
+            for width in self._widths:
+                make(engine(width, _bench()))
+                note_made(width)
+        self._widths.clear()
+        self.processor = time.thread_time() - began
 
 
 def _benches() -> list[CompleteBench]:
     return [complete(load_bench(name)) for name in shipped_benches()]
 
 
-def _lines(width: int) -> Iterator[str]:
-    for part in parts(width, _benches()):
+def _bench() -> CompleteBench:
+    """Any one: the engine is the same."""
+    return complete(load_bench(shipped_benches()[0]))
+
+
+def _lines(width: int, *only: str) -> Iterator[str]:
+    for part in [engine(width, _bench())] if only else parts(width, _benches()):
         yield json.dumps(asdict(make(part)))
 
 
@@ -153,5 +165,5 @@ def _end_with_parent() -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a word
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    for line in _lines(int(sys.argv[1])):
+    for line in _lines(int(sys.argv[1]), *sys.argv[2:]):
         print(line, flush=True)  # noqa: T201

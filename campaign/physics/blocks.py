@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from campaign.physics.compiled import inlined
@@ -20,9 +19,9 @@ from campaign.physics.vector import (
     CACHE_LINE,
     by_lanes,
     by_rows,
-    data_of,
     each_lane,
     number_by_lanes,
+    row_of,
 )
 
 Array = NDArray[np.float64]
@@ -144,12 +143,6 @@ def by_lane(rows: Sequence[Any]) -> Array:
     for lane, row in enumerate(rows):
         array[..., lane] = row
     return array
-
-
-@inlined
-def row_of(array: Any) -> Any:
-    """An array of one axis that owns nothing, for a loop."""
-    return carray(data_of(array), (array.shape[0],))
 
 
 @inlined

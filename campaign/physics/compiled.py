@@ -160,12 +160,20 @@ def _kept_in(folder: Path | None) -> Iterator[None]:
             _CONFIG.CACHE_DIR = before
 
 
-def compiled(function: F) -> F:
+def compiled(function: F, **options: Any) -> F:
     """Decorator: compile at the first call, keep on disk, release the GIL while running."""
     folder = cache_folder(function.__module__)
     with _kept_in(folder):
-        compile_ = numba.njit(cache=folder is not None, nogil=True, error_model="numpy")
+        compile_ = numba.njit(cache=folder is not None, nogil=True, error_model="numpy", **options)
         return cast(F, compile_(function))
+
+
+def entry(function: F) -> F:
+    """Decorator: as `compiled`, for what makes no arrays: counting of references is left out.
+
+    The engine's structures have dozens of arrays: counting doubled the time it took to compile.
+    """
+    return compiled(function, _nrt=False)
 
 
 def inlined(function: F) -> F:
@@ -174,8 +182,11 @@ def inlined(function: F) -> F:
 
 
 def called(function: F) -> F:
-    """Decorator: a part of the engine that is compiled for itself, where a call costs little."""
-    return cast(F, numba.njit(error_model="numpy")(function))
+    """Decorator: a part of the engine that is compiled for itself, where a call costs little.
+
+    As `entry`, it makes no arrays.
+    """
+    return cast(F, numba.njit(error_model="numpy", _nrt=False)(function))
 
 
 def compiled_callback(signature: Any, function: Callable[..., Any], module: str) -> Any:

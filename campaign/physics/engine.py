@@ -18,6 +18,8 @@ products are fused only where `fma` says so.
 
 from __future__ import annotations
 
+from typing import Any
+
 from campaign.physics.blocks import (
     Array,
     Controller,
@@ -29,7 +31,7 @@ from campaign.physics.blocks import (
     memory_of,
     system_of,
 )
-from campaign.physics.compiled import compiled, inlined
+from campaign.physics.compiled import entry, inlined
 from campaign.physics.dry_friction import (
     add_line,
     dry_torque_as_it_begins,
@@ -80,129 +82,6 @@ from campaign.physics.vector import (
     in_rows,
     rows_on_the_stack,
 )
-
-
-@compiled
-def advance_one(
-    system: System,
-    friction: Elements,
-    compensation: Elements,
-    controller: Controller,
-    memory: Memory,
-    signals: Array,
-    noise: Array,
-    every: int,
-    out: Array,
-) -> None:
-    """`_advance` of one trial."""
-    _advance(
-        1,
-        system_of(1, system),
-        elements_of(1, friction),
-        elements_of(1, compensation),
-        controller_of(1, controller),
-        memory_of(1, memory),
-        by_lanes(signals, 1),
-        by_lanes(noise, 1),
-        every,
-        by_lanes(out, 1),
-    )
-
-
-@compiled
-def advance_block(
-    system: System,
-    friction: Elements,
-    compensation: Elements,
-    controller: Controller,
-    memory: Memory,
-    signals: Array,
-    noise: Array,
-    every: int,
-    out: Array,
-) -> None:
-    """`_advance` of LANES trials at once."""
-    _advance(
-        LANES,
-        system_of(LANES, system),
-        elements_of(LANES, friction),
-        elements_of(LANES, compensation),
-        controller_of(LANES, controller),
-        memory_of(LANES, memory),
-        by_lanes(signals, LANES),
-        by_lanes(noise, LANES),
-        every,
-        by_lanes(out, LANES),
-    )
-
-
-@inlined
-def _advance(
-    lanes: int,
-    system: System,
-    friction: Elements,
-    compensation: Elements,
-    controller: Controller,
-    memory: Memory,
-    signals: Array,
-    noise: Array,
-    every: int,
-    out: Array,
-) -> None:
-    """Advance over one stretch and record every `every`-th step.
-
-    signals: (inputs, steps + 1) at the step grid, those that act on the plant first.
-    noise: (samples, noisy sensors), in sensor units.
-    out: (8, steps / every), rows as OUTPUTS; the sample at the start of each `every` steps.
-    """
-    sampled = controller.every > 0
-    compensates = not sampled and compensation.viscous.shape[0] > 0
-    dry = friction.dry.address.shape[0] > 0
-    # What is known when a step begins, the states first; and what follows of it alone.
-    known, new = rows_on_the_stack(lanes), rows_on_the_stack(lanes)
-    known_rows, known_columns, new_rows = in_rows(known), in_columns(known), in_rows(new)
-    _begin(system, friction, memory, known)
-    since_sample = memory.counters[0] % controller.every if sampled else 0
-    samples, since_record, place = 0, 0, 0
-    for now in range(signals.shape[1] - 1):
-        if sampled:
-            if since_sample == 0:
-                command = signals[system.acts[DRIVE], now]
-                sample(lanes, controller, compensation, memory, known, command, noise, samples)
-                samples += 1
-            _hold(system, memory, since_sample == controller.output_offset, known)
-            since_sample = since_sample + 1 if since_sample + 1 < controller.every else 0
-        _read_inputs(system, memory, signals, now, known)
-        base_start, base_end = _base_rates(system, signals, now)
-        _times(system.known, known_columns, new_rows)
-        _expect(
-            lanes, system, friction, compensation, compensates, known, new, base_start, base_end
-        )
-        if compensates:
-            _compensate(lanes, system, friction, compensation, known, new)
-        ask(friction)
-        if dry:
-            hold_again(system, friction, compensation, known, new, base_end)
-        if since_record == 0:
-            first = memory.counters[0] == 0
-            out[OUT_LOAD_RATE, place] = known[RATE]
-            out[OUT_FRICTION, place] = _torque_as_it_begins(friction, memory.ended[0], first)
-            if sampled:
-                _record_readings(memory.kept, out, place)
-            else:
-                torque = _torque_as_it_begins(compensation, memory.ended[1], first)
-                _record_states(system, known, base_start, torque, out, place)
-            place += 1
-        since_record = since_record + 1 if since_record + 1 < every else 0
-        memory.ended[0] = _ended_line(friction)
-        if compensates:
-            memory.ended[1] = _ended_line(compensation)
-        _take(system, friction, compensation, compensates, new_rows, known_rows)
-        if dry:
-            rest(friction.dry.numbers, base_end, known)
-        memory.counters[0] += 1
-    for row in range(memory.x.shape[0]):
-        memory.x[row] = known[row]
 
 
 @inlined
@@ -385,3 +264,83 @@ def _record_readings(kept: Array, out: Array, place: int) -> None:
     out[OUT_CURRENT, place] = kept[KEPT_CURRENT]
     out[OUT_POINTING, place] = kept[KEPT_POINTING]
     out[OUT_COMPENSATION, place] = kept[KEPT_TORQUE]
+
+
+def _advancing(lanes: int) -> Any:
+    """`advance` of so many lanes."""
+
+    def advance(
+        system: System,
+        friction: Elements,
+        compensation: Elements,
+        controller: Controller,
+        memory: Memory,
+        signals: Array,
+        noise: Array,
+        every: int,
+        out: Array,
+    ) -> None:
+        """Advance over one stretch and record every `every`-th step.
+
+        signals: (inputs, steps + 1) at the step grid, those that act on the plant first.
+        noise: (samples, noisy sensors), in sensor units.
+        out: (8, steps / every), rows as OUTPUTS; the sample at the start of each `every` steps.
+        """
+        system, memory = system_of(lanes, system), memory_of(lanes, memory)
+        friction, compensation = elements_of(lanes, friction), elements_of(lanes, compensation)
+        controller = controller_of(lanes, controller)
+        signals, noise, out = by_lanes(signals, lanes), by_lanes(noise, lanes), by_lanes(out, lanes)
+        sampled = controller.every > 0
+        compensates = not sampled and compensation.viscous.shape[0] > 0
+        dry = friction.dry.address.shape[0] > 0
+        # What is known when a step begins, the states first; and what follows of it alone.
+        known, new = rows_on_the_stack(lanes), rows_on_the_stack(lanes)
+        known_rows, known_columns, new_rows = in_rows(known), in_columns(known), in_rows(new)
+        _begin(system, friction, memory, known)
+        since_sample = memory.counters[0] % controller.every if sampled else 0
+        samples, since_record, place = 0, 0, 0
+        for now in range(signals.shape[1] - 1):
+            if sampled:
+                if since_sample == 0:
+                    command = signals[system.acts[DRIVE], now]
+                    sample(lanes, controller, compensation, memory, known, command, noise, samples)
+                    samples += 1
+                _hold(system, memory, since_sample == controller.output_offset, known)
+                since_sample = since_sample + 1 if since_sample + 1 < controller.every else 0
+            _read_inputs(system, memory, signals, now, known)
+            base_start, base_end = _base_rates(system, signals, now)
+            _times(system.known, known_columns, new_rows)
+            _expect(
+                lanes, system, friction, compensation, compensates, known, new, base_start, base_end
+            )
+            if compensates:
+                _compensate(lanes, system, friction, compensation, known, new)
+            ask(friction)
+            if dry:
+                hold_again(system, friction, compensation, known, new, base_end)
+            if since_record == 0:
+                first = memory.counters[0] == 0
+                out[OUT_LOAD_RATE, place] = known[RATE]
+                out[OUT_FRICTION, place] = _torque_as_it_begins(friction, memory.ended[0], first)
+                if sampled:
+                    _record_readings(memory.kept, out, place)
+                else:
+                    torque = _torque_as_it_begins(compensation, memory.ended[1], first)
+                    _record_states(system, known, base_start, torque, out, place)
+                place += 1
+            since_record = since_record + 1 if since_record + 1 < every else 0
+            memory.ended[0] = _ended_line(friction)
+            if compensates:
+                memory.ended[1] = _ended_line(compensation)
+            _take(system, friction, compensation, compensates, new_rows, known_rows)
+            if dry:
+                rest(friction.dry.numbers, base_end, known)
+            memory.counters[0] += 1
+        for row in range(memory.x.shape[0]):
+            memory.x[row] = known[row]
+
+    advance.__qualname__ = "advance_one" if lanes == 1 else "advance_block"  # its file
+    return entry(advance)
+
+
+advance_one, advance_block = _advancing(1), _advancing(LANES)

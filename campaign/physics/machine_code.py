@@ -64,14 +64,19 @@ def folder() -> Path | None:
 
 def parts(width: int, benches: Sequence[CompleteBench]) -> Iterator[Part]:
     """What simulating `benches` needs, for one trial (`width` 1) or for LANES side by side."""
-    side_by_side = "one trial" if width == 1 else f"{width} trials side by side"
-    empty = benches[0].with_friction({})
-    yield Part(f"engine, {side_by_side}", partial(_simulate, empty, "rate", width))
+    side_by_side, empty = _side_by_side(width), benches[0].with_friction({})
+    yield engine(width, benches[0])
     for bench in benches:
         name = f"friction models of the bench {bench.name}, {side_by_side}"
         yield Part(name, partial(_make_ready, bench, width))
     name = f"engine, prescribed motion, {side_by_side}"
     yield Part(name, partial(_simulate, empty, "prescribed", width))
+
+
+def engine(width: int, bench: CompleteBench) -> Part:
+    """The engine alone, which is the same for any bench."""
+    empty = bench.with_friction({})
+    return Part(f"engine, {_side_by_side(width)}", partial(_simulate, empty, "rate", width))
 
 
 def make(part: Part) -> Made:
@@ -83,15 +88,15 @@ def make(part: Part) -> Made:
     return Made(part.name, time.perf_counter() - began, compiling.seen)
 
 
-def all_made() -> bool:
-    """Whether everything was made already, by this installation on a machine of this kind."""
-    note = _note()
+def is_made(width: int) -> bool:
+    """Whether the engine was made already, by this installation on a machine of this kind."""
+    note = _note(width)
     return note is not None and note.exists()
 
 
-def note_all_made() -> None:
-    """From now on `all_made` is true, until a source or the processor changes."""
-    note = _note()
+def note_made(width: int) -> None:
+    """From now on `is_made` is true, until a source or the processor changes."""
+    note = _note(width)
     if note is not None:
         with suppress(OSError):
             note.touch()
@@ -110,7 +115,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
         pass
 
 
-def _note() -> Path | None:
+def _note(width: int) -> Path | None:
     """An empty file, named by what numba distinguishes besides what names the folder."""
     kept = folder()
     if kept is None:
@@ -118,7 +123,11 @@ def _note() -> Path | None:
     written = max(source.stat().st_mtime_ns for source in _SOURCES.rglob("*.py"))
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     what = "\n".join((str(_SOURCES), str(written), *processor))
-    return kept / f"all-made-{hashlib.sha256(what.encode()).hexdigest()[:16]}"
+    return kept / f"made-{width}-{hashlib.sha256(what.encode()).hexdigest()[:16]}"
+
+
+def _side_by_side(width: int) -> str:
+    return "one trial" if width == 1 else f"{width} trials side by side"
 
 
 def _make_ready(bench: CompleteBench, width: int) -> None:

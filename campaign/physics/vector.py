@@ -334,11 +334,13 @@ def add_up(typingctx: Any, total: Any, number: Any) -> Any:
 
 
 @intrinsic
-def data_of(typingctx: Any, array: Any) -> Any:
-    """The address of an array's first element, for `numba.carray`."""
-    signature = types.CPointer(array.dtype)(array)
+def row_of(typingctx: Any, array: Any) -> Any:
+    """An array of one axis, as one that owns nothing."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return context.make_array(signature.args[0])(context, builder, args[0]).data
+        own = context.make_array(signature.args[0])(context, builder, args[0])
+        return _make_array(
+            context, builder, array, own.data, cgutils.unpack_tuple(builder, own.shape)
+        )
 
-    return signature, codegen
+    return array(array), codegen

@@ -17,7 +17,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.compiled import compiled
 from campaign.physics.friction import friction_models
 from campaign.physics.lanes import Lane
-from campaign.physics.machine_code import WIDTHS, Part, all_made, make, note_all_made, parts
+from campaign.physics.machine_code import WIDTHS, Part, is_made, make, note_made, parts
 from campaign.physics.simulate import simulate_together
 from campaign.physics.step_function import compiled_step
 from campaign.physics.vector import LANES
@@ -114,14 +114,15 @@ def test_all_is_made_until_a_source_is_touched(tmp_path, monkeypatch) -> None:
     shutil.copytree(Path(machine_code.__file__).parent, sources)
     monkeypatch.setattr(machine_code, "folder", lambda: cache)
     monkeypatch.setattr(machine_code, "_SOURCES", sources)
-    assert not all_made()
-    note_all_made()
-    assert all_made()
+    assert not is_made(1)
+    note_made(1)
+    assert is_made(1)
+    assert not is_made(LANES)
     os.utime(sources / "friction" / "lugre.py", ns=(0, 1 << 62))
-    assert not all_made()
-    note_all_made()
+    assert not is_made(1)
+    note_made(1)
     monkeypatch.setattr(machine_code.binding, "get_host_cpu_name", lambda: "another")
-    assert not all_made()
+    assert not is_made(1)
 
 
 def test_a_temporary_cache_is_none(tmp_path, monkeypatch) -> None:
@@ -132,8 +133,8 @@ def test_a_temporary_cache_is_none(tmp_path, monkeypatch) -> None:
 
 def test_where_nothing_can_be_kept_nothing_is_said_to_be(monkeypatch) -> None:
     monkeypatch.setattr(machine_code, "folder", lambda: None)
-    note_all_made()
-    assert not all_made()
+    note_made(1)
+    assert not is_made(1)
 
 
 def test_each_step_function_has_a_file_of_its_own() -> None:
