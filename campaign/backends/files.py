@@ -57,8 +57,7 @@ from campaign.errors import ProtocolError, UsageError
 from campaign.importing.described import file_used
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import sufficient
-from campaign.importing.mapping import Layout
-from campaign.importing.mapping_errors import MappingError
+from campaign.importing.mapping import Layout, MappingError
 from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED

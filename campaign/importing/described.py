@@ -17,8 +17,6 @@ from campaign.importing.interface import RecordingError, check_regular
 from campaign.options import Options
 from campaign.recording import ChannelInfo
 
-_CHUNK = 1 << 20  # bytes at a time
-
 
 class FileUsed(Options):
     """A file as it was when the plan was made."""
@@ -143,12 +141,9 @@ def label(files: Sequence[FileUsed], first: int = 0) -> str:
 def file_used(path: Path, name: str) -> FileUsed:
     """A file with its digest. Raises RecordingError when it cannot be read."""
     check_regular(path)
-    digest, size = hashlib.sha256(), 0
     try:
         with path.open("rb") as file:
-            while chunk := file.read(_CHUNK):
-                digest.update(chunk)
-                size += len(chunk)
+            digest, size = hashlib.file_digest(file, "sha256"), file.tell()
     except OSError as error:
         why = error.strerror or str(error)
         raise RecordingError.of(path, f"it cannot be read: {why}") from None

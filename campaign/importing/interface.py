@@ -5,10 +5,9 @@ Nothing is converted here and nothing is guessed: a unit is text, a number what 
 
 from __future__ import annotations
 
-import difflib
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.errors import Problem, UsageError
+from campaign.protocol.problems import nearest
 
 Array = NDArray[np.float64]
 HEAD = 1 << 16
@@ -75,25 +75,17 @@ def check_regular(path: Path) -> None:
         mode = path.stat().st_mode
     except (OSError, ValueError) as error:
         told = getattr(error, "strerror", None) or str(error)
-        hint = _nearest_file(path) if isinstance(error, FileNotFoundError) else ""
-        message = f"it cannot be opened: {told}{hint}"
+        names = []
+        if isinstance(error, FileNotFoundError):
+            with suppress(OSError):
+                names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
+        message = f"it cannot be opened: {told}{nearest(path.name, names)}"
         raise RecordingError.of(path, message) from None
     if stat.S_ISDIR(mode):
         raise RecordingError.of(path, "it cannot be opened: it is a folder")
     if not stat.S_ISREG(mode):
         message = "it cannot be opened: it is a pipe, a device or the like, and no regular file"
         raise RecordingError.of(path, message)
-
-
-def _nearest_file(path: Path) -> str:
-    """The file of its folder that is called most alike, for a message; "" where none is."""
-    try:
-        names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
-    except OSError:
-        return ""
-    by_letters = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(path.name.casefold(), by_letters, 1)
-    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
 
 
 @dataclass(frozen=True)
@@ -144,12 +136,6 @@ class Table:
     said: Mapping[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     below: bool = False
-
-    def whole(self, places: Sequence[int] | None = None) -> Array:
-        """All rows of some columns, or of every numeric one: shape (n, columns)."""
-        wanted = [k for k, c in enumerate(self.columns) if c.numeric] if places is None else places
-        blocks = list(self.read(wanted))
-        return np.concatenate(blocks) if blocks else np.empty((0, len(wanted)))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import pytest
 
 from campaign.importing.defects import Defect, Severity, find
 from campaign.importing.defects.between import candidates
-from campaign.importing.defects.late import of_drive_delay
+from campaign.importing.defects.drives import of_drive_delay
 from campaign.importing.defects.samples import continuous
 from tests.importing import rig
 from tests.importing.rig import Motion, rounded

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.importing.defects.clock import ticks
-from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
+from campaign.importing.defects.clock import EvenClock, UnevenError, even_clock, ticks
 
 RATE = 1000.0
 EVEN = np.arange(5000) / RATE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.importing.defects.even_clock import UnevenError, even_clock
+from campaign.importing.defects.clock import UnevenError, even_clock
 
 
 def clock(times, repairs=()):
