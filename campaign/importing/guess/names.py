@@ -315,6 +315,7 @@ def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ..
     """The channel of the vocabulary, what to check, and whether a side of the gear is said."""
     if kind in (TIME, INDEX, UNKNOWN):
         return kind, (), True
+    said = said[kind == "rate" and said[:1] == ["d"] :]  # in front it is a derivative, no target
     told = {change for change, words in _WORDS.items() if not words.isdisjoint(said)} | {""}
     sided = not told.isdisjoint(("motor", "load"))
     if unit == "rpm" or not _TURNS.isdisjoint(said):
