@@ -44,7 +44,7 @@ from campaign.estimate import Origin
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, options_of, result_of
 from campaign.physics.truth import digest, plant_of
-from campaign.protocol import Plan, load_protocol, make_plan
+from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
 from campaign.protocol.follow import follow
 from campaign.recording import Channel, Outcome, Recording
@@ -133,6 +133,8 @@ def _look(rig: Rig, folder: Path, found: dict[str, Any]) -> None:
         truth=str(folder / "truth.toml"),
     )
     plan = make_plan(protocol, seed=rig.number + 1)
+    check_limits(plan)  # as `campaign run` does: nothing is moved then
+    check_loops(plan)
     for test in plan.tests:
         found["warnings"] += [f"{test.name}: {line}" for line in test.warnings]
         done = _executed(case, rig, plan, test.name)
@@ -286,9 +288,14 @@ HEADINGS = (
 )
 
 
+def _in_short(refusal: str) -> str:
+    """The first test of a plan that was refused, or the one line of another refusal."""
+    return (refusal.splitlines()[1:] or [refusal])[0].strip().split(";")[0]
+
+
 def page(rigs: Sequence[dict[str, Any]]) -> str:
     """The section of docs/trust.md."""
-    refused = Counter(rig["refused"].splitlines()[0] for rig in rigs if rig["refused"])
+    refused = Counter(_in_short(rig["refused"]) for rig in rigs if rig["refused"])
     trials, at_limit = (sum(rig[key] for rig in rigs) for key in ("trials", "at_limit"))
     warned = sum(bool(rig["warnings"]) for rig in rigs)
     failed = sum(len(rig["failed"]) for rig in rigs)

@@ -65,15 +65,14 @@ def smoothed_deviation(deviation: Array, place: Array, freedom: float = BATCHES 
 
 
 def lack_of_fit(
-    torque: Array, level: Array, member: Counts, residuals: Array, freedom: float
+    torque: Array, level: Array, part: Array, member: Counts, residuals: Array, freedom: float
 ) -> float | None:
     """p-value of the residuals of means against the scatter of repeats (F test), if there are any.
-
-    Both relative to the torque, as the deviation between points is.
 
     Args:
         torque: of each point (N m), shape (m,).
         level, residuals: mean torque of each place, and how far the curve is from it, shape (n,).
+        part: of each mean, what scatters and repeats differ in proportion to (N m), shape (n,).
         member: to which place each point belongs, shape (m,).
         freedom: places beyond the parameters of the curve.
     """
@@ -82,7 +81,7 @@ def lack_of_fit(
     repeats = len(torque) - len(level)
     if repeats == 0:
         return None
-    pure = float(np.sum(((torque - level[member]) / level[member]) ** 2)) / repeats
+    pure = float(np.sum(((torque - level[member]) / part[member]) ** 2)) / repeats
     count = np.bincount(member)
-    lacking = float(np.sum(count * (residuals / level) ** 2)) / freedom
+    lacking = float(np.sum(count * (residuals / part) ** 2)) / freedom
     return float(fdtrc(freedom, repeats, lacking / pure)) if pure > 0 else None

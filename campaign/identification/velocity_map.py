@@ -4,9 +4,11 @@ A point is the mean of a window, whose own deviation is known, and it deviates f
 by more: friction changes from trial to trial, and what is left of its ripple over position is no
 noise of the window. So a point counts with 1 / (window² + (between × torque)²), where the relative
 deviation between points is what makes chi-square equal to its degrees of freedom (Paule and Mandel,
-"Consensus values and weighting factors", J. Res. NBS 87 (1982)). Intervals are Student's t with
-n - p, from (JᵀWJ)⁻¹. A parameter that ends at a bound is not known by that: p and J have it, too,
-so that the intervals of the others are rather too wide than too narrow.
+"Consensus values and weighting factors", J. Res. NBS 87 (1982)). The torque in it is all of the
+friction, or friction without its viscous part where the points are likelier so: grease and contact
+need not scatter alike. Intervals are Student's t with n - p, from (JᵀWJ)⁻¹. A parameter that ends
+at a bound is not known by that: p and J have it, too, so that the intervals of the others are
+rather too wide than too narrow.
 
 Every map is fitted with delta free, with delta = 2 as the LuGre model has it, and without a
 Stribeck effect. All three have the weights of the first, the most general: a model that does not
@@ -65,6 +67,10 @@ BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_expone
 STRAIGHT = 0.2
 """Half-width of vs over it up to which intervals follow from the slopes of the curve."""
 TINY = 1e-300
+LIKELIER = 4.0
+"""By how much twice the log-likelihood has to rise for friction that scatters in its dry part."""
+LEAST_DRY = 0.1
+"""Smallest part of a torque that scatters: beyond it, weights would rest on one fast point."""
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
 HELD_EXPONENT = Cause("held", "held at {value:g}")
@@ -91,7 +97,8 @@ class DirectionFit:
         place: what repeats had in common: the commanded speed; without repeats, `speed`.
         speed, torque: positive (rad/s, N m).
         window: deviation of each torque that its window shows (N m, 1 sigma).
-        between: relative deviation from point to point beyond that.
+        between: relative deviation from point to point beyond that, of the part that scatters.
+        steady_viscous: viscous friction that does not scatter (N m s/rad); 0: all of it does.
         fits: by model.
         lack_of_fit: p-value of `free` against repeated points; None without repeats.
     """
@@ -101,6 +108,7 @@ class DirectionFit:
     torque: Array
     window: Array
     between: float
+    steady_viscous: float
     fits: Mapping[Model, StribeckFit]
     lack_of_fit: float | None = None
 
@@ -193,7 +201,7 @@ def fit_direction(
 
     means, level = mean(speed), mean(torque)
     scatter = smoothed_deviation(np.sqrt(mean(window**2) / count), np.log(means))
-    between, free = _between(means, level, scatter)
+    between, steady, free = _between(means, level, scatter)
     held = with_misfit(
         fit_stribeck(means, level, free.deviation, HELD["2"], near=free.values), means, level
     )
@@ -202,36 +210,61 @@ def fit_direction(
         "2": held,
         "none": fit_line(means, level, free.deviation),
     }
-    lacking = lack_of_fit(torque, level, member, free.residuals, len(level) - len(free.free))
+    part = scattering(means, level, steady)
+    lacking = lack_of_fit(torque, level, part, member, free.residuals, len(level) - len(free.free))
     named = means if repeat_of is None else np.asarray(shared, dtype=float)
-    return DirectionFit(named, means, level, scatter, between, fits, lacking)
+    return DirectionFit(named, means, level, scatter, between, steady, fits, lacking)
 
 
-def _between(speed: Array, torque: Array, window: Array) -> tuple[float, StribeckFit]:
-    """Relative deviation between points and the fit with delta free, which depend on each other.
+def scattering(speed: Array | float, torque: Array | float, steady_viscous: float) -> Array:
+    """The part of friction torques (N m) that changes from point to point, shape of `torque`."""
+    return np.asarray(np.maximum(torque - steady_viscous * speed, LEAST_DRY * torque))
+
+
+def _between(speed: Array, torque: Array, window: Array) -> tuple[float, float, StribeckFit]:
+    """`between` and `steady_viscous` of a direction, and the fit with delta free.
+
+    They depend on each other. All friction scatters unless the points are likelier otherwise.
+    """
+    whole, dry = (_by_scatter(speed, torque, window, dry=dry) for dry in (False, True))
+    return dry if _unlikely(whole[2]) - _unlikely(dry[2]) > LIKELIER else whole
+
+
+def _unlikely(found: StribeckFit) -> float:
+    """-2 times the logarithm of the likelihood of the residuals, less a constant."""
+    return found.chi_square + 2.0 * float(np.sum(np.log(found.deviation)))
+
+
+def _by_scatter(
+    speed: Array, torque: Array, window: Array, *, dry: bool
+) -> tuple[float, float, StribeckFit]:
+    """As `_between`, for friction that scatters as a whole, or in its dry part alone.
 
     Where windows alone explain more than there is (in a closed loop they do), a common factor makes
     chi-square equal to its degrees of freedom on that side, too.
     """
-    between = 1e-3
-    found = fit_stribeck(speed, torque, _deviation(torque, window, between))
+    between, steady = 1e-3, 0.0
+    found = fit_stribeck(speed, torque, _deviation(torque, torque, window, between))
     for _ in range(ROUNDS):
         freedom = len(speed) - len(found.free)
-        new = between_deviation(found.residuals / torque, window / torque, freedom)
+        steady = found.values["viscous_friction"] if dry else 0.0
+        part = scattering(speed, torque, steady)
+        new = between_deviation(found.residuals / part, window / part, freedom)
         settled = abs(new - between) <= SETTLED * between
         between = new
-        deviation = _deviation(torque, window, between)
+        deviation = _deviation(torque, part, window, between)
         found = fit_stribeck(speed, torque, deviation, start=found.values)
         if settled:
             break
     if between > 0:
-        return between, found
+        return between, steady, found
     factor = math.sqrt(found.chi_square / (len(speed) - len(found.free)))
-    return between, replace(found, deviation=np.maximum(factor * deviation, LEAST * torque))
+    deviation = np.maximum(factor * deviation, LEAST * torque)
+    return between, steady, replace(found, deviation=deviation)
 
 
-def _deviation(torque: Array, window: Array, between: float) -> Array:
-    return np.sqrt(window**2 + (between**2 + LEAST**2) * torque**2)
+def _deviation(torque: Array, part: Array, window: Array, between: float) -> Array:
+    return np.sqrt(window**2 + (between * part) ** 2 + (LEAST * torque) ** 2)
 
 
 def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
