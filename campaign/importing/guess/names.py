@@ -16,7 +16,7 @@ from campaign.unit_grammar import parse_unit
 _QUANTITIES = {
     UNKNOWN: "voltage volt volts spannung u vd vq vin vbus bus dc id ia ib ic iu iv iw currentd "
     "phase pwm status enable enabled flag flags error err fehler mode name ext external cof "
-    "coefficient coeff koeffizient reibwert reibzahl mu μ vibration acc accel accelerometer "
+    "coefficient coeff koeffizient reibwert reibzahl mu vibration acc accel accelerometer "
     "acceleration accelerations beschleunigung ax ay az tx ty mx my ddq qdd ddot qddot ddtheta "
     "power leistung pressure druck model sim simulated predicted residual tcp pose wrench "
     "cartesian quaternion twist mag jerk energy duty fault controlword statusword stiffness "
@@ -26,13 +26,12 @@ _QUANTITIES = {
     "electrical uncertainty sigma std variance cov",
     "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
     "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
-    "forces kraft τ couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
+    "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
     "rate": "dq qd qdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
     "speeds spd rate drehzahl geschwindigkeit geschw winkelgeschw vitesse rpm rps wm n tacho gyro "
-    "gx gy gz ω",
+    "gx gy gz",
     "angle": "q qm qg qpos pos posn position positions angle angles angular ang theta phi winkel "
-    "θ φ lage weg enc encoder encoders displacement distance travel stroke hub abstand rotation "
-    "dist",
+    "lage weg enc encoder encoders displacement distance travel stroke hub abstand rotation dist",
     "current": "current currents curr cur strom courant i iq isq currentq amps amp",
     TIME: "t time times timestamp timestamps stamp zeit temps elapsed clock secs seconds millis "
     "messzeit laufzeit zeitstempel uhrzeit epoch",
@@ -109,9 +108,8 @@ _OF_LETTERS = {"t": "torque", "m": "torque", "f": "torque", "v": "rate", "p": "a
 """Letters that are a quantity where a word says of what: `T_motor`, `v_soll`."""
 _WHOLE = re.compile(r"m?Nm|mA|kN|deg[CK]|(?:m|u)?rad|[un]s|ms|rpm|RPM")
 """What would fall apart at its capital letters."""
-_PIECE = re.compile(
-    r"[A-Z]{2,}(?=[xyz](?![a-zß-ÿ]))|[α-ω]|[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+"
-)
+_PIECE = re.compile(r"[A-Z]{2,}(?=[xyz](?![a-zß-ÿ]))|[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+")
+_SYMBOLS = str.maketrans({"θ": "theta", "ω": "omega", "τ": "tau", "φ": "phi", "μ": "mu"})
 _STARRED = re.compile(r"(?<=[^\W_])\*(?=$|[\s_.:/\[(])")
 """Drives mark targets so: `iq*`."""
 _UNIT_BEHIND = re.compile(
@@ -177,7 +175,7 @@ def common_path(names: Sequence[str]) -> str:
 
 def _pieces(text: str) -> list[str]:
     """Of a name, in the letters of the file."""
-    chunks = re.findall(r"[0-9A-Za-zÀ-ÿα-ω]+", _STARRED.sub("_target", text))
+    chunks = re.findall(r"[0-9A-Za-zÀ-ÿ]+", _STARRED.sub("_target", text).translate(_SYMBOLS))
     apart = [[each] if _WHOLE.fullmatch(each) else _PIECE.findall(each) for each in chunks]
     return [piece for each in apart for piece in each]
 
@@ -222,7 +220,8 @@ def _taken_apart(word: str) -> tuple[str, ...]:
 def _cover(word: str) -> tuple[str, ...]:
     """Words of three letters and more that make up all of it, the longest first; or none."""
     for end in range(len(word), 2, -1):
-        for rest in (word[end:], word[end:].removeprefix("s")):  # German puts one between words
+        # German puts an s or n between words.
+        for rest in (word[end:], word[end:].removeprefix("s"), word[end:].removeprefix("n")):
             if word[:end] in _KNOWN and (not rest or _cover(rest)):
                 return (word[:end], *_cover(rest))
     return ()
@@ -280,6 +279,8 @@ def _kind(said: Sequence[str], by_unit: str) -> tuple[str, str]:
     marks = [w for w in said if w in _WORDS["target"] and len(w) > 1 and w != "set"]
     if not why and marks:
         return "target", marks[0]
+    if not why and {"normal", "load"} <= set(said):
+        return "torque", told
     return kind, why
 
 
