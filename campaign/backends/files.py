@@ -175,7 +175,8 @@ class FilesBackend:
             layout = layout_of(
                 trial, read_layouts(self._mapping), self._options.columns, self._mapping
             )
-            read_by = hashlib.sha256(canonical_json(layout.tree()).encode()).hexdigest()
+            tree = layout.model_dump(mode="json", exclude_defaults=True)
+            read_by = hashlib.sha256(canonical_json(tree).encode()).hexdigest()
             self._check_whose(trial, attempt, used, read_by)
             recording = self._taken(trial, files, layout)
         except (ProtocolError, MappingError, ColumnsError) as error:

@@ -56,10 +56,7 @@ def by_value(values: Array, first: int, name: str, wanted: float | None = None) 
 
 
 def by_restart(times: Array, first: int) -> list[Stretch]:
-    """A trial for each stretch in which time (s), shape (n,), goes on; raises ValueError for one.
-
-    Stretches that are too short for a trial are left out, and the first trial says so.
-    """
+    """A trial for each stretch in which time (s), shape (n,), goes on. ValueError for one."""
     bounds = [0, *restarts(times), len(times)]
     if len(bounds) < 3:
         raise ValueError("its time begins once")

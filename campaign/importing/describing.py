@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from campaign.importing.cutting import NEEDED, Stretch, by_restart, by_trigger, by_value
-from campaign.importing.defects import Severity
 from campaign.importing.defects.clock import SHORTEST, EvenClock, even_clock
 from campaign.importing.defects.defect import counted
 from campaign.importing.described import (
@@ -36,13 +35,10 @@ from campaign.importing.reader import RecordingReader
 from campaign.protocol.positions import Keys
 from campaign.unit_grammar import parse_unit
 
-Clocks = dict[tuple[int, int], ClockUsed]
-"""The clock of each table, by file and table."""
 TIMELESS = (
     "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
     'sample_rate = "1 kHz"'
 )
-
 
 DRIFTS = (
     "it is zero where the trial begins, and what that channel reads at rest makes it drift; "
@@ -100,7 +96,7 @@ class _Finding:
         faults: list[MappingError] = []
         remarks: list[str] = []
         cells: dict[str, Cells] = {}
-        clocks: Clocks = {}
+        clocks: dict[tuple[int, int], ClockUsed] = {}
         channels = self.layout.channels
         for name, channel in channels.items():
             if channel.column is not None:
@@ -191,7 +187,7 @@ class _Finding:
                 raise ValueError(f"{unit!r} is no unit of time")
         return ClockUsed(cells=cells, factor=float(one.factor))
 
-    def _main(self, clocks: Clocks) -> tuple[int, int]:
+    def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
         """The table with the fastest clock, of several alike the longest: the others are held."""
         if len(clocks) == 1:
             return next(iter(clocks))
@@ -262,7 +258,7 @@ class _Finding:
         main: tuple[int, int],
         stretch: Stretch,
         columns: dict[str, Made],
-        clocks: Clocks,
+        clocks: dict[tuple[int, int], ClockUsed],
         told: Sequence[str],
     ) -> Described:
         clock = clocks[main]
@@ -307,7 +303,7 @@ class _Finding:
                 periods[name] = defect.size
                 remarks.append(f"{name} was made continuous: {defect.what}")
                 continue
-            if defect.severity is Severity.NOTED or defect.kind in entry.accept:
+            if defect.noted or defect.kind in entry.accept:
                 remarks.append(defect.what)
                 continue
             what = f"{described.label}: {defect.what}; {defect.remedy}"
@@ -323,7 +319,7 @@ class _Finding:
         self,
         made: dict[str, Made],
         main: tuple[int, int],
-        clocks: Clocks,
+        clocks: dict[tuple[int, int], ClockUsed],
         even: EvenClock,
         remarks: list[str],
     ) -> Iterator[Made]:

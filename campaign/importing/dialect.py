@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import islice, takewhile
 from pathlib import Path
 
@@ -33,12 +33,8 @@ ENDS = 20
 """Rows at the end of a sample by which a way of reading is judged first."""
 MOST = 3
 """Rows of a heading that belong to columns: names, units, and one more."""
-Heading = tuple[tuple[str, ...], tuple[str, ...], int]
-"""Names, units, and how many rows above the table they take."""
-_LONGEST_KEY = 60
-_ENDS_KEY = ":=\t;,"
-_AROUND = " \t;,"
-"""Characters that end a key, and those around a value."""
+Heading = tuple[tuple[str, ...], tuple[str, ...]]
+"""Names and units."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +47,6 @@ class Dialect:
         numeric: for each column, whether its cells are numbers.
         comments: a row may go on after its cells, with words that are no column.
         sheet: of a workbook whose rows are read as lines.
-        said: what stands above the heading as `key: value`.
         doubts: other ways of reading that fit as well, in words.
     """
 
@@ -62,7 +57,6 @@ class Dialect:
     names: tuple[str, ...]
     units: tuple[str, ...]
     numeric: tuple[bool, ...]
-    said: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     comments: bool = False
     sheet: str = ""
@@ -186,27 +180,13 @@ def read_as(
     while start and _looks_like_row(rows[start - 1][1], width, decimal):
         start -= 1  # a broken row that would be taken for heading
     body, first = rows[start:], rows[start][0]
-    above = [(place, cells) for place, cells in rows if place < first]
     columns = width
     if columns > 1 and all(cells[-1] == "" for _, cells in body if len(cells) == width):
         columns -= 1  # every row ends with a separator
-    names, units, used = heading([cells for _, cells in above], columns)
-    said = said_above(lines[place] for place, _ in above[: len(above) - used])
+    names, units = heading([cells for _, cells in rows[:start]], columns)
     kept = tuple(numeric[:columns])
-    found = Dialect(separator, decimal, first + 1, width, names, units, kept, said)
+    found = Dialect(separator, decimal, first + 1, width, names, units, kept)
     return (sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
-
-
-def said_above(lines: Iterable[str]) -> dict[str, str]:
-    """What lines above a heading say as `key: value`."""
-    said: dict[str, str] = {}
-    for line in lines:
-        text = plain(line).lstrip("#%*/").lstrip()
-        end = next((k for k, sign in enumerate(text[: _LONGEST_KEY + 1]) if sign in _ENDS_KEY), 0)
-        key, value = text[:end].strip(), text[end + 1 :].strip(_AROUND)
-        if key and value:
-            said.setdefault(key, value)
-    return said
 
 
 def _looks_like_row(cells: Sequence[str], width: int, decimal: str) -> bool:
@@ -259,9 +239,9 @@ def heading(above: Sequence[list[str]], columns: int) -> Heading:
     while rows and any(map(_is_any_number, rows[0])) and not _are_channels(rows):
         rows.pop(0)  # a key and its value
     if len(rows) > 1 and _is_key_of_units(rows[0]) and not _all_units(rows[1]):
-        names, own, used = _named(rows[1:], columns)
+        names, own = _named(rows[1:], columns)
         keyed = ("", *(without_brackets(cell) for cell in rows[0][1:]))
-        return names, tuple(a or b for a, b in zip(own, keyed, strict=True)), used
+        return names, tuple(a or b for a, b in zip(own, keyed, strict=True))
     return _named(rows, columns)
 
 
@@ -276,7 +256,7 @@ def _named(rows: Sequence[list[str]], columns: int) -> Heading:
     named = next((k for k, cells in enumerate(rows) if not _all_units(cells)), None)
     if named is None:
         # A single row of what may all be units is a row of names: t, A, V.
-        return (tuple(rows[-1]), ("",) * columns, 1) if len(rows) == 1 else ((), ("",) * columns, 0)
+        return tuple(rows[-1]) if len(rows) == 1 else (), ("",) * columns
     split_up = [name_and_unit(cell) for cell in rows[named]]
     names, units = (tuple(each) for each in zip(*split_up, strict=True))
     for cells in rows[named + 1 :]:
@@ -287,7 +267,7 @@ def _named(rows: Sequence[list[str]], columns: int) -> Heading:
             # A unit of time, and the names of what was recorded in place of the other units.
             names = (names[0], *cells[1:])
             units = (units[0] or without_brackets(cells[0]), *units[1:])
-    return names, units, len(rows) - named
+    return names, units
 
 
 def _all_units(cells: Sequence[str]) -> bool:
@@ -324,7 +304,6 @@ def _pairs(rows: Sequence[list[str]], columns: int) -> Heading | None:
     return (
         tuple(cell for name in called for cell in ("time", name)),
         tuple(cell for unit in usable for cell in ("", unit)),
-        len(keyed),
     )
 
 

@@ -184,10 +184,6 @@ class Layout(Options):
     time: TimeColumn | None = None
     channels: dict[ChannelName, ChannelColumn]
 
-    def tree(self) -> dict[str, Any]:
-        """As a normalised tree (SI)."""
-        return self.model_dump(mode="json", exclude_defaults=True)
-
 
 def layouts(
     columns: Mapping[str, Mapping[str, Any]], origin: Origin, problems: list[Problem]

@@ -110,7 +110,7 @@ class OpenedFiles:
 
     def part(self, cells: Cells, first: int, stop: int) -> Array:
         """Rows [first, stop) of a column. Raises RecordingError where it cannot be read."""
-        self._read(cells.rows_of)
+        self.rows(*cells.rows_of)
         file = self._wanted[cells.rows_of][cells.column]
         file.seek(first * _BYTES)
         return np.frombuffer(file.read((stop - first) * _BYTES), dtype=np.float64)
@@ -122,18 +122,14 @@ class OpenedFiles:
         return clock.start + (clock.step or 1.0) * np.arange(first, stop, dtype=np.float64)
 
     def rows(self, file: int, table: int) -> int:
-        """How many rows a table has."""
-        known = self.table(file, table).rows
-        return self._read((file, table)) if known is None else known
-
-    def _read(self, key: tuple[int, int]) -> int:
-        """How many rows a table has, after its columns that are wanted have been read."""
+        """How many rows a table has; its columns that are wanted have then been read."""
+        key = file, table
         if key not in self._rows:
             files, rows = self._wanted.get(key, {}), 0
             for block in self.table(*key).read(list(files) or [0]):
                 rows += len(block)
-                for file, column in zip(files.values(), block.T, strict=False):
-                    file.write(np.ascontiguousarray(column, dtype=np.float64).tobytes())
+                for kept, column in zip(files.values(), block.T, strict=False):
+                    kept.write(np.ascontiguousarray(column, dtype=np.float64).tobytes())
             self._rows[key] = rows
         return self._rows[key]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.importing.defects import Defect, find
-from campaign.importing.defects.clock import EvenClock, UnevenError, even_clock
+from campaign.importing.defects.clock import EvenClock, even_clock
 from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
 from campaign.importing.interface import ROWS, Array, RecordingError
@@ -160,7 +160,7 @@ class RecordingReader:
         try:
             times = partial(self._opened.times, told.clock)
             return even_clock(times, told.first, told.rows, told.repairs)
-        except UnevenError as error:  # it was even when the plan was made
+        except ValueError as error:  # it was even when the plan was made
             path = self._opened.paths[told.table[0]]
             raise RecordingError.of(path, str(error)) from None
 

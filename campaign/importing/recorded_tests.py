@@ -37,7 +37,6 @@ NO_RECORDING = (
     "it has no recordings; add [[test.recording]] for each, or `campaign run` executes it"
 )
 
-
 OUTSIDE = (
     "leads out of the mapping's folder, and a pattern stays below it; name such a file by its path"
 )

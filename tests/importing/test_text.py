@@ -89,9 +89,9 @@ def test_habits_of_other_programs(path, content, names, units, last):
     assert whole(found)[-1].tolist() == last
 
 
-def test_what_stands_above_the_heading_is_kept(path):
+def test_what_stands_above_the_heading_is_no_column(path):
     found = table(path, "Operator: me\nSampling time interval(ms),0.667\n\nt,a\n0,1\n1,2\n2,3\n")
-    assert found.said == {"Operator": "me", "Sampling time interval(ms)": "0.667"}
+    assert [(column.name, column.unit) for column in found.columns] == [("t", ""), ("a", "")]
 
 
 def test_words_are_no_numbers_and_columns_keep_their_places(path):

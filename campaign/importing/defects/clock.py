@@ -115,10 +115,6 @@ def restarts(times: Array) -> list[int]:
     return found
 
 
-class UnevenError(ValueError):
-    """Times that are no even clock: what, in which rows, and what can be done."""
-
-
 @dataclass(frozen=True)
 class EvenClock:
     """Samples at k / rate, and which rows they come from.
@@ -145,10 +141,10 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
     Args:
         repairs: what may be done: `drop repeated`, `mark gaps`, `resample`.
 
-    Raises UnevenError for times that are no even clock, with what would help.
+    Raises ValueError for times that are no even clock: in which rows, and what would help.
     """
     if rows < 2:
-        raise UnevenError(f"{counted(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
+        raise ValueError(f"{counted(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
     start, last = (float(times(k, k + 1)[0]) for k in (first, first + rows - 1))
     if np.isfinite(last - start) and last > start:
         rate = (rows - 1) / (last - start)
@@ -162,7 +158,7 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
             remarks = (told,) if worst > WORTH_TELLING else ()
             return EvenClock(rate, start, rows, None, remarks)
     if rows > LONGEST:
-        raise UnevenError(f"its times are no even clock, and {rows} rows are too many to repair")
+        raise ValueError(f"its times are no even clock, and {rows} rows are too many to repair")
     return _repaired(times(first, first + rows), first, repairs)
 
 
@@ -194,33 +190,33 @@ def _usual_step(clock: Array) -> float:
     """Of times, shape (n,), all finite."""
     steps = np.diff(clock)
     if not (steps > 0).any():
-        raise UnevenError("its times do not go on: all rows have one time")
+        raise ValueError("its times do not go on: all rows have one time")
     # Of rounded times no step is the usual one: 2 and 3 ms at 430 Hz.
     told = ticks(np.unique(clock))
     return told.step if told.resolution else float(np.median(steps[steps > 0]))
 
 
 def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
-    """Raises UnevenError where `repairs` do not allow for what is wrong."""
+    """Raises ValueError where `repairs` do not allow for what is wrong."""
     remarks: list[str] = []
     undefined = np.flatnonzero(~np.isfinite(clock)) + first
     if len(undefined):
         has = "has" if len(undefined) == 1 else "have"
-        raise UnevenError(f"row {_told(undefined)} {has} no time")
+        raise ValueError(f"row {_told(undefined)} {has} no time")
     step = _usual_step(clock)
     back = np.flatnonzero(np.diff(clock) <= 0) + 1 + first
     rows = np.arange(len(clock))
     if len(back):
         if anew := restarts(clock):
-            raise UnevenError(
+            raise ValueError(
                 f"time begins anew in row {_told(np.array(anew) + first)}: {len(anew) + 1} "
                 "recordings in one file; 'restarts = true' under its [[test.recording]] makes a "
                 "trial of each, and so does 'each' with a column that numbers them"
             )
         if not repairs and (coarse := _coarse(clock)):
-            raise UnevenError(coarse)
+            raise ValueError(coarse)
         if "drop repeated" not in repairs:
-            raise UnevenError(
+            raise ValueError(
                 f"the time of row {_told(back)} is not after that of the row before; "
                 'repair = ["drop repeated"] leaves such rows out'
             )
@@ -231,7 +227,7 @@ def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
         remarks.append(told)
         clock = clock[rows]
         if len(clock) < 2:
-            raise UnevenError("its times do not go on")
+            raise ValueError("its times do not go on")
     if "resample" in repairs:
         return _resampled(clock, rows.astype(np.float64), step, remarks)
     return _marked(clock, rows, first, step, repairs, remarks)
@@ -254,10 +250,10 @@ def _marked(
     off = np.abs((clock - clock[0]) / slope - number)
     if len(np.unique(number)) < len(number) or float(off.max()) > TOLERANCE:
         if coarse := _coarse(clock):
-            raise UnevenError(coarse)
+            raise ValueError(coarse)
         spread = float(np.std(steps) / step)
         worst = int(np.argmax(np.abs(steps - step)))
-        raise UnevenError(
+        raise ValueError(
             f"its times are no even clock: steps vary by {100 * spread:.3g} % about {step:.6g} s, "
             f"most by that of {steps[worst]:.6g} s before row {first + rows[worst + 1] + 1}; "
             'repair = ["resample"] puts lines through the samples'
@@ -267,7 +263,7 @@ def _marked(
     if missing := len(positions) - len(rows):
         before = _told(rows[1:][np.diff(number) > 1] + first)
         if "mark gaps" not in repairs:
-            raise UnevenError(
+            raise ValueError(
                 f"{missing} samples are missing, before row {before}; "
                 'repair = ["mark gaps"] marks them as lost, and a trial for each stretch is had by '
                 "'start' and 'stop'"

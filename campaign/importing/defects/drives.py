@@ -16,7 +16,6 @@ from campaign.importing.defects.defect import (
     NO_FILTER,
     Array,
     Defect,
-    Severity,
     correlation,
     is_sure,
     nearest_low,
@@ -60,7 +59,7 @@ def of_drive(name: str, values: Array) -> Iterator[Defect]:
             f"the samples, first in {rows_in_words(*long[0])}"
         )
         ends = (long[0][0], long[-1][1])
-        yield Defect("clipping", (name,), what, ends, extreme, Severity.REPAIRABLE)
+        yield Defect("clipping", (name,), what, ends, extreme)
 
 
 def _repeats(values: Array) -> bool:
@@ -123,8 +122,7 @@ def of_drive_sign(
     proven = back and mass < 0
     if not proven:
         what += "; or something else drove, such as gravity or the hull"
-    severity = Severity.REPAIRABLE if proven else Severity.NOTED
-    yield Defect("sign", names, what, (0, len(time) - 1), share, severity)
+    yield Defect("sign", names, what, (0, len(time) - 1), share, noted=not proven)
 
 
 def _mass_sign(time: Array, rate: Array, torque: Array) -> int:
@@ -189,7 +187,7 @@ def of_twins(names: tuple[str, str], one: Array, two: Array) -> Iterator[Defect]
         f"{names[1]} is {factor:.5g} times {names[0]} {'+' if offset >= 0 else '-'} "
         f"{abs(offset):.3g} (R² {alike**2:.5f}): one signal, not two measurements"
     )
-    yield Defect("twice", names, what, (0, len(one) - 1), factor, Severity.NOTED)
+    yield Defect("twice", names, what, (0, len(one) - 1), factor, noted=True)
 
 
 def of_drive_delay(
@@ -227,7 +225,7 @@ def of_drive_delay(
         f"{one} comes {abs(lag):.3g} s {where} the motion of {two}, which explains "
         f"{100 * explained[peak]:.3g} % of it then, and {100 * explained[most]:.3g} % as it is"
     )
-    yield Defect("delay", names, what, (0, n - 1), lag, Severity.REPAIRABLE)
+    yield Defect("delay", names, what, (0, n - 1), lag)
 
 
 def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.importing.defects.between import of_rate
-from campaign.importing.defects.defect import Array, Defect, Severity
+from campaign.importing.defects.defect import Array, Defect
 from campaign.importing.defects.drives import of_drive, of_drive_delay, of_drive_sign, of_twins
 from campaign.importing.defects.samples import continuous, frozen, of_channel, slower
 
@@ -35,7 +35,6 @@ TOLD = (*ASKED, FRICTION_TORQUE, LOAD_RATE)
 _DERIVATIVES = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE))
 LARGEST = 1e100
 """What no number of a recording is beyond, in any unit."""
-_ORDER = {Severity.REFUSED: 0, Severity.REPAIRABLE: 1, Severity.NOTED: 2}
 
 
 def find(
@@ -70,7 +69,7 @@ def find(
         found += of_drive(name, values) if name in DRIVES else ()
     if len(time) > 1:
         found += _between(time, sound, gear)
-    return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))
+    return tuple(sorted(found, key=lambda each: (each.noted, each.rows)))
 
 
 def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
@@ -81,7 +80,7 @@ def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
             first, last = int(beyond[0]), int(beyond[-1])
             what = f"{name} is {values[first]:.3g} in row {first + 1}: no measurement is that large"
             size = float(values[first])
-            yield Defect("absurd", (name,), what, (first, last), size, Severity.REFUSED)
+            yield Defect("absurd", (name,), what, (first, last), size)
 
 
 def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> list[Defect]:

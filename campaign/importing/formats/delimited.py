@@ -7,7 +7,7 @@ tables lie below each other, each under the same heading.
 from __future__ import annotations
 
 import mmap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -19,15 +19,12 @@ from campaign.importing.dialect import (
     dialect_of,
     encoding_of,
     heading,
-    said_above,
 )
 from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file, lines_of
 
 SAMPLE = 400
 """Lines by which the table is."""
-ABOVE = 100
-"""Lines above a heading that are kept for what they say."""
 
 
 def tables(path: Path) -> Sequence[Table]:
@@ -39,11 +36,11 @@ def tables(path: Path) -> Sequence[Table]:
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError.of(path, message)
     title = _title(dialect, sample)
-    found = list(_below(path, dialect, title)) if title and _again(path, title) else []
+    found = _below(path, dialect, title) if title and _again(path, title) else []
     if len(found) > 1:
         return found
     read = partial(blocks, path, dialect)
-    return [Table("", columns_of(dialect), read, said=dialect.said, doubts=dialect.doubts)]
+    return [Table("", columns_of(dialect), read, doubts=dialect.doubts)]
 
 
 def _title(dialect: Dialect, sample: Sequence[str]) -> str:
@@ -59,58 +56,45 @@ def _title(dialect: Dialect, sample: Sequence[str]) -> str:
 
 def _again(path: Path, title: str) -> bool:
     """Whether a line begins as that heading twice; found without reading lines."""
-    codec = encoding_of_file(path).removesuffix("-sig")
-    if codec.startswith("utf-16"):
-        return False
-    needle = title.encode(codec)
+    needle = title.encode(encoding_of_file(path).removesuffix("-sig"))
     with path.open("rb") as raw, mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as content:
         first = content.find(needle)
         return first >= 0 and content.find(b"\n" + needle, first) >= 0
 
 
-def _below(path: Path, dialect: Dialect, title: str) -> Iterator[Table]:
+def _below(path: Path, dialect: Dialect, title: str) -> list[Table]:
     """The tables below each other, given how the first is read and its line of names."""
-    above: list[str] = []
+    found: list[Table] = []
     titles: list[str] = []
-    own, first, last, rows, count = dialect, 0, 0, 0, 0
+    own, first, last = dialect, 0, 0
 
-    def table() -> Table:
-        return Table(
-            f"block {count}",
-            columns_of(own),
-            partial(blocks, path, own, rows=last - first + 1),
-            rows=rows,
-            said=own.said,
-            doubts=dialect.doubts,
-            below=True,
-        )
+    def end() -> None:
+        if first:
+            read = partial(blocks, path, own, rows=last - first + 1)
+            name = f"block {len(found) + 1}"
+            found.append(Table(name, columns_of(own), read, doubts=dialect.doubts))
 
     for number, line in enumerate(lines_of(path), start=1):
         bare = line.rstrip("\r\n")
         if bare != title and titles and _is_row(dialect, line):
             if not first:
-                own, first = _headed(dialect, titles, above, number), number
-            last, rows = number, rows + 1
+                own, first = _headed(dialect, titles, number), number
+            last = number
         elif bare == title or (first and bare.strip()):
-            if first:
-                count += 1
-                yield table()
-                above, first, rows = [], 0, 0
+            end()
+            first = 0
             titles = [bare] if bare == title else []
-            above += [] if titles else [line]
-        elif bare.strip():
-            (titles if titles else above).append(bare)
-            del above[:-ABOVE]
-    if first:
-        count += 1
-        yield table()
+        elif titles and bare.strip():
+            titles.append(bare)
+    end()
+    return found
 
 
-def _headed(dialect: Dialect, titles: Sequence[str], above: Sequence[str], first: int) -> Dialect:
-    """As the first table is read, from another line, with the units and words of its own."""
-    names, units, _ = heading([dialect.split(line) for line in titles], len(dialect.numeric))
+def _headed(dialect: Dialect, titles: Sequence[str], first: int) -> Dialect:
+    """As the first table is read, from another line, with the units of its own."""
+    names, units = heading([dialect.split(line) for line in titles], len(dialect.numeric))
     units = units if len(names) == len(dialect.names) else dialect.units
-    return replace(dialect, first=first, units=units, said=said_above(above))
+    return replace(dialect, first=first, units=units)
 
 
 def _is_row(dialect: Dialect, line: str) -> bool:

@@ -1,7 +1,7 @@
 """MAT files of version 4 to 7.2: plain variables, Simulink's structures, dSPACE's X and Y.
 
 Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) are in
-no documented form; they are named, with how to save what is in them.
+no documented form; where there is nothing else, how to save what is in them is said.
 """
 
 from __future__ import annotations
@@ -32,8 +32,6 @@ MOST_TIMES = 100
 _COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
 """Structures within each other."""
-OBJECT = "an object of a MATLAB class, which other programs cannot read"
-"""What is said of one that stands beside numbers."""
 
 
 def tables(path: Path) -> Sequence[Table]:
@@ -46,13 +44,12 @@ def tables(path: Path) -> Sequence[Table]:
         found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
     whole: list[Table] = []
     arrays: list[Named] = []
-    said: dict[str, str] = {}
+    objects: list[str] = []
     for name, value in found.items():
         if not name.startswith("__") and name != "None":
-            _sort_out(name, value, whole, arrays, said)
-    whole += tables_of(arrays, said)
+            _sort_out(name, value, whole, arrays, objects)
+    whole += tables_of(arrays)
     if not whole:
-        objects = [name for name, what in said.items() if what == OBJECT]
         nameless = not {"None", "__function_workspace__"}.isdisjoint(found)
         if not objects and not nameless:
             raise RecordingError.of(path, "no variable of it is a series of numbers")
@@ -95,14 +92,14 @@ def _sort_out(
     value: Any,
     tables: list[Table],
     arrays: list[Named],
-    said: dict[str, str],
+    objects: list[str],
     deep: int = 0,
 ) -> None:
-    """Put a variable where it belongs: a table of its own, an array, or what the file says."""
+    """Put a variable where it belongs: a table of its own, an array, or an object's name."""
     if deep > DEEPEST:
         return
     if _is_opaque(value):
-        said[name] = OBJECT
+        objects.append(name)
         return
     parts = {}
     if (fields := _fields(value)) is not None:
@@ -113,14 +110,11 @@ def _sort_out(
     elif isinstance(value, np.ndarray) and value.dtype == object:
         parts = {f"({k})": item for k, item in enumerate(value.ravel(), start=1)}
     for part, item in parts.items():
-        _sort_out(f"{name}{part}", item, tables, arrays, said, deep + 1)
+        _sort_out(f"{name}{part}", item, tables, arrays, objects, deep + 1)
     if fields is not None or parts:
         return
-    array = np.asarray(value)
-    if (series := named(name, array)) is not None:
+    if (series := named(name, np.asarray(value))) is not None:
         arrays.append(series)
-    elif array.ndim == 0 or array.size == 1:
-        said[name] = str(array.reshape(-1)[0]) if array.size else ""
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:
@@ -146,27 +140,22 @@ def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
     )
     lengths = [np.size(each["Data"]) for each in clocks]
     groups: dict[int, list[Named]] = {}
-    said: dict[str, str] = {}
     for k, of in enumerate(signals if clocks else (), start=1):
         data = np.atleast_1d(of["Data"])
-        called = _text(of.get("Name")) or f"Y({k})"
-        if path := _text(of.get("Path")):
-            said[f"Path of {called}"] = path
         index = of.get("XIndex")
         if not (isinstance(index, int | float) and 1 <= index <= len(clocks)):
             if lengths.count(len(data)) != 1:
                 # Two clocks of one length: whose it is cannot be told. A short one is a parameter.
-                said[called] = f"{len(data)} values, of which no time is known"
                 continue
             index = lengths.index(len(data)) + 1
-        series = named(called, data, _text(of.get("Unit")))
+        series = named(_text(of.get("Name")) or f"Y({k})", data, _text(of.get("Unit")))
         if series is not None and series.length == lengths[int(index) - 1]:
             groups.setdefault(int(index), []).append(series)
     for index, found in sorted(groups.items()):
         times = named("time", np.atleast_1d(clocks[index - 1]["Data"]), "s")
         if times is not None:
             part = name if len(groups) == 1 else f"{name}.X({index})"
-            yield table_of([times, *found], said, part)
+            yield table_of([times, *found], part)
 
 
 def _with_time(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
@@ -179,7 +168,7 @@ def _with_time(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
     ]
     alike = [one for one in series if one is not None and times and one.length == times.length]
     if times is not None and alike:
-        yield table_of([times, *alike], {}, name)
+        yield table_of([times, *alike], name)
 
 
 def _is_opaque(value: Any) -> bool:

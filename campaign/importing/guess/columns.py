@@ -68,7 +68,6 @@ class TableGuess:
         step: s between samples, as far as the unit of times is known; None where it is not.
         clock: whether the file states the clock, without a column of times.
         restarts: how often its time begins anew.
-        below: whether it is one of several below each other in a text file.
         doubts: what is wrong with it as a whole.
     """
 
@@ -80,5 +79,4 @@ class TableGuess:
     step: float | None
     clock: bool
     restarts: int
-    below: bool
     doubts: tuple[str, ...]

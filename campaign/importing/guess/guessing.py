@@ -119,7 +119,7 @@ def _of_table(
         columns = with_units(with_roles(columns, series, time), series, time)
     return TableGuess(
         path, form, table.name, tuple(columns), rows, step, table.clock is not None, len(anew),
-        table.below, tuple(doubts),
+        tuple(doubts),
     )  # fmt: skip
 
 

@@ -69,7 +69,8 @@ def slug(text: str) -> str:
 
 def _what_is_read(layout: Layout) -> object:
     """What two layouts that are read alike agree in."""
-    tables = [(table.clock, table.below or table.name) for table in layout.tables]
+    # Of one table the name stands in the recording, of several in their columns.
+    tables = [(table.clock, len(layout.tables) == 1 or table.name) for table in layout.tables]
     columns = [
         (p.column.name, p.column.role, p.column.unit, p.column.basis) for p in layout.columns
     ]

@@ -307,7 +307,6 @@ _CHANNELS = (
 """The channel of a quantity of which a word says that; the first that fits."""
 _OF_A_SIDE = {row[-1] for row in _CHANNELS[-6:]} | {channels.DRIVE_TORQUE}
 
-
 _TURNS = frozenset(("rpm", "drehzahl"))
 """A rate in turns is likely the motor's, and that is all that says so."""
 
