@@ -77,6 +77,11 @@ def with_units(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
             found[k] = replace(found[k], role=role, why=f"{found[k].why}; {why}")
             if found[k].basis is Basis.UNKNOWN:
                 found[k] = found[k].likely(found[j].unit, why)
+    for k, j in _pairs(found, TORQUES, (channels.MOTOR_CURRENT,)):
+        size, fit = _beside(series[k], series[j])
+        if fit > 0.9999:
+            made = f"it is {size:.5g} times {found[j].name}: made of it, and not measured by itself"
+            found[k] = _told(found[k], made)
     return found
 
 
