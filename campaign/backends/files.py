@@ -57,8 +57,7 @@ from campaign.errors import ProtocolError, UsageError
 from campaign.importing.described import file_used
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import sufficient
-from campaign.importing.mapping import Layout
-from campaign.importing.mapping_errors import MappingError
+from campaign.importing.mapping import Layout, MappingError
 from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED
@@ -176,7 +175,8 @@ class FilesBackend:
             layout = layout_of(
                 trial, read_layouts(self._mapping), self._options.columns, self._mapping
             )
-            read_by = hashlib.sha256(canonical_json(layout.tree()).encode()).hexdigest()
+            tree = layout.model_dump(mode="json", exclude_defaults=True)
+            read_by = hashlib.sha256(canonical_json(tree).encode()).hexdigest()
             self._check_whose(trial, attempt, used, read_by)
             recording = self._taken(trial, files, layout)
         except (ProtocolError, MappingError, ColumnsError) as error:

@@ -1,7 +1,7 @@
 """Named arrays of a file as tables: vectors of one length stand together, with a clock if one is.
 
 MAT and HDF5 files have no tables. What was recorded together has one length; a matrix is a column
-for each of its narrow side; single numbers and texts are what the file says besides.
+for each of its narrow side.
 """
 
 from __future__ import annotations
@@ -68,20 +68,19 @@ def named(name: str, array: np.ndarray, unit: str = "") -> Named | None:
     return Named(name, array.shape, part, unit, by_rows)
 
 
-def tables_of(arrays: Sequence[Named], said: dict[str, str]) -> list[Table]:
+def tables_of(arrays: Sequence[Named]) -> list[Table]:
     """A table for each length, the longest first."""
     lengths = sorted({each.length for each in arrays}, reverse=True)
     return [
         table_of(
             [each for each in arrays if each.length == length],
-            said,
             "" if len(lengths) == 1 else f"{length} samples",
         )
         for length in lengths
     ]
 
 
-def table_of(arrays: Sequence[Named], said: dict[str, str], name: str) -> Table:
+def table_of(arrays: Sequence[Named], name: str) -> Table:
     """Arrays of one length as one table."""
     columns: list[Column] = []
     where: list[tuple[Named, int]] = []
@@ -92,7 +91,7 @@ def table_of(arrays: Sequence[Named], said: dict[str, str], name: str) -> Table:
             columns.append(Column(place, array.unit, place))
             where.append((array, k))
     length = arrays[0].length
-    return Table(name, tuple(columns), partial(_read, where, length), rows=length, said=said)
+    return Table(name, tuple(columns), partial(_read, where, length))
 
 
 def _read(

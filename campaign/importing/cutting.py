@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from campaign.importing.defects.clock import SHORTEST
-from campaign.importing.defects.clock import restarts as restarts
+from campaign.importing.defects.clock import SHORTEST, restarts
 from campaign.importing.defects.defect import counted
 from campaign.importing.interface import Array
 
@@ -54,21 +52,16 @@ def by_value(values: Array, first: int, name: str, wanted: float | None = None) 
         remarks.append(f"{blank}, which {'is' if empty == 1 else 'are'} in no trial")
     word = "".join(c if c.isalnum() else "_" for c in name.lower()).strip("_") or "value"
     cut = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
-    cut[0] = replace(cut[0], remarks=tuple(remarks))
-    return numbered(cut)
+    return _numbered(cut, remarks)
 
 
 def by_restart(times: Array, first: int) -> list[Stretch]:
-    """A trial for each stretch in which time (s), shape (n,), goes on; raises ValueError for one.
-
-    Stretches that are too short for a trial are left out, and the first trial says so.
-    """
+    """A trial for each stretch in which time (s), shape (n,), goes on. ValueError for one."""
     bounds = [0, *restarts(times), len(times)]
     if len(bounds) < 3:
         raise ValueError("its time begins once")
     long, remarks = _long(list(pairwise(bounds)), "time")
-    cut = numbered([Stretch(first + a, b - a, {}) for a, b in long])
-    return [replace(cut[0], remarks=tuple(remarks)), *cut[1:]]
+    return _numbered([Stretch(first + a, b - a, {}) for a, b in long], remarks)
 
 
 def _long(
@@ -127,16 +120,20 @@ def by_trigger(
             )
     if (fewest := min(b - a for a, b in pairs)) < SHORTEST:
         raise ValueError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}")
-    return numbered([Stretch(a, b - a, {}) for a, b in pairs])
+    return _numbered([Stretch(a, b - a, {}) for a, b in pairs])
 
 
-def numbered(stretches: Sequence[Stretch]) -> list[Stretch]:
-    """The same; where two are told apart by nothing, each also by its number, from 1."""
-    alike = Counter(tuple(each.conditions.items()) for each in stretches)
-    if max(alike.values(), default=0) < 2:
-        return list(stretches)
-    key = "part" if all("part" not in each.conditions for each in stretches) else "stretch"
+def _numbered(stretches: list[Stretch], remarks: Sequence[str] = ()) -> list[Stretch]:
+    """The same, with what the first remarks.
+
+    Where two are told apart by nothing, each is also by its number, from 1.
+    """
+    first, *others = stretches
+    cut = [replace(first, remarks=tuple(remarks)), *others]
+    if len({tuple(each.conditions.items()) for each in cut}) == len(cut):
+        return cut
+    key = "stretch" if "part" in first.conditions else "part"
     return [
         replace(each, conditions={**each.conditions, key: number})
-        for number, each in enumerate(stretches, 1)
+        for number, each in enumerate(cut, 1)
     ]

@@ -13,11 +13,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from campaign.importing.interface import RecordingError, check_regular
+from campaign.importing.interface import regular
 from campaign.options import Options
 from campaign.recording import ChannelInfo
-
-_CHUNK = 1 << 20  # bytes at a time
 
 
 class FileUsed(Options):
@@ -142,14 +140,6 @@ def label(files: Sequence[FileUsed], first: int = 0) -> str:
 
 def file_used(path: Path, name: str) -> FileUsed:
     """A file with its digest. Raises RecordingError when it cannot be read."""
-    check_regular(path)
-    digest, size = hashlib.sha256(), 0
-    try:
-        with path.open("rb") as file:
-            while chunk := file.read(_CHUNK):
-                digest.update(chunk)
-                size += len(chunk)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise RecordingError.of(path, f"it cannot be read: {why}") from None
+    with regular(path) as file:
+        digest, size = hashlib.file_digest(file, "sha256"), file.tell()
     return FileUsed(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -10,17 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.importing.cutting import (
-    NEEDED,
-    Stretch,
-    by_restart,
-    by_trigger,
-    by_value,
-)
-from campaign.importing.defects import Severity
-from campaign.importing.defects.clock import SHORTEST
+from campaign.importing.cutting import NEEDED, Stretch, by_restart, by_trigger, by_value
+from campaign.importing.defects.clock import SHORTEST, EvenClock, even_clock
 from campaign.importing.defects.defect import counted
-from campaign.importing.defects.even_clock import EvenClock, even_clock
 from campaign.importing.described import (
     Cells,
     ClockUsed,
@@ -30,27 +22,23 @@ from campaign.importing.described import (
     file_used,
     label,
 )
-from campaign.importing.interface import Array
 from campaign.importing.made import PLAIN, RigFacts, following, made_of_channel, made_of_column
 from campaign.importing.mapping import (
-    ChannelColumn,
     ColumnPlace,
     Layout,
+    MappingError,
     RecordingEntry,
     TimeColumn,
 )
-from campaign.importing.mapping_errors import Key, MappingError
 from campaign.importing.opened import OpenedFiles
-from campaign.importing.reader import RecordingReader, clock_times
+from campaign.importing.reader import RecordingReader
+from campaign.protocol.positions import Keys
 from campaign.unit_grammar import parse_unit
 
-Clocks = dict[tuple[int, int], ClockUsed]
-"""The clock of each table, by file and table."""
 TIMELESS = (
     "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
     'sample_rate = "1 kHz"'
 )
-
 
 DRIFTS = (
     "it is zero where the trial begins, and what that channel reads at rest makes it drift; "
@@ -105,18 +93,34 @@ class _Finding:
 
     def trials(self) -> list[tuple[Described, Stretch]]:
         """Raises MappingError with everything that is wrong."""
-        made, remarks, clocks, chosen = self._columns()
-        used: list[Made | ClockUsed] = [*made.values(), *clocks.values()]
-        for cells in (*(each.cells for each in used), *chosen):
-            if cells is not None:
-                self.opened.want(cells)
-        main = self._main(clocks)
         faults: list[MappingError] = []
-        for each in chosen:
-            if each.rows_of != main:
-                message = f"column {each.name!r} has another clock than the channels"
-                faults.append(MappingError(message))
+        remarks: list[str] = []
+        cells: dict[str, Cells] = {}
+        clocks: dict[tuple[int, int], ClockUsed] = {}
+        channels = self.layout.channels
+        for name, channel in channels.items():
+            if channel.column is not None:
+                with _collected(faults), self._told(("columns", name, "column")):
+                    cells[name] = self.opened.find(channel, self.entry.table)
+        for table in sorted({each.rows_of for each in cells.values()}):
+            with _collected(faults):
+                clocks[table] = self._clock(*table)
+        made: dict[str, Made] = {}
+        for name in (*cells, *(name for name in channels if channels[name].derive)):
+            with _collected(faults):
+                self._make(name, cells, made, remarks)
+        chosen = None
+        if choosing := self.entry.choosing:
+            key, column = choosing
+            with _collected(faults), self._told(key):
+                chosen = self.opened.find(ColumnPlace(column=column), self.entry.table)
         MappingError.together(faults)
+        for one, remark in following(self.wanted - made.keys(), made, self.rig):
+            made[one.name] = one
+            remarks.append(remark)
+        main = self._main(clocks)
+        if chosen is not None and chosen.rows_of != main:
+            raise MappingError(f"column {chosen.name!r} has another clock than the channels")
         found = []
         for stretch in self._stretches(main, clocks[main], chosen):
             with _collected(faults):
@@ -124,121 +128,66 @@ class _Finding:
         MappingError.together(faults)
         return found
 
-    def _columns(self) -> tuple[dict[str, Made], list[str], Clocks, list[Cells]]:
-        """What each channel is made of, what to remark, the clock of each table, and the columns
-        that tell trials apart. Raises MappingError with everything that is wrong.
-        """
-        made: dict[str, Made] = {}
-        remarks: list[str] = []
-        clocks: Clocks = {}
-        chosen: list[Cells] = []
-        faults: list[MappingError] = []
-        cells: dict[str, Cells] = {}
-        channels = self.layout.channels
-        for name, channel in channels.items():
-            if channel.column is not None:
-                with _collected(faults):
-                    cells[name] = self._find((name, "column"), channel, of_columns=True)
-        for table in sorted({each.rows_of for each in cells.values()}):
-            with _collected(faults):
-                clocks[table] = self._clock(*table)
-        for name in (*cells, *(name for name in channels if channels[name].derive)):
-            channel = channels[name]
-            with _collected(faults):
-                if name in cells:
-                    made[name] = self._of_column(name, channel, cells[name], remarks)
-                elif channel.derive in made:
-                    made[name] = self._derived(name, channel, made[channel.derive], remarks)
-                elif channels[channel.derive].derive:
-                    message = f"{channel.derive} is derived itself; derive {name} from a column"
-                    raise MappingError(message, (name, "derive"), of_columns=True)
-        for key, column in self._choosing():
-            with _collected(faults):
-                chosen.append(self._find(key, column))
-        MappingError.together(faults)
-        for one, remark in following(self.wanted - made.keys(), made, self.rig):
-            made[one.name] = one
-            remarks.append(remark)
-        return made, remarks, clocks, chosen
+    def _make(
+        self, name: str, cells: Mapping[str, Cells], made: dict[str, Made], remarks: list[str]
+    ) -> None:
+        """Add a channel to those that are `made`; one whose source is wrong is left out."""
+        channel = self.layout.channels[name]
+        if at := cells.get(name):
+            if channel.filter:
+                remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
+            unit = self.opened.column(at).unit
+            with self._told(("columns", name)):
+                made[name] = made_of_column(name, channel, at, unit, self.rig)
+        elif source := made.get(channel.derive):
+            with self._told(("columns", name, "derive")):
+                made[name] = made_of_channel(name, channel, source, self.rig)
+            if made[name].how == "integral":
+                remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
+        elif self.layout.channels[channel.derive].derive:
+            message = f"{channel.derive} is derived itself; derive {name} from a column"
+            raise MappingError(message, ("columns", name, "derive"))
 
-    def _find(self, keys: Key, wanted: ColumnPlace, *, of_columns: bool = False) -> Cells:
-        with self._told(keys, of_columns=of_columns):
-            return self.opened.find(wanted, self.entry.table)
-
-    def _of_column(self, name: str, channel: ChannelColumn, at: Cells, remarks: list[str]) -> Made:
-        if channel.filter:
-            remarks.append(f"{name} was filtered before it was recorded: {channel.filter}")
-        with self._told((name,), of_columns=True):
-            return made_of_column(name, channel, at, self.opened.column(at).unit, self.rig)
-
-    def _derived(self, name: str, channel: ChannelColumn, source: Made, remarks: list[str]) -> Made:
-        with self._told((name, "derive"), of_columns=True):
-            one = made_of_channel(name, channel, source, self.rig)
-        if one.how == "integral":
-            remarks.append(f"{name} is the integral of {source.name}: {DRIFTS}")
-        return one
-
-    def _wrong(
-        self, what: object, keys: Key = (), *, of_columns: bool = False, first: int = 0
-    ) -> MappingError:
+    def _wrong(self, what: object, keys: Keys = (), first: int = 0) -> MappingError:
         """What of these files, or of them from a row on, does not go with the mapping."""
-        return MappingError(f"{label(self.used, first)}: {what}", keys, of_columns=of_columns)
+        return MappingError(f"{label(self.used, first)}: {what}", keys)
 
     @contextmanager
-    def _told(self, keys: Key, *, of_columns: bool = False, first: int = 0) -> Iterator[None]:
+    def _told(self, keys: Keys, first: int = 0) -> Iterator[None]:
         """A ValueError in the block is told so."""
         try:
             yield
         except MappingError:
             raise
         except ValueError as error:
-            raise self._wrong(error, keys, of_columns=of_columns, first=first) from None
-
-    def _choosing(self) -> Iterator[tuple[Key, ColumnPlace]]:
-        """The columns that tell trials apart."""
-        entry = self.entry
-        if entry.where is not None:
-            yield ("where", "column"), ColumnPlace(column=entry.where.column)
-        if entry.each is not None:
-            yield ("each",), ColumnPlace(column=entry.each)
-        if entry.trigger is not None:
-            yield ("trigger", "column"), ColumnPlace(column=entry.trigger.column)
+            raise self._wrong(error, keys, first) from None
 
     # Clocks
 
     def _clock(self, file: int, table: int) -> ClockUsed:
-        time, stated = self.layout.time, self.opened.table(file, table).clock
-        if time is not None and time.column is not None:
-            return self._column_clock(time, file, table)
-        if time is not None and time.sample_rate is not None:
-            return ClockUsed(step=1.0 / time.sample_rate)
-        if stated is not None:
-            return ClockUsed(step=stated.step, start=stated.start)
-        raise self._wrong(TIMELESS, of_columns=True)
-
-    def _column_clock(self, time: TimeColumn, file: int, table: int) -> ClockUsed:
-        name = self.opened.table(file, table).name
-        within = time.model_copy(
-            update={"file": time.file or file + 1, "table": time.table or name}
-        )
-        cells = self._find(("time", "column"), within, of_columns=True)
-        if cells.rows_of != (file, table):
-            message = f"the times of column {cells.name!r} are those of other rows"
-            raise self._wrong(message, ("time", "column"), of_columns=True)
+        time, of = self.layout.time or TimeColumn(), self.opened.table(file, table)
+        if time.column is None:
+            if time.sample_rate is not None:
+                return ClockUsed(step=1.0 / time.sample_rate)
+            if of.clock is None:
+                raise self._wrong(TIMELESS, ("columns",))
+            return ClockUsed(step=of.clock.step, start=of.clock.start)
+        within = {"file": time.file or file + 1, "table": time.table or of.name}
+        with self._told(("columns", "time", "column")):
+            cells = self.opened.find(time.model_copy(update=within), self.entry.table)
+            if cells.rows_of != (file, table):
+                raise ValueError(f"the times of column {cells.name!r} are those of other rows")
         unit = time.unit or self.opened.column(cells).unit
         if unit in PLAIN:
             message = f"the file states no unit of column {cells.name!r}; write unit = ..."
-            raise self._wrong(message, ("time",), of_columns=True)
-        with self._told(("time", "unit"), of_columns=True):
+            raise self._wrong(message, ("columns", "time"))
+        with self._told(("columns", "time", "unit")):
             one = parse_unit(unit)
             if one.dimensions != parse_unit("s").dimensions:
                 raise ValueError(f"{unit!r} is no unit of time")
         return ClockUsed(cells=cells, factor=float(one.factor))
 
-    def _times(self, clock: ClockUsed) -> Callable[[int, int], Array]:
-        return lambda first, stop: clock_times(clock, self.opened, first, stop)
-
-    def _main(self, clocks: Clocks) -> tuple[int, int]:
+    def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
         """The table with the fastest clock, of several alike the longest: the others are held."""
         if len(clocks) == 1:
             return next(iter(clocks))
@@ -246,7 +195,7 @@ class _Finding:
         def slowness(table: tuple[int, int]) -> tuple[float, int]:
             count = self.opened.rows(*table)
             rows = min(count, 1000)
-            times = self._times(clocks[table])(0, rows)
+            times = self.opened.times(clocks[table], 0, rows)
             step = float(np.median(np.diff(times))) if rows > 1 else np.inf
             return float(f"{step:.3g}"), -count  # the last digits of a step are its rounding
 
@@ -255,7 +204,7 @@ class _Finding:
     # Rows
 
     def _stretches(
-        self, main: tuple[int, int], clock: ClockUsed, chosen: Sequence[Cells]
+        self, main: tuple[int, int], clock: ClockUsed, chosen: Cells | None
     ) -> Sequence[Stretch]:
         total = self.opened.rows(*main)
         if total < SHORTEST:
@@ -263,12 +212,12 @@ class _Finding:
             raise self._wrong(message, ("file",))
         first, stop = self._bounds(clock, total)
         entry = self.entry
-        if not chosen and not entry.restarts:
-            return [Stretch(first, stop - first, {})]
         if entry.restarts:
             with self._told(("restarts",)):
-                return by_restart(self._times(clock)(first, stop), first)
-        name, values = chosen[0].name, self.opened.part(chosen[0], first, stop)
+                return by_restart(self.opened.times(clock, first, stop), first)
+        if chosen is None:
+            return [Stretch(first, stop - first, {})]
+        name, values = chosen.name, self.opened.part(chosen, first, stop)
         if entry.trigger is not None:
             ends = partial(self._after, clock, entry.trigger.duration, stop)
             with self._told(("trigger",)):
@@ -278,7 +227,7 @@ class _Finding:
             return by_value(values, first, name, wanted)
 
     def _after(self, clock: ClockUsed, duration: float, stop: int, rises: np.ndarray) -> np.ndarray:
-        times = self._times(clock)(0, stop)
+        times = self.opened.times(clock, 0, stop)
         # Half a sample early: times are written with finite digits.
         half = 0.5 * float(np.median(np.diff(times)))
         ends = np.searchsorted(times, times[rises] + duration - half, side="left")
@@ -288,7 +237,7 @@ class _Finding:
         entry = self.entry
         if entry.start is None and entry.stop is None:
             return 0, total
-        times = self._times(clock)(0, total)
+        times = self.opened.times(clock, 0, total)
         first = 0 if entry.start is None else int(np.searchsorted(times, entry.start))
         stop = total if entry.stop is None else int(np.searchsorted(times, entry.stop))
         if stop - first < SHORTEST:
@@ -309,13 +258,14 @@ class _Finding:
         main: tuple[int, int],
         stretch: Stretch,
         columns: dict[str, Made],
-        clocks: Clocks,
+        clocks: dict[tuple[int, int], ClockUsed],
         told: Sequence[str],
     ) -> Described:
         clock = clocks[main]
         repairs = self.layout.time.repair if self.layout.time is not None else ()
-        with self._told(("file",), first=stretch.first):
-            even = even_clock(self._times(clock), stretch.first, stretch.rows, repairs)
+        with self._told(("file",), stretch.first):
+            times = partial(self.opened.times, clock)
+            even = even_clock(times, stretch.first, stretch.rows, repairs)
         remarks = [*stretch.remarks, *even.remarks, *told]
         made = list(self._placed(columns, main, clocks, even, remarks))
         shifts = [each.shift for each in made if each.clock is None]
@@ -353,11 +303,11 @@ class _Finding:
                 periods[name] = defect.size
                 remarks.append(f"{name} was made continuous: {defect.what}")
                 continue
-            if defect.severity is Severity.NOTED or defect.kind in entry.accept:
+            if defect.noted or defect.kind in entry.accept:
                 remarks.append(defect.what)
                 continue
             what = f"{described.label}: {defect.what}; {defect.remedy}"
-            faults.append(MappingError(what, (name,), of_columns=True, defect=defect.kind))
+            faults.append(MappingError(what, ("columns", name), defect=defect.kind))
         MappingError.together(faults)
         channels = tuple(
             each.model_copy(update={"period": periods.get(each.name)})
@@ -369,7 +319,7 @@ class _Finding:
         self,
         made: dict[str, Made],
         main: tuple[int, int],
-        clocks: Clocks,
+        clocks: dict[tuple[int, int], ClockUsed],
         even: EvenClock,
         remarks: list[str],
     ) -> Iterator[Made]:
@@ -390,7 +340,7 @@ class _Finding:
         self, clock: ClockUsed, table: tuple[int, int], even: EvenClock
     ) -> dict[str, object]:
         rows = self.opened.rows(*table)
-        times = self._times(clock)(0, rows)
+        times = self.opened.times(clock, 0, rows)
         step = float(times[-1] - times[0]) / max(rows - 1, 1)
         ends = even.start, even.start + (even.samples - 1) / even.rate
         if step <= 0 or times[0] > ends[0] + step or times[-1] + step < ends[1] - step:

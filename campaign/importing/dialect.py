@@ -3,29 +3,38 @@
 Nothing is taken for granted of the first line. A way of reading is tried on the end of a sample,
 where the rows are, and followed upwards; what is above is heading. The way that makes most of the
 rows into numbers is the file's, and a second one that does as well is a doubt for the reader.
+
+Of what is above, rows belong to the columns: names, and units, wherever they are. Instruments have
+habits of their own: names in the row of units, channels by number, a key and its value for each
+column.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import islice
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice, takewhile
 from pathlib import Path
-from typing import NamedTuple
 
 from campaign.errors import Problem
-from campaign.importing.cells import is_lost, is_number, plain
-from campaign.importing.heading import heading
+from campaign.importing.cells import (
+    is_lost,
+    is_number,
+    is_unit,
+    name_and_unit,
+    plain,
+    without_brackets,
+)
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 ENDS = 20
 """Rows at the end of a sample by which a way of reading is judged first."""
-_LONGEST_KEY = 60
-_ENDS_KEY = ":=\t;,"
-_AROUND = " \t;,"
-"""Characters that end a key, and those around a value."""
+MOST = 3
+"""Rows of a heading that belong to columns: names, units, and one more."""
+Heading = tuple[tuple[str, ...], tuple[str, ...]]
+"""Names and units."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +47,6 @@ class Dialect:
         numeric: for each column, whether its cells are numbers.
         comments: a row may go on after its cells, with words that are no column.
         sheet: of a workbook whose rows are read as lines.
-        said: what stands above the heading as `key: value`.
         doubts: other ways of reading that fit as well, in words.
     """
 
@@ -49,7 +57,6 @@ class Dialect:
     names: tuple[str, ...]
     units: tuple[str, ...]
     numeric: tuple[bool, ...]
-    said: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     comments: bool = False
     sheet: str = ""
@@ -135,18 +142,14 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
     return replace(best, doubts=tuple(islice(doubts, 1)))
 
 
-class _Fit(NamedTuple):
-    """How well a way of reading fits; the larger the better, from first to last."""
+def read_as(
+    lines: Sequence[str], separator: str, decimal: str
+) -> tuple[tuple[float, int, bool, int], Dialect] | None:
+    """What the lines hold when they are read in one way, and how well that fits; None: nothing.
 
-    numeric: float
-    """Share of the columns that are numbers."""
-    rows: int
-    titled: bool
-    columns: int
-
-
-def read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, Dialect] | None:
-    """What the lines hold when they are read in one way, and how well that fits; None: nothing."""
+    That is the share of columns that are numbers, the rows, whether there are names, and how many
+    columns are numbers; the larger the better, from first to last.
+    """
     rows = [(place, split(line, separator)) for place, line in enumerate(lines) if line.strip()]
     while rows and not _has_number(rows[-1][1], decimal):  # an end mark, such as EOF
         rows.pop()
@@ -177,27 +180,13 @@ def read_as(lines: Sequence[str], separator: str, decimal: str) -> tuple[_Fit, D
     while start and _looks_like_row(rows[start - 1][1], width, decimal):
         start -= 1  # a broken row that would be taken for heading
     body, first = rows[start:], rows[start][0]
-    above = [(place, cells) for place, cells in rows if place < first]
     columns = width
     if columns > 1 and all(cells[-1] == "" for _, cells in body if len(cells) == width):
         columns -= 1  # every row ends with a separator
-    names, units, used = heading([cells for _, cells in above], columns)
-    said = said_above(lines[place] for place, _ in above[: len(above) - used])
+    names, units = heading([cells for _, cells in rows[:start]], columns)
     kept = tuple(numeric[:columns])
-    found = Dialect(separator, decimal, first + 1, width, names, units, kept, said)
-    return _Fit(sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
-
-
-def said_above(lines: Iterable[str]) -> dict[str, str]:
-    """What lines above a heading say as `key: value`."""
-    said: dict[str, str] = {}
-    for line in lines:
-        text = plain(line).lstrip("#%*/").lstrip()
-        end = next((k for k, sign in enumerate(text[: _LONGEST_KEY + 1]) if sign in _ENDS_KEY), 0)
-        key, value = text[:end].strip(), text[end + 1 :].strip(_AROUND)
-        if key and value:
-            said.setdefault(key, value)
-    return said
+    found = Dialect(separator, decimal, first + 1, width, names, units, kept)
+    return (sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
 
 
 def _looks_like_row(cells: Sequence[str], width: int, decimal: str) -> bool:
@@ -225,3 +214,98 @@ def _differ(one: Dialect, other: Dialect, lines: Sequence[str]) -> bool:
 def _in_words(dialect: Dialect) -> str:
     sign = "comma" if dialect.decimal == "," else "point"
     return f"cells separated by {SEPARATORS[dialect.separator]} with a decimal {sign}"
+
+
+def heading(above: Sequence[list[str]], columns: int) -> Heading:
+    """What the rows above a table say of its columns; no names where they say none."""
+    near = takewhile(lambda cells: len(cells) in (columns, columns + 1), reversed(above[-MOST:]))
+    rows = [cells for cells in reversed(list(near)) if any(cells)]
+    paired = _pairs(rows, columns)
+    if paired is not None:
+        return paired
+    # Of comments only the last can be a heading, and the one above it if that is of units; those
+    # above are sentences.
+    commented = [k for k, cells in enumerate(rows) if cells[0][:1] in ("#", "%")]
+    if commented:
+        last = commented[-1]
+        bare = _unmarked(rows[last])
+        named = last - 1 in commented and any(bare) and _all_units(bare)
+        rows = rows[last - named :]
+    rows = [_unmarked(cells) for cells in rows]
+    # A mark of a comment may be a cell of its own. An index without a name is a column, and so is
+    # one without a unit; what is one cell too long then ends with a separator.
+    marked = [not cells[0] and len(cells) > columns and cells[-1] != "" for cells in rows]
+    rows = [cells[m : columns + m] for cells, m in zip(rows, map(int, marked), strict=True)]
+    while rows and any(map(_is_any_number, rows[0])) and not _are_channels(rows):
+        rows.pop(0)  # a key and its value
+    if len(rows) > 1 and _is_key_of_units(rows[0]) and not _all_units(rows[1]):
+        names, own = _named(rows[1:], columns)
+        keyed = ("", *(without_brackets(cell) for cell in rows[0][1:]))
+        return names, tuple(a or b for a, b in zip(own, keyed, strict=True))
+    return _named(rows, columns)
+
+
+def _unmarked(cells: Sequence[str]) -> list[str]:
+    """Without the mark of a comment, which hides the quotes of the cell behind it."""
+    bare = cells[0].lstrip("#% ")
+    quoted = bare != cells[0] and len(bare) > 1 and bare[0] == bare[-1] == '"'
+    return [bare[1:-1] if quoted else bare, *cells[1:]]
+
+
+def _named(rows: Sequence[list[str]], columns: int) -> Heading:
+    named = next((k for k, cells in enumerate(rows) if not _all_units(cells)), None)
+    if named is None:
+        # A single row of what may all be units is a row of names: t, A, V.
+        return tuple(rows[-1]) if len(rows) == 1 else (), ("",) * columns
+    split_up = [name_and_unit(cell) for cell in rows[named]]
+    names, units = (tuple(each) for each in zip(*split_up, strict=True))
+    for cells in rows[named + 1 :]:
+        if _all_units(cells):
+            below = (without_brackets(cell) for cell in cells)
+            units = tuple(own or other for own, other in zip(units, below, strict=True))
+        elif cells[0] and is_unit(cells[0]) and all(cells):
+            # A unit of time, and the names of what was recorded in place of the other units.
+            names = (names[0], *cells[1:])
+            units = (units[0] or without_brackets(cells[0]), *units[1:])
+    return names, units
+
+
+def _all_units(cells: Sequence[str]) -> bool:
+    return all(map(is_unit, cells))
+
+
+def _is_key_of_units(cells: Sequence[str]) -> bool:
+    """`Vertical Units,V,V`: a key, and the units of all columns but the first."""
+    return "unit" in cells[0].lower() and _all_units(cells[1:])
+
+
+def _are_channels(rows: Sequence[list[str]]) -> bool:
+    """`x-axis,1,2` above `second,Volt,Volt`: channels by their number."""
+    first, *others = rows[0]
+    numbers = all(cell.isdigit() and int(cell) < 100 for cell in others)
+    return numbers and not _is_any_number(first) and len(rows) > 1 and _all_units(rows[1])
+
+
+def _pairs(rows: Sequence[list[str]], columns: int) -> Heading | None:
+    """`Channel name,"Force",Channel name,"RMV"`: a column of times before each channel."""
+    keyed = {
+        cells[0].lower(): cells[1:columns:2]
+        for cells in rows
+        if columns >= 4
+        and columns % 2 == 0
+        and len(set(cells[0:columns:2])) == 1
+        and not _is_any_number(cells[0])
+    }
+    called = next((cells for key, cells in keyed.items() if "name" in key), None)
+    if called is None:
+        return None
+    units = next((cells for key, cells in keyed.items() if "unit" in key), [""] * len(called))
+    usable = [without_brackets(cell) if is_unit(cell) else "" for cell in units]
+    return (
+        tuple(cell for name in called for cell in ("time", name)),
+        tuple(cell for unit in usable for cell in ("", unit)),
+    )
+
+
+def _is_any_number(cell: str) -> bool:
+    return is_number(cell, ".") or is_number(cell, ",")

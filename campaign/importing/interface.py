@@ -5,11 +5,11 @@ Nothing is converted here and nothing is guessed: a unit is text, a number what 
 
 from __future__ import annotations
 
-import difflib
 import stat
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from io import BufferedReader
 from itertools import islice
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.errors import Problem, UsageError
+from campaign.protocol.problems import nearest
 
 Array = NDArray[np.float64]
 HEAD = 1 << 16
@@ -66,34 +67,28 @@ def read_by(package: str, path: Path, what: str, extra: str = "") -> Iterator[No
         raise RecordingError.of(path, f"this {what} cannot be read ({why[:300]})") from None
 
 
-def check_regular(path: Path) -> None:
-    """Raise RecordingError for what is no regular file; nothing is opened.
+@contextmanager
+def regular(path: Path) -> Iterator[BufferedReader]:
+    """A regular file, open; raises RecordingError where it cannot be read, and for any other.
 
-    Pipes and devices have no end, and a pipe that nobody writes to would be waited for.
+    A pipe or a device is not opened: it has no end.
     """
     try:
         mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            other = "a pipe, a device or the like, and no regular file"
+            what = "a folder" if stat.S_ISDIR(mode) else other
+            raise RecordingError.of(path, f"it cannot be opened: it is {what}")
+        with path.open("rb") as file:
+            yield file
     except (OSError, ValueError) as error:
         told = getattr(error, "strerror", None) or str(error)
-        hint = _nearest_file(path) if isinstance(error, FileNotFoundError) else ""
-        message = f"it cannot be opened: {told}{hint}"
+        names = []
+        if isinstance(error, FileNotFoundError):
+            with suppress(OSError):
+                names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
+        message = f"it cannot be opened: {told}{nearest(path.name, names)}"
         raise RecordingError.of(path, message) from None
-    if stat.S_ISDIR(mode):
-        raise RecordingError.of(path, "it cannot be opened: it is a folder")
-    if not stat.S_ISREG(mode):
-        message = "it cannot be opened: it is a pipe, a device or the like, and no regular file"
-        raise RecordingError.of(path, message)
-
-
-def _nearest_file(path: Path) -> str:
-    """The file of its folder that is called most alike, for a message; "" where none is."""
-    try:
-        names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
-    except OSError:
-        return ""
-    by_letters = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(path.name.casefold(), by_letters, 1)
-    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
 
 
 @dataclass(frozen=True)
@@ -128,10 +123,7 @@ class Table:
     Attributes:
         name: of the part of the file; "" where the file has only one.
         clock: None where time is a column, or is not told.
-        rows: how many, where that is known without reading all of them.
-        said: what else the file says of it, as written, e.g. `Operator`.
         doubts: how else the file could be read, in words.
-        below: whether it is one of several below each other, alike in their headings.
         read: blocks of at most `ROWS` rows of the columns at the given places (from 0), in order:
             shape (k, len(places)), NaN where a cell is empty. Raises RecordingError.
     """
@@ -140,16 +132,7 @@ class Table:
     columns: tuple[Column, ...]
     read: Callable[[Sequence[int]], Iterator[Array]] = field(repr=False)
     clock: Clock | None = None
-    rows: int | None = None
-    said: Mapping[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
-    below: bool = False
-
-    def whole(self, places: Sequence[int] | None = None) -> Array:
-        """All rows of some columns, or of every numeric one: shape (n, columns)."""
-        wanted = [k for k, c in enumerate(self.columns) if c.numeric] if places is None else places
-        blocks = list(self.read(wanted))
-        return np.concatenate(blocks) if blocks else np.empty((0, len(wanted)))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from campaign.channels import (
     COMMAND,
@@ -70,13 +70,11 @@ def made_of_column(
     Raises ValueError with a message for the user where units do not go together.
     """
     written = entry.unit or stated
-    if not written and not entry.unit:
-        what = _info(name, entry, rig, None)
-        if what.unit:
-            raise ValueError(
-                f"the file states no unit of column {cells.name!r}; write unit = ..., or "
-                'unit = "1" for a number without one'
-            )
+    if not written and _info(name, entry, rig, None).unit:
+        raise ValueError(
+            f"the file states no unit of column {cells.name!r}; write unit = ..., or "
+            'unit = "1" for a number without one'
+        )
     number, by = _times(entry)
     unit = _unit(written) * by
     what = _info(name, entry, rig, unit)
@@ -109,15 +107,16 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
     for how, per in ways:
         unit = _unit(source.unit) * by * _unit(per)
         if unit.dimensions == _unit(what.unit).dimensions:
+            shares = _relative(entry, number), source.relative_uncertainty
+            known = [share for share in shares if share is not None]
             return _made(
                 name,
                 what,
                 how=how,
                 source=source.name,
                 factor=entry.sign * number * float(unit.factor / _unit(what.unit).factor),
-                relative_uncertainty=_together(
-                    _relative(entry, number), source.relative_uncertainty
-                ),
+                # Factors are independent of each other.
+                relative_uncertainty=math.hypot(*known) if known else None,
                 filter=entry.filter,
             )
     raise ValueError(
@@ -132,38 +131,41 @@ def _made(name: str, what: ChannelInfo, **of: Any) -> Made:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Way:
+class _Way(NamedTuple):
     """How a channel follows from another one, where the rig is known well enough."""
 
     name: str
     source: str
-    derivative: bool
+    how: Literal["copy", "derivative"]
     factor: Callable[[RigFacts], float | None]
     remark: str = ""
 
 
-def _by_gear(rig: RigFacts) -> float:
-    return 1.0 / rig.ratio
-
-
 _WAYS = (
-    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, False, _by_gear, GEARED),
-    _Way(RELATIVE_RATE, RELATIVE_ANGLE, True, lambda rig: 1.0),
-    _Way(RELATIVE_RATE, MOTOR_RATE, False, _by_gear, GEARED),
-    _Way(RELATIVE_RATE, GYRO_RATE, False, lambda rig: 1.0, AT_REST),
-    _Way(GYRO_RATE, RELATIVE_RATE, False, lambda rig: 1.0, AT_REST),
-    _Way(DRIVE_TORQUE, MOTOR_CURRENT, False, lambda rig: rig.torque_per_current),
+    _Way(RELATIVE_ANGLE, MOTOR_ANGLE, "copy", lambda rig: 1.0 / rig.ratio, f"; {GEARED}"),
+    _Way(RELATIVE_RATE, RELATIVE_ANGLE, "derivative", lambda rig: 1.0),
+    _Way(RELATIVE_RATE, MOTOR_RATE, "copy", lambda rig: 1.0 / rig.ratio, f"; {GEARED}"),
+    _Way(RELATIVE_RATE, GYRO_RATE, "copy", lambda rig: 1.0, f"; {AT_REST}"),
+    _Way(GYRO_RATE, RELATIVE_RATE, "copy", lambda rig: 1.0, f"; {AT_REST}"),
+    _Way(DRIVE_TORQUE, MOTOR_CURRENT, "copy", lambda rig: rig.torque_per_current),
 )
-"""What suffices for a channel that nobody recorded, the best first."""
+"""What suffices for a channel that nobody recorded, the best first; what is made on the way to
+another one comes before it."""
+
+
+def _ways(have: Collection[str], rig: RigFacts) -> dict[str, _Way]:
+    """How each channel that there is not follows from those that there are."""
+    found: dict[str, _Way] = {}
+    for way in _WAYS:
+        known = {*have, *found}
+        if way.name not in known and way.source in known and way.factor(rig):
+            found[way.name] = way
+    return found
 
 
 def sufficient(have: Collection[str], rig: RigFacts) -> frozenset[str]:
     """The channels that there are, and those that follow from them."""
-    known = set(have)
-    while more := {w.name for w in _WAYS if w.source in known and w.factor(rig)} - known:
-        known |= more
-    return frozenset(known)
+    return frozenset((*have, *_ways(have, rig)))
 
 
 def following(
@@ -173,36 +175,23 @@ def following(
 
     A channel on the way to a wanted one comes before it.
     """
-    known = dict(have)
+    ways, known = _ways(have, rig), dict(have)
     for name in sorted(wanted):
-        for way in _path(name, known, rig):
-            made = _made(
+        path: list[_Way] = []
+        while name not in known and name in ways:
+            path.append(ways[name])
+            name = ways[name].source
+        for way in reversed(path):
+            made = known[way.name] = _made(
                 way.name,
                 info(way.name, axis=rig.axis),
-                how="derivative" if way.derivative else "copy",
+                how=way.how,
                 source=way.source,
                 factor=way.factor(rig) or 1.0,
                 relative_uncertainty=known[way.source].relative_uncertainty,
             )
-            known[way.name] = made
-            verb = "the derivative of" if way.derivative else "made of"
-            remark = f"; {way.remark}" if way.remark else ""
-            yield made, f"{way.name} is {verb} {way.source}{remark}"
-
-
-def _path(
-    name: str, known: Mapping[str, Made], rig: RigFacts, on_the_way: frozenset[str] = frozenset()
-) -> list[_Way]:
-    """The ways from what is known to a channel, in order; none where there are none."""
-    if name in known:
-        return []
-    for way in _WAYS:
-        if way.name != name or way.source in on_the_way or not way.factor(rig):
-            continue
-        before = _path(way.source, known, rig, on_the_way | {name})
-        if way.source in known or before:
-            return [*before, way]
-    return []
+            verb = "the derivative of" if way.how == "derivative" else "made of"
+            yield made, f"{way.name} is {verb} {way.source}{way.remark}"
 
 
 def _info(name: str, entry: ChannelColumn, rig: RigFacts, unit: Unit | None) -> ChannelInfo:
@@ -213,11 +202,9 @@ def _info(name: str, entry: ChannelColumn, rig: RigFacts, unit: Unit | None) -> 
             if _unit(what.unit).dimensions == unit.dimensions:
                 return what
     if name in VOCABULARY:
-        of = VOCABULARY[name]
         axis = rig.motor if name in (MOTOR_ANGLE, MOTOR_RATE) else rig.axis
-        if of.quantity is Quantity.DEPENDS and unit is None:
-            return info(name, "rate", axis=axis)
-        return info(name, axis=axis)
+        depends = VOCABULARY[name].quantity is Quantity.DEPENDS and unit is None
+        return info(name, "rate", axis=axis) if depends else info(name, axis=axis)
     if not entry.label:
         raise ValueError(
             f"{name!r} is none of the channels that analyses know (`campaign kinds channels`); "
@@ -261,12 +248,6 @@ def _relative(entry: ChannelColumn, number: float) -> float | None:
     if of.dimensions != by.dimensions:
         raise ValueError(f"the uncertainty {entry.uncertainty!r} has another unit than 'times'")
     return abs(error * float(of.factor / by.factor) / number)
-
-
-def _together(*shares: float | None) -> float | None:
-    """Relative uncertainties of factors that are independent: the root of their squares."""
-    known = [share for share in shares if share is not None]
-    return math.hypot(*known) if known else None
 
 
 def _mismatch(name: str, entry: ChannelColumn, written: str, what: ChannelInfo) -> str:

@@ -16,6 +16,7 @@ from campaign.errors import Problem
 from campaign.importing.defects import CHANNEL_KINDS
 from campaign.options import Options, spelled
 from campaign.protocol.files import Origin, Within
+from campaign.protocol.positions import Keys
 from campaign.protocol.problems import Fault, allowed, nearest, shown, validate
 from campaign.units import Frequency, Time
 
@@ -28,6 +29,35 @@ ChannelName = Annotated[
     spelled(r"[a-z][a-z0-9_]*", "a lower-case letter, then lower-case letters, digits and _"),
 ]
 Repair = Literal["resample", "drop repeated", "mark gaps"]
+
+
+class MappingError(ValueError):
+    """What of a mapping does not go with its files.
+
+    Attributes:
+        keys: where it stands, in `[[test.recording]]`; in `[columns.NAME]` behind "columns".
+        defect: the kind of what was found in the samples and nobody has accepted, as `clipping`.
+        others: what is wrong besides, told together with it.
+    """
+
+    def __init__(self, message: str, keys: Keys = (), *, defect: str = "") -> None:
+        self.keys = keys
+        self.defect = defect
+        self.others: tuple[MappingError, ...] = ()
+        super().__init__(message)
+
+    @property
+    def of_columns(self) -> bool:
+        """Whether it stands in `[columns.NAME]`."""
+        return self.keys[:1] == ("columns",)
+
+    @classmethod
+    def together(cls, faults: Sequence[MappingError]) -> None:
+        """Raise the first with the others; nothing where there are none."""
+        if faults:
+            later = (each for one in faults[1:] for each in (one, *one.others))
+            faults[0].others = (*faults[0].others, *later)
+            raise faults[0]
 
 
 class ColumnPlace(Options):
@@ -132,6 +162,16 @@ class RecordingEntry(Options):
     note: str = Field(default="", max_length=500)
     """Anything worth keeping with it."""
 
+    @property
+    def choosing(self) -> tuple[Keys, str | int] | None:
+        """The column that tells trials apart, and where it is named."""
+        if self.each is not None:
+            return ("each",), self.each
+        for key, one in (("where", self.where), ("trigger", self.trigger)):
+            if one is not None:
+                return (key, "column"), one.column
+        return None
+
 
 class Layout(Options):
     """One `[columns.NAME]`, validated.
@@ -143,10 +183,6 @@ class Layout(Options):
 
     time: TimeColumn | None = None
     channels: dict[ChannelName, ChannelColumn]
-
-    def tree(self) -> dict[str, Any]:
-        """As a normalised tree (SI)."""
-        return self.model_dump(mode="json", exclude_defaults=True)
 
 
 def layouts(

@@ -1,21 +1,30 @@
-"""Files of one recording, opened: which column is meant by a name, and its values."""
+"""Files of one recording, opened: which column is meant by a name, and its values.
+
+Whoever checks, cuts and serves a recording reads parts of it many times, and text is slow to read:
+the columns of a table are read once, and kept, in memory while they are small, else on disk.
+"""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import SpooledTemporaryFile
+
+import numpy as np
 
 from campaign.errors import Problem
-from campaign.importing.described import Cells
+from campaign.importing.described import Cells, ClockUsed
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import Array, Column, RecordingError, Table
 from campaign.importing.mapping import ColumnPlace
-from campaign.importing.spool import Spool
+from campaign.protocol.problems import nearest
 
 NAMED = 12
 """columns that a message lists."""
+IN_MEMORY = 1 << 24
+"""Bytes of a column; a longer one goes to a temporary file."""
+_BYTES = 8  # of a float64
 
 
 class OpenedFiles:
@@ -36,9 +45,9 @@ class OpenedFiles:
         if problems:
             raise RecordingError(problems)
         self.tables = tuple(found)
-        self._spools: dict[tuple[int, int], Spool] = {}
         self._closing = ExitStack()
-        self._wanted: dict[tuple[int, int], dict[int, None]] = {}
+        self._wanted: dict[tuple[int, int], dict[int, SpooledTemporaryFile[bytes]]] = {}
+        self._rows: dict[tuple[int, int], int] = {}
 
     def __enter__(self) -> OpenedFiles:
         return self
@@ -50,7 +59,7 @@ class OpenedFiles:
         return self.tables[file][table]
 
     def find(self, wanted: ColumnPlace, table: str = "") -> Cells:
-        """The column that is meant. Raises ValueError with the names there are.
+        """The column that is meant; it is wanted then. Raises ValueError with the names there are.
 
         Args:
             table: the one to look in where `wanted` names none.
@@ -86,6 +95,7 @@ class OpenedFiles:
             raise ValueError(_no_such(wanted.column, [each.name for each in among]))
         if not self.column(found[0]).numeric:
             raise ValueError(f"column {found[0].name!r} holds text and no numbers")
+        self.want(found[0])
         return found[0]
 
     def column(self, cells: Cells) -> Column:
@@ -93,23 +103,35 @@ class OpenedFiles:
 
     def want(self, cells: Cells) -> None:
         """This column will be read; said before the first of its table is."""
-        self._wanted.setdefault(cells.rows_of, {})[cells.column] = None
+        wanted = self._wanted.setdefault(cells.rows_of, {})
+        if cells.column not in wanted:
+            file = self._closing.enter_context(SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
+            wanted[cells.column] = file
 
     def part(self, cells: Cells, first: int, stop: int) -> Array:
         """Rows [first, stop) of a column. Raises RecordingError where it cannot be read."""
-        return self._spool(*cells.rows_of).part(cells.column, first, stop)
+        self.rows(*cells.rows_of)
+        file = self._wanted[cells.rows_of][cells.column]
+        file.seek(first * _BYTES)
+        return np.frombuffer(file.read((stop - first) * _BYTES), dtype=np.float64)
+
+    def times(self, clock: ClockUsed, first: int, stop: int) -> Array:
+        """Times (s) of rows [first, stop) by a clock, shape (stop - first,)."""
+        if clock.cells is not None:
+            return clock.factor * self.part(clock.cells, first, stop)
+        return clock.start + (clock.step or 1.0) * np.arange(first, stop, dtype=np.float64)
 
     def rows(self, file: int, table: int) -> int:
-        """How many rows a table has."""
-        known = self.table(file, table).rows
-        return self._spool(file, table).rows if known is None else known
-
-    def _spool(self, file: int, table: int) -> Spool:
-        key = (file, table)
-        if key not in self._spools:
-            places = self._wanted.get(key) or [0]
-            self._spools[key] = Spool(self.table(file, table), places, self._closing)
-        return self._spools[key]
+        """How many rows a table has; its columns that are wanted have then been read."""
+        key = file, table
+        if key not in self._rows:
+            files, rows = self._wanted.get(key, {}), 0
+            for block in self.table(*key).read(list(files) or [0]):
+                rows += len(block)
+                for kept, column in zip(files.values(), block.T, strict=False):
+                    kept.write(np.ascontiguousarray(column, dtype=np.float64).tobytes())
+            self._rows[key] = rows
+        return self._rows[key]
 
     def _told(self, each: Cells) -> str:
         table = self.table(*each.rows_of).name
@@ -120,23 +142,16 @@ class OpenedFiles:
 
 def _no_such(wanted: str | int | None, columns: Sequence[str]) -> str:
     names = list(dict.fromkeys(columns))
-    close = difflib.get_close_matches(str(wanted), names, 1)
     listed = ", ".join(map(repr, names[:NAMED]))
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    hint = f"; did you mean {close[0]!r}?" if close else ""
     what = f"column {wanted!r}" if isinstance(wanted, str) else f"column of place {wanted}"
-    return f"there is no {what}; there are {listed}{more}{hint}"
+    return f"there is no {what}; there are {listed}{more}{nearest(wanted, names)}"
 
 
 def _spellings(column: Column) -> set[str]:
     """How a heading may stand in the file that a reader has parted into name and unit."""
-    name, unit = column.name, column.unit
-    headings = {name}
-    if unit:
-        headings |= {
-            f"{name}{how.format(unit)}" for how in (" [{}]", " ({})", "/{}", " / {}", "_{}")
-        }
-    return {_plain(heading) for heading in headings}
+    ways = (" [{}]", " ({})", "/{}", " / {}", "_{}") if column.unit else ()
+    return {_plain(column.name + how.format(column.unit)) for how in ("", *ways)}
 
 
 def _plain(name: str) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from campaign.importing.defects import Defect, find
-from campaign.importing.defects.even_clock import EvenClock, UnevenError, even_clock
+from campaign.importing.defects.clock import EvenClock, even_clock
 from campaign.importing.defects.samples import continuous
 from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
 from campaign.importing.interface import ROWS, Array, RecordingError
@@ -82,35 +83,35 @@ class RecordingReader:
                     yield replace(each, rows=(each.rows[0] + first, each.rows[1] + first))
 
     def _channel(self, made: Made, first: int, stop: int) -> Array:
-        if made.period is not None:
-            return self._unwrapped(made, made.period)[first:stop]
+        if made.period is not None or made.how == "integral":
+            return self._all_of(made)[first:stop]
         if made.cells is not None:
             return made.factor * (self._column(made, made.cells, first, stop) - made.offset)
         source = self._made[made.source]
         if made.how == "copy":
             return made.factor * self._channel(source, first, stop)
-        if made.how == "integral":
-            return self._integrated(made, source)[first:stop]
         before, after = max(first - 1, 0), min(stop + 1, self.described.samples)
         values = self._channel(source, before, after)
         slope = np.gradient(values) if len(values) > 1 else np.zeros(len(values))
         cut: Array = slope[first - before : first - before + stop - first]
         return made.factor * self.described.sample_rate * cut
 
-    def _unwrapped(self, made: Made, period: float) -> Array:
-        """All of a channel whose scale begins anew; it is kept, as no part of it stands alone."""
+    def _all_of(self, made: Made) -> Array:
+        """All of a channel of which no part stands alone; it is kept.
+
+        One whose scale begins anew; or an integral, by trapezoids: behind a lost sample nothing of
+        it is known.
+        """
         if made.name not in self._whole:
             plain = made.model_copy(update={"period": None})
-            values = self._channel(plain, 0, self.described.samples)
-            self._whole[made.name] = continuous(values, period)
-        return self._whole[made.name]
-
-    def _integrated(self, made: Made, source: Made) -> Array:
-        """All of an integral, by trapezoids; behind a lost sample nothing of it is known."""
-        if made.name not in self._whole:
-            values = self._channel(source, 0, self.described.samples)
-            steps = 0.5 * (values[1:] + values[:-1]) / self.described.sample_rate
-            self._whole[made.name] = made.factor * np.concatenate([[0.0], np.cumsum(steps)])
+            of = self._made[made.source] if made.how == "integral" else plain
+            values = self._channel(of, 0, self.described.samples)
+            if made.how == "integral":
+                steps = 0.5 * (values[1:] + values[:-1]) / self.described.sample_rate
+                values = made.factor * np.concatenate([[0.0], np.cumsum(steps)])
+            if made.period is not None:
+                values = continuous(values, made.period)
+            self._whole[made.name] = values
         return self._whole[made.name]
 
     def _column(self, made: Made, cells: Cells, first: int, stop: int) -> Array:
@@ -133,10 +134,10 @@ class RecordingReader:
     def _held(self, made: Made, cells: Cells, clock: ClockUsed, first: int, stop: int) -> Array:
         """Of another clock: the last value that was known at each time."""
         count = self._opened.rows(*cells.rows_of)
-        times = clock_times(clock, self._opened, 0, count)
+        times = self._opened.times(clock, 0, count)
         values = self._opened.part(cells, 0, count)
         row = self.described.first
-        start = float(clock_times(self.described.clock, self._opened, row, row + 1)[0])
+        start = float(self._opened.times(self.described.clock, row, row + 1)[0])
         wanted = np.arange(first, stop) + self.described.skip + made.shift
         at = start + wanted / self.described.sample_rate
         # Half a millionth of a sample: both clocks are written with finite digits.
@@ -157,24 +158,11 @@ class RecordingReader:
     def _even(self) -> EvenClock:
         told = self.described
         try:
-            return even_clock(
-                lambda a, b: clock_times(told.clock, self._opened, a, b),
-                told.first,
-                told.rows,
-                told.repairs,
-            )
-        except UnevenError as error:  # it was even when the plan was made
+            times = partial(self._opened.times, told.clock)
+            return even_clock(times, told.first, told.rows, told.repairs)
+        except ValueError as error:  # it was even when the plan was made
             path = self._opened.paths[told.table[0]]
             raise RecordingError.of(path, str(error)) from None
-
-
-def clock_times(clock: ClockUsed, opened: OpenedFiles, first: int, stop: int) -> Array:
-    """Times (s) of rows [first, stop) by a clock."""
-    if clock.cells is not None:
-        times: Array = clock.factor * opened.part(clock.cells, first, stop)
-        return times
-    even: Array = clock.start + (clock.step or 1.0) * np.arange(first, stop, dtype=np.float64)
-    return even
 
 
 def paths_unchanged(described: Described) -> Sequence[Path]:

@@ -20,15 +20,13 @@ from campaign.importing.described import Described
 from campaign.importing.describing import describe
 from campaign.importing.interface import RecordingError
 from campaign.importing.made import RigFacts, sufficient
-from campaign.importing.mapping import Layout, RecordingEntry, layouts, recordings_of
-from campaign.importing.mapping_errors import MappingError
+from campaign.importing.mapping import Layout, MappingError, RecordingEntry, layouts, recordings_of
 from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Origin, Within
 from campaign.protocol.problems import allowed, nearest, shown
 from campaign.protocol.schema import ExperimentKind, Protocol, Test
-from campaign.recording import Recording
 from campaign.trial import Offered, Task, TrialRequest
 from campaign.units import to_si
 
@@ -38,7 +36,6 @@ _FILE = re.compile(r"^.*?(?=(:\d+:\d+)?: )")
 NO_RECORDING = (
     "it has no recordings; add [[test.recording]] for each, or `campaign run` executes it"
 )
-
 
 OUTSIDE = (
     "leads out of the mapping's folder, and a pattern stays below it; name such a file by its path"
@@ -104,25 +101,15 @@ class _Loader:
     problems: list[Problem]
     stack: ExitStack
 
-    @property
-    def folder(self) -> Path:
-        """That of the mapping, from which its files are named."""
-        return self.protocol.path.parent
-
     def test(self, test: Test) -> Test:
         origin = test.origin
         if not test.entry.recording:
-            self.problems.append(
-                origin.problem((), "key", f"{shown(test.entry.name)}: {NO_RECORDING}")
-            )
-        for key, there in (
-            ("matrix", bool(test.axes)),
-            ("repeat", test.entry.repeat > 1),
-            ("truth", test.truth is not None),
-        ):
-            if there:
-                message = f"a test with recordings has no {key!r}: each recording says what it is"
-                self.problems.append(origin.problem((key,), "key", message))
+            message = f"{shown(test.entry.name)}: {NO_RECORDING}"
+            self.problems.append(origin.problem((), "key", message))
+        there = {"matrix": test.axes, "repeat": test.entry.repeat > 1, "truth": test.truth}
+        for key in (key for key, value in there.items() if value):
+            message = f"a test with recordings has no {key!r}: each recording says what it is"
+            self.problems.append(origin.problem((key,), "key", message))
         entries = recordings_of(
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
@@ -135,11 +122,11 @@ class _Loader:
         return replace(test, experiment=_kind(test.experiment, found))
 
     def _found(self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
-        layout = self._layout(at, entry)
+        layout, folder = self._layout(at, entry), self.protocol.path.parent
         wanted = {*test.experiment.requires, *test.experiment.can_use}
         found: list[Found] = []
         for written in self._files(at, entry):
-            paths = [self.folder / each for each in written]
+            paths = [folder / each for each in written]
             try:
                 if layout is None:  # what can be said of its files is said all the same
                     OpenedFiles(paths)
@@ -157,20 +144,19 @@ class _Loader:
         return found
 
     def _placed(self, at: Origin, entry: RecordingEntry, error: MappingError) -> Problem:
-        if error.of_columns:
-            name = entry.columns or next(iter(self.layouts))
-            at = Within(self.protocol.origin or at, ("columns", name))
-        return at.problem(error.keys, "key" if error.of_columns else "value", str(error))
+        if not error.of_columns:
+            return at.problem(error.keys, "value", str(error))
+        name = entry.columns or next(iter(self.layouts))
+        keys = ("columns", name, *error.keys[1:])
+        return (self.protocol.origin or at).problem(keys, "key", str(error))
 
     def _layout(self, at: Origin, entry: RecordingEntry) -> Layout | None:
         names = list(self.protocol.columns)
         name = entry.columns or (names[0] if len(names) == 1 else "")
-        if not names:
-            message = "nothing says what its columns are; add [columns.NAME] tables"
-            self.problems.append(at.problem(("file",), "key", message))
-        elif not name:
-            message = f"say by which 'columns' it is read; {allowed(names)}"
-            self.problems.append(at.problem(("file",), "key", message))
+        if not names or not name:
+            nothing = "nothing says what its columns are; add [columns.NAME] tables"
+            which = f"say by which 'columns' it is read; {allowed(names)}"
+            self.problems.append(at.problem(("file",), "key", which if names else nothing))
         elif name not in names:
             message = f"there is no [columns.{name}]; {allowed(names)}{nearest(name, names)}"
             self.problems.append(at.problem(("columns",), "value", message))
@@ -182,7 +168,7 @@ class _Loader:
         if not any(sign in entry.file for sign in "*?["):
             return [[entry.file]]
         try:
-            return [[each] for each in _matching(self.folder, entry.file)]
+            return [[each] for each in _matching(self.protocol.path.parent, entry.file)]
         except ValueError as error:
             message = f"{shown(entry.file)}: {error}"
             self.problems.append(at.problem(("file",), "value", message))
@@ -284,19 +270,9 @@ def _offered(
     )
     requests: Iterable[TrialRequest] = [whole]
     if experiment.recorded is not None:
-        names = frozenset(each.name for each in told.channels)
-
-        def read(wanted: Any) -> Recording:
-            return RecordingReader(told, found.opened).recording(list(wanted))
-
-        offered = Offered(
-            duration,
-            told.sample_rate,
-            sufficient(names, RigFacts.of(bench)),
-            conditions,
-            windows,
-            read,
-        )
+        can = sufficient([each.name for each in told.channels], RigFacts.of(bench))
+        read = RecordingReader(told, found.opened).recording
+        offered = Offered(duration, told.sample_rate, can, conditions, windows, read)
         try:
             requests = list(experiment.recorded(options, bench, offered))
         except ValueError as error:

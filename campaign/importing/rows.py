@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.importing.cells import is_lost, value_of
+from campaign.importing.cells import is_number, value_of
 from campaign.importing.dialect import Dialect, encoding_of
 from campaign.importing.interface import HEAD, ROWS, Array, Column, RecordingError
 
@@ -147,7 +147,8 @@ def _row_by_row(
     further: Iterator[str],
 ) -> Array:
     """What `_quickly` did not take: cells that hold no number, and whatever is wrong, placed."""
-    values, problems = [], []
+    values: list[list[float]] = []
+    problems = []
     for offset, line in enumerate(lines):
         if not line.strip():
             continue
@@ -155,30 +156,22 @@ def _row_by_row(
         if dialect.comments:
             cells = cells[: dialect.width]
         if len(cells) != dialect.width:
-            numbers = [not is_lost(c) and _value(c, dialect) is not None for c in cells]
             after = (each.strip() for rest in (lines[offset + 1 :], further) for each in rest)
-            if not any(numbers) and not any(after):
+            if not any(is_number(cell, dialect.decimal) for cell in cells) and not any(after):
                 break  # an end mark
             message = f"{len(cells)} cells where the rows above have {dialect.width}"
             problems.append(dialect.problem(path, number + offset, message))
             continue
-        row = [_value(cells[place], dialect) for place in places]
-        for place, value in zip(places, row, strict=True):
-            if value is None:
+        values.append([])
+        for place in places:
+            try:
+                values[-1].append(value_of(cells[place], dialect.decimal))
+            except ValueError:
                 message = f"{cells[place][:100]!r} is no number, as the rest of its column is"
                 problems.append(dialect.problem(path, number + offset, message, line, place))
                 break
-        values.append(row)
         if len(problems) >= FEW:
             break
     if problems:
         raise RecordingError(problems)
     return np.array(values, dtype=np.float64).reshape(-1, len(places))
-
-
-def _value(cell: str, dialect: Dialect) -> float | None:
-    """The number in a cell, NaN where it says that there is none; None where it is no number."""
-    try:
-        return value_of(cell, dialect.decimal)
-    except ValueError:
-        return None

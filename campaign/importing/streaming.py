@@ -13,10 +13,8 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -34,18 +32,13 @@ def tables_streamed(module: str, path: Path) -> list[Table]:
     """What `module.tables` finds in a file, asked in other processes. Raises RecordingError."""
     with _process(module, path, "tell") as read:
         told = read()
-    return [
-        Table(
-            each["name"],
-            tuple(Column(**column) for column in each["columns"]),
-            partial(_read, module, path, number),
-            None if each["clock"] is None else Clock(**each["clock"]),
-            each["rows"],
-            each["said"],
-            tuple(each["doubts"]),
-        )
-        for number, each in enumerate(json.loads(told))
-    ]
+    found = []
+    for number, each in enumerate(json.loads(told)):
+        each["columns"] = tuple(Column(**column) for column in each["columns"])
+        each["clock"] = each["clock"] and Clock(**each["clock"])
+        each["doubts"] = tuple(each["doubts"])
+        found.append(Table(**{**each, "read": partial(_read, module, path, number)}))
+    return found
 
 
 def _read(module: str, path: Path, number: int, places: Sequence[int]) -> Iterator[Array]:
@@ -123,28 +116,17 @@ def answer(tables: Callable[[Path], Sequence[Table]]) -> None:
     try:
         found = tables(Path(path))
         if task == "tell":
-            output.write(json.dumps([_told(table) for table in found]).encode())
+            told = [{**vars(table), "read": None} for table in found]
+            output.write(json.dumps(told, default=vars).encode())
         else:
             number, *places = map(int, numbers)
             for block in found[number].read(places):
-                if not len(block):
-                    continue
-                output.write(len(block).to_bytes(_LENGTH, "little"))
-                output.write(np.ascontiguousarray(block, dtype="<f8").tobytes())
+                if len(block):
+                    output.write(len(block).to_bytes(_LENGTH, "little"))
+                    output.write(np.ascontiguousarray(block, dtype="<f8").tobytes())
             output.write(bytes(_LENGTH))
         output.flush()
     except RecordingError as error:
         output.flush()
         sys.stderr.write("; ".join(problem.message for problem in error.problems))
         sys.exit(REFUSED)
-
-
-def _told(table: Table) -> dict[str, Any]:
-    return {
-        "name": table.name,
-        "columns": [asdict(column) for column in table.columns],
-        "clock": None if table.clock is None else asdict(table.clock),
-        "rows": table.rows,
-        "said": dict(table.said),
-        "doubts": list(table.doubts),
-    }

@@ -31,4 +31,4 @@ def tables(path: Path) -> list[Table]:
             yield np.arange(first, first + 10.0)[:, None] + 100.0 * np.array(places)
 
     columns = (Column("a", "N m", "1"), Column("b", "", "2"))
-    return [Table("one", columns, read, Clock(0.1), 30, {"by": "me"}, ("odd",))]
+    return [Table("one", columns, read, Clock(0.1), ("odd",))]

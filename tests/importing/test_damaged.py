@@ -17,6 +17,7 @@ from campaign.importing.formats import open_recordings
 from campaign.importing.guess import guess, mapping_text
 from campaign.importing.interface import RecordingError
 from tests.importing.files import MADE
+from tests.importing.whole import whole
 
 ALL, SOME, APART = 46, 12, 2
 """Mutations of each file: in all, and in every run; fewer of those that take a process each."""
@@ -165,14 +166,14 @@ def test_a_number_beyond_all_numbers_is_none(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("t,q\n0,1\n1,1e999\n2,3\n3,4\n")
     with pytest.raises(RecordingError, match=r"a.csv:3:3: '1e999' is no number"):
-        open_recordings(path)[1][0].whole()
+        whole(open_recordings(path)[1][0])
 
 
 def test_a_quote_that_never_ends(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text('t,q\n0,1\n1,"' + "x" * 200_000 + "\n2,3\n3,4\n4,5\n5,6\n")
     with pytest.raises(RecordingError, match=r"a.csv:3:3: '\"x*"):
-        open_recordings(path)[1][0].whole()
+        whole(open_recordings(path)[1][0])
 
 
 # Memory

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.archive.reading.opening import open_run
-from campaign.importing.defects import Defect, Severity, find
+from campaign.importing.defects import Defect, find
 from campaign.resources import protocols_folder
 from tests.archives import simulated_run
 from tests.importing import rig
@@ -31,7 +31,7 @@ def channels(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def wrong(found: tuple[Defect, ...]) -> list[str]:
-    return [each.what for each in found if each.severity is not Severity.NOTED]
+    return [each.what for each in found if not each.noted]
 
 
 @pytest.mark.parametrize("seed", SEEDS)

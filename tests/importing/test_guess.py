@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.guess import Basis, Guess, guess, mapping_text
+from campaign.importing.guess import Basis, TableGuess, guess, mapping_text
 from campaign.importing.guess.names import named
 from campaign.unit_grammar import parse_unit
 from tests.importing.files import LVM
@@ -37,7 +37,7 @@ def test_there_are_forty_of_them():
 def test_nine_of_ten_roles_are_right(tmp_path):
     right, wrong = 0, []
     for wild in wild_files():
-        for table in guess([made(tmp_path, wild)]).tables:
+        for table in guess([made(tmp_path, wild)]):
             for column in table.columns:
                 is_role, _ = wild.columns[column.name]
                 if column.role in is_role.split("|"):
@@ -66,10 +66,10 @@ def test_no_unit_that_stands_plainly_is_wrong(tmp_path, number):
             assert set(channel) <= given, "or something was guessed that never is"
 
 
-def name_of(channel: dict[str, object], found: Guess) -> str:
+def name_of(channel: dict[str, object], found: list[TableGuess]) -> str:
     """The column's name, which stands as a place where two have it."""
     column = channel["column"]
-    return column if isinstance(column, str) else found.tables[0].columns[column - 1].name
+    return column if isinstance(column, str) else found[0].columns[column - 1].name
 
 
 def test_what_is_not_stated_is_marked(tmp_path):
@@ -82,7 +82,7 @@ def test_what_is_not_stated_is_marked(tmp_path):
         )
     )
     found = guess([tmp_path / "a.csv"])
-    time, angle, speed, torque = found.tables[0].columns
+    time, angle, speed, torque = found[0].columns
     assert (time.unit, time.basis) == ("s", Basis.LIKELY)
     assert (angle.unit, angle.basis) == ("deg", Basis.STATED)
     assert (speed.unit, speed.basis) == ("rad/s", Basis.LIKELY)
@@ -173,7 +173,7 @@ def test_names_are_taken_apart(name, role, unit):
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the measured files are not here")
 @pytest.mark.parametrize("name", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
 def test_a_measured_axis(name):
-    (table,) = guess([SHARED / name]).tables
+    (table,) = guess([SHARED / name])
     roles = {column.name: column.role for column in table.columns}
     assert roles["t"] == "time"
     assert (roles["qm"], roles["qg"]) == ("relative_angle", "reference")

@@ -48,7 +48,7 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     acceleration = np.gradient(m.v, 1 / 500.0)
     data = np.column_stack([m.t, m.q, m.v, acceleration, m.tau, m.i, 35 + m.t / 10])
     scipy.io.savemat(tmp_path / "joint3.mat", {"data": data, "robot": "arm"})
-    (table,) = guess([tmp_path / "joint3.mat"]).tables
+    (table,) = guess([tmp_path / "joint3.mat"])
     assert [column.role for column in table.columns] == [
         "time",
         "relative_angle",
@@ -235,7 +235,7 @@ def test_headings_as_programs_write_them(tmp_path: Path, head: str, roles: list[
     if head.endswith(",\n"):
         rows = [[*row, ""] for row in rows]
     text(rows, head, separator)(tmp_path / "a.csv")
-    (table,) = guess([tmp_path / "a.csv"]).tables
+    (table,) = guess([tmp_path / "a.csv"])
     assert table.step == pytest.approx(1e-3)
     assert [column.role for column in table.columns][: len(roles)] == roles
     told = tomllib.loads(mapping_text(guess([tmp_path / "a.csv"])))["columns"]["a"]
@@ -248,7 +248,7 @@ def test_times_with_holes_are_times(tmp_path: Path):
     rows = [[*row] for row in together(m.t, m.q)]
     rows[7][0] = ""
     text(rows, "time [s],angle\n")(tmp_path / "a.csv")
-    (table,) = guess([tmp_path / "a.csv"]).tables
+    (table,) = guess([tmp_path / "a.csv"])
     assert table.columns[0].role == "time"
     assert table.columns[0].doubts == ("1 of its cells hold no number",)
     assert table.step == pytest.approx(1e-3)
@@ -260,7 +260,7 @@ def test_units_that_contradict_each_other_do_not_stand(tmp_path: Path):
     text(together(m.t, m.q, m.v, m.tau), "time [s],angle [deg],rate [rad/s],torque [Nm]\n")(
         tmp_path / "a.csv"
     )
-    time, angle, rate, torque = guess([tmp_path / "a.csv"]).tables[0].columns
+    time, angle, rate, torque = guess([tmp_path / "a.csv"])[0].columns
     assert [each.basis for each in (angle, rate)] == [Basis.LIKELY, Basis.LIKELY]
     assert "0.017453 is due" in angle.unit_why
     assert [each.basis for each in (time, torque)] == [Basis.LIKELY, Basis.STATED]
@@ -274,7 +274,7 @@ def test_times_that_contradict_a_rate_do_not_stand_either(tmp_path: Path):
     text(together(m.t * 1000.0, m.q, m.v), "time [s],angle [rad],rate [rad/s]\n")(
         tmp_path / "a.csv"
     )
-    columns = guess([tmp_path / "a.csv"]).tables[0].columns
+    columns = guess([tmp_path / "a.csv"])[0].columns
     assert {each.basis for each in columns} == {Basis.LIKELY}
 
 
@@ -289,7 +289,7 @@ def test_what_follows_has_the_unit_of_what_it_follows(tmp_path: Path):
         "torque": m.i * 1.7,
     }
     text(together(*own.values()), ",".join(own) + "\n")(tmp_path / "a.csv")
-    columns = guess([tmp_path / "a.csv"]).tables[0].columns
+    columns = guess([tmp_path / "a.csv"])[0].columns
     _, _, reference, setpoint, _, torque = columns
     assert (reference.role, reference.unit, reference.basis) == ("reference", "deg", Basis.LIKELY)
     assert (setpoint.role, setpoint.unit, setpoint.basis) == ("reference", "deg", Basis.LIKELY)
@@ -314,10 +314,10 @@ def test_which_side_of_the_gear(tmp_path: Path, angle: str, rate: str, roles: li
         tmp_path / "a.csv"
     )
     found = guess([tmp_path / "a.csv"])
-    assert [column.role for column in found.tables[0].columns[1:]] == roles
+    assert [column.role for column in found[0].columns[1:]] == roles
     agree = "rad" not in angle
-    assert agree == (not any(column.doubts for column in found.tables[0].columns))
-    assert agree or "; 0.017453 in its unit" in found.tables[0].columns[2].doubts[0]
+    assert agree == (not any(column.doubts for column in found[0].columns))
+    assert agree or "; 0.017453 in its unit" in found[0].columns[2].doubts[0]
     assert mapping_text(found).count("side of the gear not said") == ("motor angle" not in angle)
 
 
@@ -350,7 +350,7 @@ def test_a_group_of_all_columns_says_nothing(tmp_path: Path):
     ):
         heads = ",".join(f"{group}/{name}" for name in names)
         text(together(m.t, m.q, m.v), f"{heads}\n")(tmp_path / f"{group}.csv")
-        (table,) = guess([tmp_path / f"{group}.csv"]).tables
+        (table,) = guess([tmp_path / f"{group}.csv"])
         assert [column.role for column in table.columns] == roles
 
 

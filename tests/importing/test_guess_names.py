@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from campaign.importing.guess import Basis, ColumnGuess, guess, mapping_text
+from campaign.importing.guess.columns import INDEX, UNKNOWN
 from campaign.importing.guess.names import named
-from campaign.importing.guess.words import INDEX, UNKNOWN
 from campaign.unit_grammar import parse_unit
 from tests.importing.listed import Listed, listed
 from tests.importing.mutilated import mutilate
@@ -30,7 +30,7 @@ def guessed(name: str, folder: Path) -> list[tuple[str, Listed, ColumnGuess]]:
     for number, source in enumerate(listed(name), start=1):
         path = folder / f"{name}{number}.csv"
         source.write(path, number)
-        (table,) = guess([path]).tables
+        (table,) = guess([path])
         both = zip(source.columns, table.columns, strict=True)
         found += [(source.label, column, one) for column, one in both]
     return found
@@ -148,7 +148,7 @@ def test_mutilated_files_lose_little_and_no_unit_is_wrong(tmp_path: Path, name: 
         columns = mutilate(source, path, number)
         found = guess([path])
         tomllib.loads(mapping_text(found))
-        (table,) = found.tables
+        (table,) = found
         for column, one in zip(columns, table.columns, strict=True):
             of += 1
             right += one.role in column.roles

@@ -16,6 +16,7 @@ from campaign.importing.formats import hdf5, open_recordings, tdms
 from campaign.importing.formats import mat as mat_format
 from campaign.importing.interface import Clock, RecordingError, Table
 from tests.importing.files import LVM, MADE, RATE, RIGOL, TIME, TORQUE, TWINCAT, N, mat
+from tests.importing.whole import whole
 
 OPAQUE_FIELDS = ("s0", "s1", "s2", "arr")
 
@@ -42,11 +43,9 @@ def test_blocks_of_labview_are_tables(tmp_path):
     first, second = opened(made(tmp_path, "old.lvm"), "lvm")
     assert headings(first) == [("time", "s"), ("torque", "N m"), ("angle", "deg")]
     np.testing.assert_array_equal(
-        first.whole(), [[0, 1.5, 2], [0.001, 1.6, 3], [0.002, 1.7, 4]]
+        whole(first), [[0, 1.5, 2], [0.001, 1.6, 3], [0.002, 1.7, 4]]
     )  # the comment is no channel
-    np.testing.assert_array_equal(second.whole(), [[0, 2.5, 2], [0.001, 2.6, 3]])
-    assert first.said["Operator"] == "lab"
-    assert (first.rows, second.rows) == (3, 2)
+    np.testing.assert_array_equal(whole(second), [[0, 2.5, 2], [0.001, 2.6, 3]])
 
 
 def test_without_times_the_clock_is_in_the_heading(tmp_path):
@@ -61,7 +60,7 @@ def test_without_times_the_clock_is_in_the_heading(tmp_path):
     path.write_text(text.replace("Delta_X\t0,001\t0,001", "Delta_X\t0,001\t0,01"))
     torque, angle, *_ = opened(path, "lvm")
     assert (torque.clock, angle.clock) == (Clock(0.001), Clock(0.01))
-    assert angle.whole().ravel().tolist() == [2, 3, 4]
+    assert whole(angle).ravel().tolist() == [2, 3, 4]
     path.write_text(text.replace("Delta_X", "Delta_Y"))
     with pytest.raises(RecordingError, match="states no X0 and Delta_X"):
         opened(path, "lvm")
@@ -74,8 +73,8 @@ def test_channels_with_times_of_their_own_are_apart(tmp_path):
     path.write_text(text)
     torque, angle = opened(path, "lvm")
     assert headings(angle) == [("time", "s"), ("angle", "deg")]
-    assert torque.whole().tolist() == [[0, 1], [0.1, 3]]
-    assert angle.whole().tolist() == [[0.5, 2], [0.6, 4]]
+    assert whole(torque).tolist() == [[0, 1], [0.1, 3]]
+    assert whole(angle).tolist() == [[0.5, 2], [0.6, 4]]
 
 
 # Oscilloscopes
@@ -87,7 +86,7 @@ def test_a_scope_that_counts_samples_states_their_clock(tmp_path):
     (table,) = opened(path, "rigol")
     assert table.clock == Clock(2e-4, -1e-3)
     assert headings(table) == [("X", ""), ("CH1", "Volt"), ("CH2", "Volt")]
-    assert table.whole().tolist() == [[0, 1.5, 2], [1, 1.6, 3]]
+    assert whole(table).tolist() == [[0, 1.5, 2], [1, 1.6, 3]]
     path.write_text(RIGOL.replace("2.0e-04", ""))
     with pytest.raises(RecordingError, match=r"NewFile1.csv:2:1: below Start and Increment"):
         opened(path, "rigol")
@@ -103,10 +102,9 @@ def test_clocks_of_twincat_are_tables(tmp_path):
     fast, slow = opened(made(tmp_path, "scope.csv"), "twincat")
     assert headings(fast) == [("time", "ms"), ("ActPos", "deg")]
     assert headings(slow) == [("time", "ms"), ("ActTorque", "Nm"), ("SetVelo", "")]
-    assert fast.whole().tolist() == [[0, 1.5], [1, 1.6], [2, 1.7], [3, 1.8]]
-    assert slow.whole().tolist() == [[0, 3, 4.5], [2, 4, 4.6], [4, 5, 4.7]]
-    assert slow.whole([2]).tolist() == [[4.5], [4.6], [4.7]]
-    assert slow.said["SymbolName of SetVelo"] == "Axis.Velo"
+    assert whole(fast).tolist() == [[0, 1.5], [1, 1.6], [2, 1.7], [3, 1.8]]
+    assert whole(slow).tolist() == [[0, 3, 4.5], [2, 4, 4.6], [4, 5, 4.7]]
+    assert whole(slow, [2]).tolist() == [[4.5], [4.6], [4.7]]
 
 
 def test_a_channel_of_twincat_that_skips_a_time_is_not_cut_short_silently(tmp_path):
@@ -114,7 +112,7 @@ def test_a_channel_of_twincat_that_skips_a_time_is_not_cut_short_silently(tmp_pa
     path.write_text(TWINCAT.replace("2\t1,7\t4\t5\t4,7", "2\t1,7\t\t5\t4,7"))
     _, slow = opened(path, "twincat")
     with pytest.raises(RecordingError, match=r"scope.csv:14:1: values without a time"):
-        slow.whole()
+        whole(slow)
 
 
 # MATLAB
@@ -123,14 +121,12 @@ def test_a_channel_of_twincat_that_skips_a_time_is_not_cut_short_silently(tmp_pa
 def test_variables_of_one_length_stand_together(tmp_path):
     (table,) = opened(made(tmp_path, "v5.mat"), "mat")
     assert [name for name, _ in headings(table)] == ["t", "w", "both(:,1)", "both(:,2)"]
-    np.testing.assert_array_equal(table.whole(), np.column_stack([TIME, RATE, RATE, TORQUE]))
-    assert table.said == {"gain": "35.15"}
-    assert table.rows == N
+    np.testing.assert_array_equal(whole(table), np.column_stack([TIME, RATE, RATE, TORQUE]))
 
 
 def test_version_4_has_no_mark_of_its_own(tmp_path):
     (table,) = opened(made(tmp_path, "v4.mat"), "mat")
-    np.testing.assert_array_equal(table.whole(), np.column_stack([TIME, RATE]))
+    np.testing.assert_array_equal(whole(table), np.column_stack([TIME, RATE]))
 
 
 def test_rows_of_a_matrix_are_named_as_rows(tmp_path):
@@ -138,7 +134,7 @@ def test_rows_of_a_matrix_are_named_as_rows(tmp_path):
     scipy.io.savemat(path, {"data": np.vstack([TIME, RATE])})
     (table,) = opened(path, "mat")
     assert [name for name, _ in headings(table)] == ["data(1,:)", "data(2,:)"]
-    np.testing.assert_array_equal(table.whole([1]).ravel(), RATE)
+    np.testing.assert_array_equal(whole(table, [1]).ravel(), RATE)
 
 
 def test_objects_beside_numbers_are_left_out(tmp_path, monkeypatch):
@@ -153,8 +149,6 @@ def test_objects_beside_numbers_are_left_out(tmp_path, monkeypatch):
             continue
         (table,) = mat_format.tables(tmp_path / "bench.mat")
         assert [name for name, _ in headings(table)] == columns
-        assert "object" in table.said["plan"]
-        assert "None" not in table.said
 
 
 def test_whole_numbers_do_not_wrap_around(tmp_path):
@@ -163,7 +157,7 @@ def test_whole_numbers_do_not_wrap_around(tmp_path):
     counts = np.array([1.0, 2.0, 1.0, 250.0])
     scipy.io.savemat(path, {"n": counts.astype(np.uint8)})
     (table,) = opened(path, "mat")
-    assert np.diff(table.whole().ravel()).tolist() == [1, -1, 249]
+    assert np.diff(whole(table).ravel()).tolist() == [1, -1, 249]
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -188,9 +182,8 @@ def test_signals_of_dspace_have_the_clock_they_name(tmp_path):
     fast, slow = opened(made(tmp_path, "dspace.mat"), "mat")
     assert headings(fast) == [("time", "s"), ("w", "rad/s")]
     assert headings(slow) == [("time", "s"), ("tau", "Nm")]
-    np.testing.assert_array_equal(fast.whole(), np.column_stack([TIME, RATE]))
-    np.testing.assert_array_equal(slow.whole(), np.column_stack([TIME[::2], TORQUE[::2]]))
-    assert fast.said["Path of w"] == "Model Root/w"
+    np.testing.assert_array_equal(whole(fast), np.column_stack([TIME, RATE]))
+    np.testing.assert_array_equal(whole(slow), np.column_stack([TIME[::2], TORQUE[::2]]))
 
 
 def test_a_signal_whose_clock_cannot_be_told_is_not_given_one(tmp_path):
@@ -200,7 +193,6 @@ def test_a_signal_whose_clock_cannot_be_told_is_not_given_one(tmp_path):
     scipy.io.savemat(path, {"rec": {"X": clocks, "Y": signals}})
     (table,) = opened(path, "mat")
     assert [name for name, _ in headings(table)] == ["time", "tau"]
-    assert table.said["w"] == f"{N} values, of which no time is known"
 
 
 def test_structures_of_simulink_have_their_time(tmp_path):
@@ -211,7 +203,7 @@ def test_structures_of_simulink_have_their_time(tmp_path):
         "signals(2)(:,1)",
         "signals(2)(:,2)",
     ]
-    np.testing.assert_array_equal(table.whole([0, 3]), np.column_stack([TIME, TORQUE]))
+    np.testing.assert_array_equal(whole(table, [0, 3]), np.column_stack([TIME, TORQUE]))
 
 
 def test_version_7_3_is_read_in_parts(tmp_path, monkeypatch):
@@ -221,9 +213,8 @@ def test_version_7_3_is_read_in_parts(tmp_path, monkeypatch):
     assert max(len(block) for block in here.read([0, 3])) == 7
     (table,) = opened(path, "hdf5")
     assert [name for name, _ in headings(table)] == ["both(:,1)", "both(:,2)", "t", "rec.tau"]
-    for whole in (table.whole(), here.whole()):
-        np.testing.assert_array_equal(whole, np.column_stack([RATE, TORQUE, TIME, TORQUE]))
-    assert table.said["name"] == "rig"
+    for values in (whole(table), whole(here)):
+        np.testing.assert_array_equal(values, np.column_stack([RATE, TORQUE, TIME, TORQUE]))
 
 
 # HDF5
@@ -232,8 +223,7 @@ def test_version_7_3_is_read_in_parts(tmp_path, monkeypatch):
 def test_nothing_outside_a_file_is_opened(tmp_path):
     (table,) = opened(made(tmp_path, "plain.h5"), "hdf5")
     assert headings(table) == [("run.t", ""), ("run.tau", "N m")]
-    assert table.said["elsewhere"] == table.said["soft"] == "a link, which is not followed"
-    np.testing.assert_array_equal(table.whole(), np.column_stack([TIME, TORQUE]))
+    np.testing.assert_array_equal(whole(table), np.column_stack([TIME, TORQUE]))
 
 
 # Parquet
@@ -251,16 +241,15 @@ def test_columns_of_parquet_have_their_units(tmp_path, monkeypatch):
         pa.field("w", pa.int16()),
     ]
     counts = np.arange(N, dtype=np.int16)
-    schema = pa.schema(fields, metadata={"rig": "seven"})
+    schema = pa.schema(fields)
     values = [TIME, RATE.astype(np.float32), ["run"] * N, counts]
     path = tmp_path / "a.parquet"
     parquet.write_table(pa.table(values, schema=schema), path)
     (table,) = opened(path, "parquet")
     assert headings(table) == [("t", "s"), ("w", "rad/s"), ("mode", ""), ("w", "")]
     assert [column.numeric for column in table.columns] == [True, True, False, True]
-    assert table.said == {"rig": "seven"}
     np.testing.assert_array_equal(
-        table.whole(), np.column_stack([TIME, RATE.astype(np.float32), counts])
+        whole(table), np.column_stack([TIME, RATE.astype(np.float32), counts])
     )
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(RecordingError, match="this Parquet file cannot be read"):
@@ -286,13 +275,12 @@ def test_channels_of_tdms_have_the_clock_of_their_waveform(tmp_path, monkeypatch
         )
     here = tdms.tables(path)[0]  # as the other process has it
     assert max(len(block) for block in here.read([0])) == 7
-    np.testing.assert_array_equal(here.whole(), np.column_stack([RATE, TORQUE]))
+    np.testing.assert_array_equal(whole(here), np.column_stack([RATE, TORQUE]))
     clocked, other = opened(path, "tdms")
     assert headings(clocked) == [("w", "rad/s"), ("tau", "N m")]
-    assert (clocked.clock, clocked.rows) == (Clock(0.01, 0.5), N)
-    np.testing.assert_array_equal(clocked.whole(), np.column_stack([RATE, TORQUE]))
+    assert clocked.clock == Clock(0.01, 0.5)
+    np.testing.assert_array_equal(whole(clocked), np.column_stack([RATE, TORQUE]))
     assert (headings(other), other.clock) == ([("half", "")], None)
-    assert clocked.said["Operator"] == "lab"
     path.write_bytes(path.read_bytes()[:60])
     with pytest.raises(RecordingError, match=r"TDMS file cannot be read|no channel of it"):
         opened(path, "tdms")
@@ -326,7 +314,7 @@ def test_nothing_in_the_folder_of_a_file_is_run(tmp_path, monkeypatch):
     (tmp_path / "numpy.py").write_text("open('run', 'w')\nraise SystemExit(7)\n")
     monkeypatch.chdir(tmp_path)
     (table,) = opened(tmp_path / "a.mat", "mat")
-    assert table.rows == N
+    assert len(whole(table)) == N
     assert not (tmp_path / "run").exists()
 
 

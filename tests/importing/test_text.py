@@ -10,6 +10,7 @@ import pytest
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError, Table
 from tests.importing.files import CSV, GERMAN
+from tests.importing.whole import whole
 
 
 def table(path: Path, content: str | bytes) -> Table:
@@ -33,22 +34,22 @@ def test_names_units_and_numbers_are_as_written(path):
     found = table(path, CSV)
     assert headings(found) == [("time", "s"), ("rate", "deg/s"), ("torque", "N m")]
     np.testing.assert_array_equal(
-        found.whole(), [[0, 1.5, -2], [0.01, 1.6, -2.25], [0.02, 1.7, -2.5]]
+        whole(found), [[0, 1.5, -2], [0.01, 1.6, -2.25], [0.02, 1.7, -2.5]]
     )
-    np.testing.assert_array_equal(found.whole([2, 0]), [[-2, 0], [-2.25, 0.01], [-2.5, 0.02]])
+    np.testing.assert_array_equal(whole(found, [2, 0]), [[-2, 0], [-2.25, 0.01], [-2.5, 0.02]])
 
 
 def test_a_decimal_comma_groups_thousands_with_points(path):
     found = table(path, GERMAN)
     assert headings(found) == [("Zeit", "ms"), ("Drehzahl", "1/min"), ("Moment", "Nm")]
-    np.testing.assert_array_equal(found.whole()[0], [0, 1234.5, -0.2])
+    np.testing.assert_array_equal(whole(found)[0], [0, 1234.5, -0.2])
 
 
 @pytest.mark.parametrize("codec", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"])
 def test_the_encoding_is_found(path, codec):
     found = table(path, "t [µs];Kraft [N] für Achse\n0;1,5\n1;2,5\n2;3,5\n".encode(codec))
     assert [column.name for column in found.columns] == ["t", "Kraft [N] für Achse"]
-    assert found.whole()[:, 1].tolist() == [1.5, 2.5, 3.5]
+    assert whole(found)[:, 1].tolist() == [1.5, 2.5, 3.5]
 
 
 AMPLIFIER = (
@@ -85,22 +86,22 @@ def test_habits_of_other_programs(path, content, names, units, last):
     found = table(path, content)
     assert [column.name for column in found.columns] == names
     assert [column.unit for column in found.columns] == units
-    assert found.whole()[-1].tolist() == last
+    assert whole(found)[-1].tolist() == last
 
 
-def test_what_stands_above_the_heading_is_kept(path):
+def test_what_stands_above_the_heading_is_no_column(path):
     found = table(path, "Operator: me\nSampling time interval(ms),0.667\n\nt,a\n0,1\n1,2\n2,3\n")
-    assert found.said == {"Operator": "me", "Sampling time interval(ms)": "0.667"}
+    assert [(column.name, column.unit) for column in found.columns] == [("t", ""), ("a", "")]
 
 
 def test_words_are_no_numbers_and_columns_keep_their_places(path):
     found = table(path, "time,mode,q\n0,IDLE,1\n0.1,RUN,2\n0.2,RUN,3\n")
     assert [column.numeric for column in found.columns] == [True, False, True]
-    assert found.whole().tolist() == [[0, 1], [0.1, 2], [0.2, 3]]
+    assert whole(found).tolist() == [[0, 1], [0.1, 2], [0.2, 3]]
 
 
 def test_lost_numbers_are_nan(path):
-    rows = table(path, "t,a\n0,1\n1,\n2,nan\n3,inf\n4,4\n5,#N/A\n6,7\n").whole()
+    rows = whole(table(path, "t,a\n0,1\n1,\n2,nan\n3,inf\n4,4\n5,#N/A\n6,7\n"))
     assert np.isnan(rows[:, 1]).tolist() == [False, True, True, True, False, True, False]
 
 
@@ -122,7 +123,7 @@ def test_two_ways_of_reading_are_a_doubt(path):
 def test_a_broken_row_is_refused_by_line_and_column(path, content, place, what):
     """It is never padded, never dropped, and rows above it are no heading."""
     with pytest.raises(RecordingError) as caught:
-        table(path, content).whole()
+        whole(table(path, content))
     assert f"{path}:{place}: {what}" in str(caught.value)
 
 
@@ -130,7 +131,7 @@ def test_a_row_is_broken_far_behind_the_sample(path):
     rows = [f"{k},{k % 7}" for k in range(5000)]
     rows[4200] = "4200,3,9"
     with pytest.raises(RecordingError, match=rf"{path}:4202:1: 3 cells"):
-        table(path, "t,a\n" + "\n".join(rows) + "\n").whole()
+        whole(table(path, "t,a\n" + "\n".join(rows) + "\n"))
 
 
 def test_a_long_file_is_read_in_blocks(path, monkeypatch):
@@ -153,7 +154,7 @@ def test_a_long_file_is_read_in_blocks(path, monkeypatch):
 )
 def test_what_is_no_table_is_told_in_one_line(path, content, what):
     with pytest.raises(RecordingError) as caught:
-        table(path, content).whole()
+        whole(table(path, content))
     assert what in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -168,14 +169,14 @@ def test_rows_that_begin_without_a_number_are_rows(path, lost):
     rows = [f"{k},{k * 2},{lost if k < 100 else k}" for k in range(400)]
     found = table(path, "t,a,b\n" + "\n".join(rows) + "\n")
     assert [column.name for column in found.columns] == ["t", "a", "b"]
-    assert len(found.whole()) == 400
+    assert len(whole(found)) == 400
 
 
 @pytest.mark.parametrize("broken", ["{k},{k},?", "{k},{k}"])
 def test_broken_rows_at_the_beginning_are_no_heading(path, broken):
     rows = [(broken if k < 100 else "{k},{k},{k}").format(k=k) for k in range(400)]
     with pytest.raises(RecordingError, match=rf"{path}:2:"):
-        table(path, "t,a,b\n" + "\n".join(rows) + "\n").whole()
+        whole(table(path, "t,a,b\n" + "\n".join(rows) + "\n"))
 
 
 def test_a_row_too_long_does_not_make_up_for_one_too_short(path):
@@ -183,5 +184,5 @@ def test_a_row_too_long_does_not_make_up_for_one_too_short(path):
     rows[60:62] = ["0.6,60,1,1", "0.61,61"]
     found = table(path, "\n".join(["time [s],rate [deg/s],torque [N m]", *rows, ""]))
     with pytest.raises(RecordingError) as refused:
-        found.whole([0, 1])
+        whole(found, [0, 1])
     assert [problem.line for problem in refused.value.problems] == [62, 63]

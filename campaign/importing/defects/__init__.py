@@ -4,24 +4,13 @@ Nothing is repaired because it was found: what a mapping asks for is done where 
 columns (`importing.made`), times a clock (`even_clock`) and samples read.
 """
 
-from campaign.importing.defects.defect import Defect, Severity
+from campaign.importing.defects.defect import Defect
 from campaign.importing.defects.finding import find
 
-__all__ = ["CHANNEL_KINDS", "Defect", "Severity", "find"]
+__all__ = ["CHANNEL_KINDS", "Defect", "find"]
 
 CHANNEL_KINDS = (
-    "absurd",
-    "clipping",
-    "delay",
-    "dropout",
-    "factor",
-    "filled",
-    "held",
-    "lost",
-    "sign",
-    "spike",
-    "twice",
-    "unrelated",
-    "wraparound",
+    *("absurd", "clipping", "delay", "dropout", "factor", "filled", "held"),
+    *("lost", "sign", "spike", "twice", "unrelated", "wraparound"),
 )
 """Kinds of what is found in channels; those of time are not among them."""

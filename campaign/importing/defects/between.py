@@ -17,7 +17,6 @@ from campaign.importing.defects.defect import (
     NO_FILTER,
     Array,
     Defect,
-    Severity,
     correlation,
     is_sure,
     nearest_low,
@@ -129,19 +128,19 @@ def of_rate(
             f"{two} is not the derivative of {one}: it explains {100 * found.explained:.2g} % of "
             "how far that moved"
         )
-        yield Defect("unrelated", (two, one), what, rows, found.explained, Severity.NOTED)
+        yield Defect("unrelated", (two, one), what, rows, found.explained, noted=True)
         return
     if found.factor < 0 and found.explained > 0.9:
         what = (
             f"{two} has the opposite sign of the derivative of {one} (factor {found.factor:.4g}, "
             f"R² {found.explained:.3f})"
         )
-        yield Defect("sign", (two, one), what, rows, found.factor, Severity.REPAIRABLE)
+        yield Defect("sign", (two, one), what, rows, found.factor)
     yield from _factor(found, names, rows, gear)
     if found.explained > 0.9:
         apart = delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
         # Both agree on how far it moved: a long delay would be that of a part that hardly changes.
-        yield from (each for each in apart if each.severity is Severity.NOTED)
+        yield from (each for each in apart if each.noted)
 
 
 def candidates(factor: float, error: float = 0.0, gear: float | None = None) -> list[str]:
@@ -167,16 +166,13 @@ def _factor(
         return
     told = f"{two} is {size:.5g} times the derivative of {one} (R² {found.explained:.4f})"
     means = candidates(found.factor, found.error, gear)
-    if len(means) == 1:
-        what = f"{told}: {means[0]}"
-        yield Defect("factor", (two, one), what, rows, size, Severity.REPAIRABLE)
-    elif means:
-        what = f"{told}: either {', or '.join(means)}"
-        yield Defect("factor", (two, one), what, rows, size, Severity.REFUSED)
+    if means:
+        what = f"{told}: {'either ' * (len(means) > 1)}{', or '.join(means)}"
+        yield Defect("factor", (two, one), what, rows, size)
     elif off > _UNEXPLAINED:
         severe = found.travel > 100 and not 0.5 < size < 2
-        severity = Severity.REFUSED if severe else Severity.NOTED
-        yield Defect("factor", (two, one), f"{told}, for no usual reason", rows, size, severity)
+        what = f"{told}, for no usual reason"
+        yield Defect("factor", (two, one), what, rows, size, noted=not severe)
 
 
 def delay(
@@ -221,5 +217,4 @@ def delay(
         f"{two} comes {1000 * abs(lag):.3g} ms {where} the derivative of {one} "
         f"({abs(lag) / step:.2g} samples): a delay or a filter"
     )
-    severity = Severity.REPAIRABLE if is_long else Severity.NOTED
-    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), severity)
+    yield Defect("delay", (two, one), what, (0, n - 1), float(lag), noted=not is_long)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MOST = 10
-"""Places of one kind that are told one by one; of the others their number is."""
-
 
 _REMEDIES = {
     "factor": "correct its 'unit' or 'times', or ",
@@ -20,14 +16,6 @@ _REMEDIES = {
     "delay": "put it back by 'delay', or ",
     "wraparound": 'repair = ["unwrap"] makes it continuous, or ',
 }
-
-
-class Severity(StrEnum):
-    """What a defect means for the recording."""
-
-    REFUSED = "refused"  # nothing that can be worked out of it would be right
-    REPAIRABLE = "repairable"  # refused as well, unless somebody asks for the repair
-    NOTED = "noted"  # it is usable; a reader should know
 
 
 @dataclass(frozen=True)
@@ -40,7 +28,7 @@ class Defect:
         what: a sentence with its number.
         rows: the first and the last row, from 0.
         size: the number that tells how much: of lost samples, of a factor, s of a delay.
-        severity: what it means for the recording.
+        noted: it is usable, and a reader should know; else it is refused unless it is accepted.
     """
 
     kind: str
@@ -48,7 +36,7 @@ class Defect:
     what: str
     rows: tuple[int, int]
     size: float
-    severity: Severity
+    noted: bool = False
 
     @property
     def remedy(self) -> str:

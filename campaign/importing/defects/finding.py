@@ -23,11 +23,9 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.importing.defects.between import of_rate
-from campaign.importing.defects.defect import Array, Defect, Severity
-from campaign.importing.defects.drives import of_drive, of_drive_sign, of_twins
-from campaign.importing.defects.late import of_drive_delay
-from campaign.importing.defects.rates import frozen, slower
-from campaign.importing.defects.samples import continuous, of_channel
+from campaign.importing.defects.defect import Array, Defect
+from campaign.importing.defects.drives import of_drive, of_drive_delay, of_drive_sign, of_twins
+from campaign.importing.defects.samples import continuous, frozen, of_channel, slower
 
 ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
 DRIVES = (DRIVE_TORQUE, JOINT_TORQUE, MOTOR_CURRENT)
@@ -37,7 +35,6 @@ TOLD = (*ASKED, FRICTION_TORQUE, LOAD_RATE)
 _DERIVATIVES = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE))
 LARGEST = 1e100
 """What no number of a recording is beyond, in any unit."""
-_ORDER = {Severity.REFUSED: 0, Severity.REPAIRABLE: 1, Severity.NOTED: 2}
 
 
 def find(
@@ -58,12 +55,8 @@ def find(
     }
     sound = {}
     # What follows a command that is drawn by lines is drawn by lines, too.
-    drawn = {
-        (each.kind, each.size)
-        for name in ASKED
-        if name in channels
-        for each in slower(name, channels[name])
-    }
+    asked = (slower(name, channels[name]) for name in ASKED if name in channels)
+    drawn = {(each.kind, each.size) for own in asked for each in own}
     for name, values in channels.items():
         own = list(of_channel(name, values, angle=name in ANGLES))
         if name not in ASKED:
@@ -76,7 +69,7 @@ def find(
         found += of_drive(name, values) if name in DRIVES else ()
     if len(time) > 1:
         found += _between(time, sound, gear)
-    return tuple(sorted(found, key=lambda each: (_ORDER[each.severity], each.rows)))
+    return tuple(sorted(found, key=lambda each: (each.noted, each.rows)))
 
 
 def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
@@ -87,25 +80,24 @@ def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
             first, last = int(beyond[0]), int(beyond[-1])
             what = f"{name} is {values[first]:.3g} in row {first + 1}: no measurement is that large"
             size = float(values[first])
-            yield Defect("absurd", (name,), what, (first, last), size, Severity.REFUSED)
+            yield Defect("absurd", (name,), what, (first, last), size)
 
 
 def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> list[Defect]:
     found: list[Defect] = []
-    for angle, rate in _DERIVATIVES:
-        if angle in channels and rate in channels:
-            names = (angle, rate)
-            found += of_rate(time, channels[angle], channels[rate], names, gear)
+    for names in (both for both in _DERIVATIVES if channels.keys() >= set(both)):
+        found += of_rate(time, channels[names[0]], channels[names[1]], names, gear)
     if gear is not None:
         found += _across_the_gear(time, channels, gear)
+    drives = [name for name in DRIVES if name in channels]
     drive = next((name for name in (DRIVE_TORQUE, MOTOR_CURRENT) if name in channels), None)
     moving = _motion(time, channels)
     if drive is not None and moving is not None:
         name, there, moves = moving
         found += of_drive_sign(time, there, moves, channels[drive], (drive, name))
-        for each in (each for each in DRIVES if each in channels):
+        for each in drives:
             found += of_drive_delay(time, moves, channels[each], (each, name))
-    for pair in combinations([name for name in DRIVES if name in channels], 2):
+    for pair in combinations(drives, 2):
         found += of_twins(pair, channels[pair[0]], channels[pair[1]])
     return found
 

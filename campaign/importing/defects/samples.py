@@ -1,7 +1,9 @@
-"""What is wrong with a channel by itself: lost samples, dropouts, clipping, wraparound.
+"""What is wrong with a channel by itself: lost samples, dropouts, wraparound, slowness.
 
 Standing still is no defect, however long: what only a motion would show is judged by how a channel
-enters and leaves the stretch in question.
+enters and leaves the stretch in question. A channel that is slower than its table is held, or
+filled in between: it changes in every p-th row only, and always in the same phase, as no motion
+does.
 """
 
 from __future__ import annotations
@@ -10,12 +12,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.importing.defects.defect import (
-    MOST,
     Array,
     Defect,
-    Severity,
     counted,
     rows_in_words,
     runs,
@@ -30,6 +31,12 @@ _SPIKE = 5.0
 """Spans of nearly all samples by which a single one may be off its neighbours."""
 _ABRUPT = 8.0
 """Usual steps, beyond which a step is none that the motion before it would lead to."""
+FEWEST = 20
+"""Changes by which a rhythm is believed."""
+_REGULAR = 0.95
+"""Share of the changes that keep to the rhythm."""
+_MOST = 10
+"""Stretches in which a channel stands still; with more that is how it is made: of counts, say."""
 
 
 def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Defect]:
@@ -42,23 +49,20 @@ def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Def
     rows = (0, max(len(values) - 1, 0))
     if not known.any():
         what = f"{name} holds no number at all"
-        yield Defect("lost", (name,), what, rows, float(len(values)), Severity.REFUSED)
+        yield Defect("lost", (name,), what, rows, float(len(values)))
         return
     lost = np.flatnonzero(~known)
     if len(lost):
         ends = (int(lost[0]), int(lost[-1]))
         what = f"{name} lacks {counted(len(lost), 'sample')}, the first in row {lost[0] + 1}"
-        yield Defect("lost", (name,), what, ends, float(len(lost)), Severity.NOTED)
-    if len(values) < 2:
-        return
-    if np.ptp(values[known]) == 0:  # standing still is no defect
+        yield Defect("lost", (name,), what, ends, float(len(lost)), noted=True)
+    if len(values) < 2 or np.ptp(values[known]) == 0:  # standing still is no defect
         return
     turns = list(_wraparound(name, values)) if angle else []
     yield from turns
     if not turns:
         yield from _zeros(name, values)
         yield from _spikes(name, values)
-    yield from _limit_of_integers(name, values)
 
 
 def _wraparound(name: str, values: Array) -> Iterator[Defect]:
@@ -80,7 +84,7 @@ def _wraparound(name: str, values: Array) -> Iterator[Defect]:
                 f"the first behind row {jumps[0] + 1}"
             )
             where = (int(jumps[0]), int(jumps[-1]) + 1)
-            yield Defect("wraparound", (name,), what, where, scale, Severity.REPAIRABLE)
+            yield Defect("wraparound", (name,), what, where, scale)
             return
 
 
@@ -136,39 +140,81 @@ def _spikes(name: str, values: Array) -> Iterator[Defect]:
             f"{high:.4g}"
         )
         ends = (int(rows[0]), int(rows[-1]))
-        yield Defect("spike", (name,), what, ends, float(len(rows)), Severity.REPAIRABLE)
+        yield Defect("spike", (name,), what, ends, float(len(rows)))
 
 
 def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Defect]:
-    """A defect for each stretch, or one for many."""
-    stretches = [(int(first), int(last)) for first, last in found]
-    for first, last in stretches[:MOST]:
-        samples = last - first + 1
-        where = rows_in_words(first, last)
-        what = f"{name} {does} in the middle of motion, {where} ({counted(samples, 'sample')})"
-        yield Defect("dropout", (name,), what, (first, last), float(samples), Severity.REPAIRABLE)
-    rest = stretches[MOST:]
-    if rest:
-        samples = sum(last - first + 1 for first, last in rest)
-        what = f"{name} {does} in {counted(len(rest), 'further stretch')}"
-        ends = (rest[0][0], rest[-1][1])
-        yield Defect("dropout", (name,), what, ends, float(samples), Severity.REPAIRABLE)
+    """One defect for all stretches that there are."""
+    if found:
+        first, last = map(int, found[0])
+        samples = int(sum(last - first + 1 for first, last in found))
+        more = f" and in {counted(len(found) - 1, 'further stretch')}" if len(found) > 1 else ""
+        where = f"{rows_in_words(first, last)}{more} ({counted(samples, 'sample')})"
+        what = f"{name} {does} in the middle of motion, {where}"
+        yield Defect("dropout", (name,), what, (first, int(found[-1][1])), float(samples))
 
 
-def _limit_of_integers(name: str, values: Array) -> Iterator[Defect]:
-    """Runs at -2^n or 2^n - 1 of whole numbers: the number that held it was full."""
-    whole = values[np.isfinite(values)]
-    if not np.array_equal(whole, np.round(whole)):
+def slower(name: str, values: Array) -> Iterator[Defect]:
+    """A channel whose value is new in every p-th row only; `size` is p."""
+    if not np.isfinite(values).all() or len(values) < 2 * FEWEST:
         return
-    for bits in (7, 8, 11, 12, 13, 15, 16, 23, 24, 31, 32):
-        for limit in (-float(2**bits), float(2**bits - 1)):
-            at = values == limit
-            if limit not in (whole.min(), whole.max()) or at.sum() < 5:
-                continue
-            longest = max(runs(at), key=lambda each: each[1] - each[0])
-            if longest[1] - longest[0] >= 4:
-                what = (
-                    f"{name} stands at {limit:.0f}, where whole numbers of some bits end, in "
-                    f"{counted(int(at.sum()), 'sample')}"
-                )
-                yield Defect("clipping", (name,), what, longest, limit, Severity.REPAIRABLE)
+    rows = (0, len(values) - 1)
+    changes = np.flatnonzero(np.diff(values) != 0) + 1
+    period = _rhythm(changes, len(values))
+    if period:
+        what = f"{name} is new in one of {period} rows only, and held in between"
+        yield Defect("held", (name,), what, rows, float(period), noted=True)
+        return
+    bends = np.diff(values, 2)
+    noise = 1e-6 * float(np.quantile(np.abs(np.diff(values)), 0.99)) + 1e-12 * np.abs(values).max()
+    corners = np.flatnonzero(np.abs(bends) > noise) + 1
+    period = _rhythm(corners, len(values))
+    if period:
+        what = f"{name} was measured in one of {period} rows, and drawn straight in between"
+        yield Defect("filled", (name,), what, rows, float(period))
+
+
+def _rhythm(places: NDArray[np.intp], length: int) -> int:
+    """Period of what happens in every p-th row, p > 1; 0 where it has none."""
+    if len(places) < FEWEST or len(places) > 0.75 * length:
+        return 0
+    apart = np.diff(places)
+    period = int(np.gcd.reduce(apart)) if len(apart) else 0
+    if period < 2:
+        usual, counts = np.unique(apart, return_counts=True)
+        period = int(usual[np.argmax(counts)])
+    if period < 2:
+        return 0
+    phases = np.bincount(places % period, minlength=period)
+    # Rows in which nothing happened are many, too, where it stood still.
+    happened = len(places) * period / length
+    return period if phases.max() >= _REGULAR * len(places) and happened > 0.2 else 0
+
+
+def frozen(name: str, values: Array) -> Iterator[Defect]:
+    """Where a channel with noise stands still for a while, and then jumps: nothing came from it.
+
+    Noise seldom repeats itself; how seldom, the rest of the channel tells.
+    """
+    if len(values) < 100 or not np.isfinite(values).all():
+        return
+    size = np.abs(np.diff(values))
+    same = size == 0
+    share = float(same.mean())
+    if share > 0.2:
+        return
+    usual = float(np.median(size[size > 0]))
+    peak = float(np.abs(values).max())
+    found = []
+    for first, last in runs(same):
+        length = last - first + 1
+        # Chance of such a run anywhere, were repetitions independent of each other.
+        chance = len(values) * max(share, 1.0 / len(values)) ** length
+        leap = float(size[last + 1]) if last + 1 < len(size) else 0.0
+        # A filter that has run out rests at next to nothing, and not in the middle of motion.
+        rests = abs(values[first]) <= 1e-6 * peak
+        moved = first >= 4 and not same[first - 4 : first].any() and not rests
+        if length >= 4 and moved and chance < 1e-6 and leap > 5 * usual:
+            found.append((first + 1, last + 1))
+    if len(found) <= _MOST:
+        yield from dropouts(name, found, "stands still")

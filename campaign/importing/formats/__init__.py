@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table, check_regular
+from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table, regular
 from campaign.plugins import Kinds
 
 TEXT = "text"
@@ -24,13 +24,8 @@ def open_recordings(path: Path) -> tuple[RecordingFormat, Sequence[Table]]:
 
     Raises RecordingError with everything that is wrong, also when it is in no format there is.
     """
-    check_regular(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise RecordingError.of(path, f"it cannot be opened: {why}") from None
+    with regular(path) as file:
+        head = file.read(HEAD)
     if not head.strip():
         raise RecordingError.of(path, "it is empty")
     formats = [each for _, each in recording_formats().described() if not isinstance(each, str)]

@@ -1,15 +1,27 @@
-"""CSV, TSV and any other table of text: separator, decimal sign and heading are found."""
+"""CSV, TSV and any other table of text: separator, decimal sign and heading are found.
+
+Test machines write a table for each step of a procedure, with lines about the step above it: such
+tables lie below each other, each under the same heading.
+"""
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from campaign.importing.dialect import SEPARATORS, dialect_of, encoding_of
+from campaign.importing.cells import is_lost, is_number, name_and_unit
+from campaign.importing.dialect import (
+    SEPARATORS,
+    Dialect,
+    dialect_of,
+    encoding_of,
+    heading,
+)
 from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
-from campaign.importing.rows import beginning, blocks, columns_of
-from campaign.importing.stacked import stacked
+from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file, lines_of
 
 SAMPLE = 400
 """Lines by which the table is."""
@@ -23,19 +35,75 @@ def tables(path: Path) -> Sequence[Table]:
         separators = ", ".join(SEPARATORS.values())
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError.of(path, message)
-    found = stacked(path, dialect, sample)
-    return tuple(
-        Table(
-            f"block {number}" if len(found) > 1 else "",
-            columns_of(each.dialect),
-            partial(blocks, path, each.dialect, rows=each.lines),
-            rows=each.rows,
-            said=each.dialect.said,
-            doubts=dialect.doubts,
-            below=len(found) > 1,
-        )
-        for number, each in enumerate(found, start=1)
-    )
+    title = _title(dialect, sample)
+    found = _below(path, dialect, title) if title and _again(path, title) else []
+    if len(found) > 1:
+        return found
+    read = partial(blocks, path, dialect)
+    return [Table("", columns_of(dialect), read, doubts=dialect.doubts)]
+
+
+def _title(dialect: Dialect, sample: Sequence[str]) -> str:
+    """The line with the names of the columns; "" where there is none."""
+    for line in reversed(sample[: dialect.first - 1]):
+        cells = dialect.split(line)
+        if dialect.names and [name_and_unit(each)[0] for each in cells][: len(dialect.names)] == [
+            *dialect.names
+        ]:
+            return line.rstrip("\r\n")
+    return ""
+
+
+def _again(path: Path, title: str) -> bool:
+    """Whether a line begins as that heading twice; found without reading lines."""
+    needle = title.encode(encoding_of_file(path).removesuffix("-sig"))
+    with path.open("rb") as raw, mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        first = content.find(needle)
+        return first >= 0 and content.find(b"\n" + needle, first) >= 0
+
+
+def _below(path: Path, dialect: Dialect, title: str) -> list[Table]:
+    """The tables below each other, given how the first is read and its line of names."""
+    found: list[Table] = []
+    titles: list[str] = []
+    own, first, last = dialect, 0, 0
+
+    def end() -> None:
+        if first:
+            read = partial(blocks, path, own, rows=last - first + 1)
+            name = f"block {len(found) + 1}"
+            found.append(Table(name, columns_of(own), read, doubts=dialect.doubts))
+
+    for number, line in enumerate(lines_of(path), start=1):
+        bare = line.rstrip("\r\n")
+        if bare != title and titles and _is_row(dialect, line):
+            if not first:
+                own, first = _headed(dialect, titles, number), number
+            last = number
+        elif bare == title or (first and bare.strip()):
+            end()
+            first = 0
+            titles = [bare] if bare == title else []
+        elif titles and bare.strip():
+            titles.append(bare)
+    end()
+    return found
+
+
+def _headed(dialect: Dialect, titles: Sequence[str], first: int) -> Dialect:
+    """As the first table is read, from another line, with the units of its own."""
+    names, units = heading([dialect.split(line) for line in titles], len(dialect.numeric))
+    units = units if len(names) == len(dialect.names) else dialect.units
+    return replace(dialect, first=first, units=units)
+
+
+def _is_row(dialect: Dialect, line: str) -> bool:
+    cells = dialect.split(line)
+    if len(cells) != dialect.width:
+        return False
+    numbers = [c for c, number in zip(cells, dialect.numeric, strict=False) if number]
+    known = [is_number(cell, dialect.decimal) for cell in numbers]
+    return any(known) and all(k or is_lost(c) for k, c in zip(known, numbers, strict=True))
 
 
 def _recognises(head: bytes) -> bool:

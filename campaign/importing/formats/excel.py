@@ -12,7 +12,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -60,23 +60,21 @@ def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
     if found is None:
         return
     dialect = replace(found[1], sheet=sheet.title)
-    body = [[*cells, *[None] * width][:width] for cells in sample[dialect.first - 1 :]]
-    moments = {k for cells in body for k, cell in enumerate(cells) if isinstance(cell, _MOMENTS)}
-    commas = {k for cells in body for k, cell in enumerate(cells) if _has_comma(cell)}
+    body = [both for cells in sample[dialect.first - 1 :] for both in enumerate(cells)]
+    moments = {k for k, cell in body if isinstance(cell, _MOMENTS)}
+    commas = sorted({k for k, cell in body if _has_comma(cell)})
     columns = [
         replace(column, unit=column.unit or "s") if k in moments else column
         for k, column in enumerate(columns_of(dialect))
     ]
-    doubts = []
+    doubts: tuple[str, ...] = ()
     if commas:
-        told = ", ".join(columns[k].name for k in sorted(commas))
-        doubts.append(f"numbers of {told} are text with a decimal comma")
+        told = ", ".join(columns[k].name for k in commas)
+        doubts = (f"numbers of {told} are text with a decimal comma",)
     if moments:
-        doubts.append("dates and times are kept as days, to some 10 us: steps of it are rounding")
+        doubts += ("dates and times are kept as days, to some 10 us: steps of it are rounding",)
     _check_formulas(path, dialect, sample, formulas)
-    yield Table(
-        sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=tuple(doubts)
-    )
+    yield Table(sheet.title, tuple(columns), partial(_read, path, dialect, moments), doubts=doubts)
 
 
 def _read(
@@ -180,9 +178,8 @@ def _check_formulas(path: Path, dialect: Dialect, sample: Sequence[Cells], formu
     """Raises RecordingError for a formula among the first rows whose value is not in the file."""
     written = islice(_rows(formulas), dialect.first - 1, None)
     told = zip(sample[dialect.first - 1 :], written, strict=False)
-    for row, (values, texts) in enumerate(told, dialect.first):
-        for place, text in enumerate(texts):
-            value = values[place] if place < len(values) else None
+    for row, cells in enumerate(told, dialect.first):
+        for place, (value, text) in enumerate(zip_longest(*cells)):
             if value is None and isinstance(text, str) and text.startswith("="):
                 message = "a formula whose value is not in the file; open and save it in Excel"
                 raise RecordingError([dialect.problem(path, row, message, place=place)])

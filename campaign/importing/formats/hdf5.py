@@ -1,7 +1,7 @@
 """HDF5 files, those of MATLAB's version 7.3 among them: datasets by their path, read in parts.
 
 Nothing outside the file is opened: links to other files, and datasets whose numbers lie in others,
-are left out and named.
+are left out.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from campaign.importing.streaming import tables_streamed
 MAGIC = b"\x89HDF\r\n\x1a\n"
 MOST = 10_000
 """Objects of a file that are looked at."""
-LONGEST_TEXT = 10_000
-"""Characters of a text that the file says."""
 CLASS = "MATLAB_class"
 PLAIN = {"double", "single", "logical", "int8", "int16", "int32", "int64"}
 PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
@@ -33,34 +31,31 @@ def tables(path: Path) -> Sequence[Table]:
     import h5py
 
     arrays: list[Named] = []
-    said: dict[str, str] = {}
+    objects: list[str] = []
     with read_by("h5py", path, "HDF5 file"), h5py.File(path, "r") as file:
-        for name, dataset in _datasets(file, said):
-            _sort_out(path, name, dataset, arrays, said)
+        for name, dataset in _datasets(file):
+            _sort_out(path, name, dataset, arrays, objects)
     if not arrays:
-        message = said.pop("", "no dataset of it is a series of numbers")
+        message = f"{objects[0]} {OPAQUE}" if objects else "no dataset of it is a series of numbers"
         raise RecordingError.of(path, message)
-    return tables_of(arrays, said)
+    return tables_of(arrays)
 
 
-def _datasets(group: Any, said: dict[str, str], inside: str = "") -> Iterator[tuple[str, Any]]:
+def _datasets(file: Any) -> Iterator[tuple[str, Any]]:
     """Every dataset in the file itself, by dotted path, in the order of names."""
     import h5py
 
-    waiting = [(inside, group)]
-    seen, looked = {h5py.h5o.get_info(group.id).addr}, 0
+    waiting = [("", file)]
+    seen, looked = {h5py.h5o.get_info(file.id).addr}, 0
     while waiting:
         prefix, here = waiting.pop()
         for name in sorted(here):
             looked += 1
             if looked > MOST:
-                said["Not looked at"] = f"what is beyond the first {MOST} objects"
                 return
             link = here.get(name, getlink=True)
             path = f"{prefix}{name}"
             if not isinstance(link, h5py.HardLink) or name == "#refs#":
-                if name != "#refs#":
-                    said[path] = "a link, which is not followed"
                 continue
             item = here[name]
             address = h5py.h5o.get_info(item.id).addr
@@ -71,31 +66,18 @@ def _datasets(group: Any, said: dict[str, str], inside: str = "") -> Iterator[tu
                 waiting.append((f"{path}.", item))
 
 
-def _sort_out(
-    path: Path, name: str, dataset: Any, arrays: list[Named], said: dict[str, str]
-) -> None:
+def _sort_out(path: Path, name: str, dataset: Any, arrays: list[Named], objects: list[str]) -> None:
     kind = dataset.attrs.get(CLASS, b"")
     kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
-    if dataset.shape is None:
-        return  # a dataspace without any number
-    if dataset.is_virtual or dataset.external:
-        said[name] = "its numbers lie in other files, which are not opened"
-    elif kind and kind not in PLAIN:
-        if kind == "char" and dataset.size <= LONGEST_TEXT:
-            said[name] = "".join(map(chr, dataset[()].T.ravel()))
-        elif kind not in ("char", "cell", "struct", "function_handle"):
-            said.setdefault("", f"{name} {OPAQUE}")
-    elif "MATLAB_empty" in dataset.attrs:
-        return
-    elif dataset.dtype.kind in "fiub" and dataset.size > 1:
+    if dataset.shape is None or dataset.is_virtual or dataset.external:
+        return  # without any number, or with numbers that lie in other files
+    if kind and kind not in PLAIN:
+        if kind not in ("char", "cell", "struct", "function_handle"):
+            objects.append(name)
+    elif "MATLAB_empty" not in dataset.attrs and dataset.dtype.kind in "fiub" and dataset.size > 1:
         shape = [length for length in dataset.shape if length > 1]
         if len(shape) in (1, 2) and (len(shape) == 1 or min(shape) <= WIDEST):
             arrays.append(_named(path, name, dataset, bool(kind)))
-    elif dataset.size == 1 and dataset.dtype.kind in "fiubSO":
-        value = dataset[()]
-        value = value.reshape(-1)[0] if isinstance(value, np.ndarray) else value
-        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-        said[name] = text[:LONGEST_TEXT]
 
 
 def _named(path: Path, name: str, dataset: Any, matlab: bool) -> Named:

@@ -123,8 +123,6 @@ def _of_block(path: Path, dialect: Dialect, said: dict[str, str], block: _Block)
             tuple(columns),
             partial(blocks, path, dialect, rows=block.rows, among=places),
             clock if isinstance(clock, Clock) else None,
-            block.rows,
-            said,
         )
 
 

@@ -1,7 +1,7 @@
 """MAT files of version 4 to 7.2: plain variables, Simulink's structures, dSPACE's X and Y.
 
 Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) are in
-no documented form; they are named, with how to save what is in them.
+no documented form; where there is nothing else, how to save what is in them is said.
 """
 
 from __future__ import annotations
@@ -32,9 +32,6 @@ MOST_TIMES = 100
 _COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
 """Structures within each other."""
-OBJECT = "an object of a MATLAB class, which other programs cannot read"
-"""What is said of one that stands beside numbers."""
-NOTHING = "no variable of it is a series of numbers"
 
 
 def tables(path: Path) -> Sequence[Table]:
@@ -47,17 +44,16 @@ def tables(path: Path) -> Sequence[Table]:
         found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
     whole: list[Table] = []
     arrays: list[Named] = []
-    said: dict[str, str] = {}
-    objects = [name for name in ("None", "__function_workspace__") if name in found]
+    objects: list[str] = []
     for name, value in found.items():
         if not name.startswith("__") and name != "None":
-            _sort_out(name, value, whole, arrays, said)
-    objects += [name for name, what in said.items() if what == OBJECT]
-    whole += tables_of(arrays, said) if arrays else []
+            _sort_out(name, value, whole, arrays, objects)
+    whole += tables_of(arrays)
     if not whole:
-        shown = next((name for name in objects if not name.startswith(("None", "__"))), "")
-        message = f"{shown or 'a variable'} {OPAQUE}" if objects else NOTHING
-        raise RecordingError.of(path, message)
+        nameless = not {"None", "__function_workspace__"}.isdisjoint(found)
+        if not objects and not nameless:
+            raise RecordingError.of(path, "no variable of it is a series of numbers")
+        raise RecordingError.of(path, f"{(*objects, 'a variable')[0]} {OPAQUE}")
     return whole
 
 
@@ -96,35 +92,29 @@ def _sort_out(
     value: Any,
     tables: list[Table],
     arrays: list[Named],
-    said: dict[str, str],
+    objects: list[str],
     deep: int = 0,
 ) -> None:
-    """Put a variable where it belongs: a table of its own, an array, or what the file says."""
+    """Put a variable where it belongs: a table of its own, an array, or an object's name."""
     if deep > DEEPEST:
         return
     if _is_opaque(value):
-        said[name] = OBJECT
+        objects.append(name)
         return
-    fields = _fields(value)
-    if fields is not None:
-        for special in (_dspace, _with_time):
-            own = list(special(name, fields))
-            if own:
-                tables += own
-                return
-        for field, item in fields.items():
-            _sort_out(f"{name}.{field}", item, tables, arrays, said, deep + 1)
+    parts = {}
+    if (fields := _fields(value)) is not None:
+        if own := [*_dspace(name, fields)] or [*_with_time(name, fields)]:
+            tables += own
+            return
+        parts = {f".{field}": item for field, item in fields.items()}
+    elif isinstance(value, np.ndarray) and value.dtype == object:
+        parts = {f"({k})": item for k, item in enumerate(value.ravel(), start=1)}
+    for part, item in parts.items():
+        _sort_out(f"{name}{part}", item, tables, arrays, objects, deep + 1)
+    if fields is not None or parts:
         return
-    if isinstance(value, np.ndarray) and value.dtype == object:
-        for k, item in enumerate(value.ravel(), start=1):
-            _sort_out(f"{name}({k})", item, tables, arrays, said, deep + 1)
-        return
-    array = np.asarray(value)
-    series = named(name, array) if array.dtype.kind in "fiub" else None
-    if series is not None:
+    if (series := named(name, np.asarray(value))) is not None:
         arrays.append(series)
-    elif array.ndim == 0 or array.size == 1:
-        said[name] = str(array.reshape(-1)[0]) if array.size else ""
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:
@@ -133,9 +123,10 @@ def _fields(value: Any) -> Mapping[str, Any] | None:
     return None if names is None else {name: getattr(value, name) for name in names}
 
 
-def _listed(value: Any) -> list[Any]:
-    """An array of structures as a list, where a single one is no array."""
-    return list(value.ravel()) if isinstance(value, np.ndarray) else [value]
+def _structures(value: Any) -> list[Mapping[str, Any]]:
+    """The fields of each of an array of structures, where a single one is no array."""
+    listed = value.ravel() if isinstance(value, np.ndarray) else [value]
+    return [fields for each in listed if (fields := _fields(each)) is not None]
 
 
 def _text(value: Any) -> str:
@@ -144,65 +135,40 @@ def _text(value: Any) -> str:
 
 def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
     """ControlDesk's recordings: times in `X`, each signal in `Y` with the index of its times."""
-    if not {"X", "Y"} <= set(fields):
-        return
-    clocks = [
-        np.atleast_1d(of["Data"])
-        for each in _listed(fields["X"])
-        if "Data" in (of := _fields(each) or {})
-    ]
-    signals = [each for each in _listed(fields["Y"]) if _has_data(each)]
-    if not clocks or not signals:
-        return
+    clocks, signals = (
+        [each for each in _structures(fields.get(key)) if "Data" in each] for key in "XY"
+    )
+    lengths = [np.size(each["Data"]) for each in clocks]
     groups: dict[int, list[Named]] = {}
-    said: dict[str, str] = {}
-    for k, signal in enumerate(signals, start=1):
-        of = _fields(signal) or {}
+    for k, of in enumerate(signals if clocks else (), start=1):
         data = np.atleast_1d(of["Data"])
-        called = _text(of.get("Name")) or f"Y({k})"
-        if _text(of.get("Path")):
-            said[f"Path of {called}"] = _text(of.get("Path"))
         index = of.get("XIndex")
-        alike = [x for x, times in enumerate(clocks) if len(times) == len(data)]
-        if isinstance(index, int | float) and 1 <= index <= len(clocks):
-            place = int(index) - 1
-        elif len(alike) == 1:
-            place = alike[0]
-        else:
-            # Two clocks of one length: whose it is cannot be told. A short one is a parameter.
-            said[called] = f"{len(data)} values, of which no time is known"
-            continue
-        series = named(called, data, _text(of.get("Unit")))
-        if series is not None and series.length == len(clocks[place]):
-            groups.setdefault(place, []).append(series)
-    for place, found in sorted(groups.items()):
-        times = named("time", clocks[place], "s")
+        if not (isinstance(index, int | float) and 1 <= index <= len(clocks)):
+            if lengths.count(len(data)) != 1:
+                # Two clocks of one length: whose it is cannot be told. A short one is a parameter.
+                continue
+            index = lengths.index(len(data)) + 1
+        series = named(_text(of.get("Name")) or f"Y({k})", data, _text(of.get("Unit")))
+        if series is not None and series.length == lengths[int(index) - 1]:
+            groups.setdefault(int(index), []).append(series)
+    for index, found in sorted(groups.items()):
+        times = named("time", np.atleast_1d(clocks[index - 1]["Data"]), "s")
         if times is not None:
-            part = name if len(groups) == 1 else f"{name}.X({place + 1})"
-            yield table_of([times, *found], said, part)
-
-
-def _has_data(value: Any) -> bool:
-    return "Data" in (_fields(value) or {})
+            part = name if len(groups) == 1 else f"{name}.X({index})"
+            yield table_of([times, *found], part)
 
 
 def _with_time(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
     """Simulink's structure with time: `time`, and `signals` of values and labels."""
-    if not {"time", "signals"} <= set(fields):
-        return
-    times = named("time", np.atleast_1d(np.asarray(fields["time"])), "s")
-    if times is None:
-        return
-    series = []
-    for k, signal in enumerate(_listed(fields["signals"]), start=1):
-        of = _fields(signal) or {}
-        values = np.asarray(of.get("values", ()))
-        called = _text(of.get("label")) or f"signals({k})"
-        one = named(called, values)
-        if one is not None and one.length == times.length:
-            series.append(one)
-    if series:
-        yield table_of([times, *series], {}, name)
+    times = named("time", np.atleast_1d(np.asarray(fields.get("time", ()))), "s")
+    signals = enumerate(_structures(fields.get("signals")), start=1)
+    series = [
+        named(_text(of.get("label")) or f"signals({k})", np.asarray(of.get("values", ())))
+        for k, of in signals
+    ]
+    alike = [one for one in series if one is not None and times and one.length == times.length]
+    if times is not None and alike:
+        yield table_of([times, *alike], name)
 
 
 def _is_opaque(value: Any) -> bool:

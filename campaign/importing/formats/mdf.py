@@ -47,7 +47,7 @@ def tables(path: Path) -> Sequence[Table]:
             if any(column.numeric for column in columns[1:]):
                 name = str(getattr(each.channel_group, "acq_name", "") or f"group {group + 1}")
                 read = partial(_read, path, group, places, rows)
-                found.append(Table(name, tuple(columns), read, rows=rows))
+                found.append(Table(name, tuple(columns), read))
     if not found:
         raise RecordingError.of(path, "no group of it has a series of numbers")
     return found

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 MAGIC = b"PAR1"
 _reading = partial(read_by, "pyarrow", what="Parquet file", extra="parquet")
-OURS = frozenset({"pandas", "ARROW:schema"})
-"""What libraries say to each other in the file's metadata."""
 
 
 def _tables(path: Path) -> Sequence[Table]:
@@ -33,15 +31,14 @@ def _tables(path: Path) -> Sequence[Table]:
         from pyarrow import parquet
 
         with parquet.ParquetFile(path) as file:
-            schema, rows = file.schema_arrow, file.metadata.num_rows
+            schema = file.schema_arrow
     columns = tuple(
         Column(each.name, _unit(each), f"column {place}", _is_numeric(each))
         for place, each in enumerate(schema, start=1)
     )
     if not any(column.numeric for column in columns):
         raise RecordingError.of(path, "no column of it holds numbers")
-    said = {name: text for name, text in _texts(schema.metadata).items() if name not in OURS}
-    return [Table("", columns, partial(_read, path), rows=rows, said=said)]
+    return [Table("", columns, partial(_read, path))]
 
 
 def _read(path: Path, places: Sequence[int]) -> Iterator[Array]:
@@ -64,15 +61,8 @@ def _is_numeric(field: pa.Field) -> bool:
 
 
 def _unit(field: pa.Field) -> str:
-    told = _texts(field.metadata)
-    return told.get("units") or told.get("unit", "")
-
-
-def _texts(metadata: dict[bytes, bytes] | None) -> dict[str, str]:
-    return {
-        name.decode("utf-8", "replace"): value.decode("utf-8", "replace")
-        for name, value in (metadata or {}).items()
-    }
+    told: dict[bytes, bytes] = field.metadata or {}
+    return (told.get(b"units") or told.get(b"unit", b"")).decode("utf-8", "replace")
 
 
 FORMAT = RecordingFormat(

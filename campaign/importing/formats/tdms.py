@@ -36,7 +36,6 @@ def tables(path: Path) -> Sequence[Table]:
         from nptdms import TdmsFile
 
         with TdmsFile.open(path) as file:
-            said = {str(name): str(value) for name, value in file.properties.items()}
             for group in file.groups():
                 for channel in group.channels():
                     if len(channel) > 1 and channel.dtype.kind in "fiub":
@@ -53,10 +52,8 @@ def tables(path: Path) -> Sequence[Table]:
             tuple(Column(name, str(unit or ""), f"{group}/{name}") for name, unit in channels),
             partial(_read, path, group, [name for name, _ in channels], length),
             clock,
-            length,
-            {**said, **({"wf_start_time": start} if start != "None" else {})},
         )
-        for (group, length, clock, start), channels in alike.items()
+        for (group, length, clock, _), channels in alike.items()
     ]
 
 

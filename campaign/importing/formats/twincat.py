@@ -31,7 +31,6 @@ def _tables(path: Path) -> Sequence[Table]:
     headed = next((k for k, cells in enumerate(rows) if k and cells[0] == NAME), None)
     if headed is None:
         raise RecordingError.of(path, f"no row of the channels begins with {NAME!r}")
-    said = {cells[0]: cells[1] for cells in rows[:headed] if len(cells) > 1 and cells[0]}
     first = next((k for k in range(headed, len(rows)) if _decimal(rows[k])), None)
     if first is None:
         raise RecordingError.of(path, "no row of numbers follows", headed + 1)
@@ -44,7 +43,7 @@ def _tables(path: Path) -> Sequence[Table]:
         if cells[0]
     }
     dialect = Dialect.of_numbers(separator, _decimal(rows[first]), first + 1, names)
-    return list(_by_clock(path, dialect, facts, said))
+    return list(_by_clock(path, dialect, facts))
 
 
 def _decimal(cells: Sequence[str]) -> str:
@@ -55,9 +54,7 @@ def _decimal(cells: Sequence[str]) -> str:
     return decimal if given and all(is_number(cell, decimal) for cell in given) else ""
 
 
-def _by_clock(
-    path: Path, dialect: Dialect, facts: dict[str, list[str]], said: dict[str, str]
-) -> Iterator[Table]:
+def _by_clock(path: Path, dialect: Dialect, facts: dict[str, list[str]]) -> Iterator[Table]:
     starts = [place for place, name in enumerate(dialect.names) if name == NAME]
     for start, end in zip(starts, [*starts[1:], dialect.width], strict=True):
         channels = range(start + 1, end)
@@ -67,16 +64,9 @@ def _by_clock(
             Column("time", "ms", f"column {start + 1}"),
             *(Column(dialect.names[k], _unit(facts, k), f"column {k + 1}") for k in channels),
         )
-        # Whether values are scaled is not told.
-        of_channels = {
-            f"{row} of {dialect.names[k]}": cells[k]
-            for row, cells in facts.items()
-            for k in channels
-            if row != NAME and cells[k]
-        }
         read = partial(_rows, path, dialect, range(start, end))
         name = "" if len(starts) == 1 else ", ".join(dialect.names[k] for k in channels)
-        yield Table(name, columns, read, said={**said, **of_channels})
+        yield Table(name, columns, read)
 
 
 def _unit(facts: dict[str, list[str]], place: int) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
-from campaign.importing.guess.words import INDEX, TIME, UNKNOWN
+TIME, INDEX, UNKNOWN = "time", "index", "unknown"
+"""Roles that are no channels."""
 
 
 class Basis(StrEnum):
@@ -53,6 +54,10 @@ class ColumnGuess:
         """Whether it was taken for one."""
         return self.role not in (TIME, INDEX, UNKNOWN)
 
+    def likely(self, unit: str, why: str) -> ColumnGuess:
+        """With a unit that numbers suggest, and why; as it was where they suggest none."""
+        return replace(self, unit=unit, basis=Basis.LIKELY, unit_why=why) if unit else self
+
 
 @dataclass(frozen=True)
 class TableGuess:
@@ -63,7 +68,6 @@ class TableGuess:
         step: s between samples, as far as the unit of times is known; None where it is not.
         clock: whether the file states the clock, without a column of times.
         restarts: how often its time begins anew.
-        below: whether it is one of several below each other in a text file.
         doubts: what is wrong with it as a whole.
     """
 
@@ -75,12 +79,4 @@ class TableGuess:
     step: float | None
     clock: bool
     restarts: int
-    below: bool
     doubts: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Guess:
-    """What files may be."""
-
-    tables: tuple[TableGuess, ...]

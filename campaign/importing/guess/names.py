@@ -6,22 +6,70 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 from campaign import channels
 from campaign.importing.cells import UNIT_WORDS
-from campaign.importing.guess.columns import Basis, ColumnGuess
-from campaign.importing.guess.words import (
-    INDEX,
-    KNOWN,
-    MOVING,
-    QUANTITIES,
-    TIME,
-    UNKNOWN,
-    WORDS,
-    taken_apart,
-)
+from campaign.importing.guess.columns import INDEX, TIME, UNKNOWN, Basis, ColumnGuess
 from campaign.unit_grammar import parse_unit
 
+_QUANTITIES = {
+    UNKNOWN: "voltage volt volts spannung u vd vq vin vbus bus dc id ia ib ic iu iv iw currentd "
+    "phase pwm status enable enabled flag flags error err fehler mode name ext external cof "
+    "coefficient coeff koeffizient reibwert reibzahl mu vibration acc accel accelerometer "
+    "acceleration accelerations beschleunigung ax ay az tx ty mx my ddq qdd ddot qddot ddtheta "
+    "power leistung pressure druck model sim simulated predicted residual tcp pose wrench "
+    "cartesian quaternion twist mag jerk energy duty fault controlword statusword stiffness "
+    "damping inertia gain kp ki kd init initial home offset bias limit limits threshold diff "
+    "deviation following schleppfehler abweichung pulse pulses battery supply latency jitter dt "
+    "delta humidity feuchte depth wear verschleiss resistance feed hall erpm thetae omegae elec "
+    "electrical uncertainty sigma std variance cov",
+    "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
+    "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
+    "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
+    "rate": "dq qd qdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
+    "speeds spd rate drehzahl geschwindigkeit geschw winkelgeschw vitesse rpm rps wm n tacho gyro "
+    "gx gy gz",
+    "angle": "q qm qg qpos pos posn position positions angle angles angular ang theta phi winkel "
+    "lage weg enc encoder encoders displacement distance travel stroke hub abstand rotation dist",
+    "current": "current currents curr cur strom courant i iq isq currentq amps amp",
+    TIME: "t time times timestamp timestamps stamp zeit temps elapsed clock secs seconds millis "
+    "messzeit laufzeit zeitstempel uhrzeit epoch",
+    INDEX: "index idx sample samples seq sequence nr no row count counter step cycle cycles iter "
+    "iteration tick loop",
+}
+"""An earlier quantity outweighs a later one: `q2_tau` is a torque at joint 2."""
+
+_CHANGED = {
+    "target": "target targets cmd cmds command commands commanded soll sollwert demand demanded "
+    "dmd setpoint stpt set desired des ref reference goal d g qg sp tgt request requested req "
+    "consigne vorgabe action wanted planned traj trajectory profile star",
+    "motor": "motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor spindle spindel",
+    "load": "load link joint joints jnt gimbal output l j abtrieb abtriebsseite last arm",
+    "hull": "base hull platform plattform ship vessel carrier",
+    "gyro": "gyro gyr gyroscope imu inertial los gx gy gz",
+    "sensed": "tauj sensor cell loadcell transducer messwelle torquemeter strain fx fy ft fr ff tz "
+    "mz friction frictional reib reibung",
+    "normal": "normal axial radial fn fz preload",
+    "place": "winding wicklung bearing housing ambient amb oil coil coolant stator magnet mos fet "
+    "mosfet room rotor",
+    "estimate": "estimate estimated est hat observer",
+    "neutral": "act actual ist istwert wert meas measured measurement fb feedback fbk present "
+    "filt filtered filter raw smooth smoothed avg average mean value values val data real in of "
+    "the du de la und nach max min nominal per rms axis achse axe rel relative gleit sliding "
+    "column channel float double signal sig lin linear rotational robot main state states mech "
+    "mechanical number revolutions",
+}
+"""What a word says of a quantity; a neutral one says nothing."""
+
+_WORDS = {kind: frozenset(listed.split()) for kind, listed in (_QUANTITIES | _CHANGED).items()}
+_KNOWN = frozenset().union(*_WORDS.values())
+
+_MOVING = _WORDS["rate"] | _WORDS["angle"] | _WORDS["current"]
+"""Words of what a motor and its load have each of their own."""
+_SHORT = frozenset("xyzml")
+"""An axis, or a side of the gear, behind a quantity: `velz`, `omegam`."""
+_MARKS = sorted((word for word in _WORDS["target"] if len(word) > 2), key=len, reverse=True)
 _KINDS = {
     parse_unit(unit).dimensions: kind
     for unit, kind in (
@@ -61,7 +109,7 @@ _OF_LETTERS = {"t": "torque", "m": "torque", "f": "torque", "v": "rate", "p": "a
 _WHOLE = re.compile(r"m?Nm|mA|kN|deg[CK]|(?:m|u)?rad|[un]s|ms|rpm|RPM")
 """What would fall apart at its capital letters."""
 _PIECE = re.compile(r"[A-Z]{2,}(?=[xyz](?![a-zß-ÿ]))|[A-ZÀ-Þ]?[a-zß-ÿ]+|[A-ZÀ-Þ]+(?![a-zß-ÿ])|\d+")
-_SYMBOLS = {"θ": "theta", "ω": "omega", "τ": "tau", "φ": "phi", "ϕ": "phi", "μ": "mu"}
+_SYMBOLS = str.maketrans({"θ": "theta", "ω": "omega", "τ": "tau", "φ": "phi", "μ": "mu"})
 _STARRED = re.compile(r"(?<=[^\W_])\*(?=$|[\s_.:/\[(])")
 """Drives mark targets so: `iq*`."""
 _UNIT_BEHIND = re.compile(
@@ -69,8 +117,8 @@ _UNIT_BEHIND = re.compile(
     r"|(?<=[^/\s])\s*/\s*(?P<per>[^/\s]+))"
 )
 _FORCE = parse_unit("N").dimensions
-_LOADED = WORDS["load"] | WORDS["neutral"]
-_CHANGES = frozenset().union(*(WORDS[k] for k in ("target", "motor", "load", "sensed", "neutral")))
+_LOADED = _WORDS["load"] | _WORDS["neutral"]
+_CHANGES = frozenset().union(*(_WORDS[k] for k in ("target", "motor", "load", "sensed", "neutral")))
 """What a word behind a letter may say for the letter to be a quantity."""
 BY_UNIT = "its unit, and nothing else"
 
@@ -100,7 +148,7 @@ def named(name: str, stated: str = "", place: str = "", before: str = "") -> Col
     if not unit:
         pieces, unit, sure = _unit_apart(pieces)
     words = _words(pieces)
-    tag = tuple(w for w in words if (len(w) < 3 if w.isdigit() else w not in KNOWN))
+    tag = tuple(w for w in words if (len(w) < 3 if w.isdigit() else w not in _KNOWN))
     said = [word for word in words if not word.isdigit()]
     usable = usable_unit(stated)
     kind, why = _kind(said, kind_of_unit(usable or unit))
@@ -122,15 +170,12 @@ def common_path(names: Sequence[str]) -> str:
     """What stands before all names and says nothing, as a group of a file does: `run1.`."""
     path = re.split(r"[^./]*$", names[0])[0] if len(names) > 1 else ""
     common = all(name.startswith(path) for name in names)
-    return path if common and KNOWN.isdisjoint(_words(_pieces(path))) else ""
+    return path if common and _KNOWN.isdisjoint(_words(_pieces(path))) else ""
 
 
 def _pieces(text: str) -> list[str]:
     """Of a name, in the letters of the file."""
-    text = _STARRED.sub("_target", text)
-    for letter, word in _SYMBOLS.items():
-        text = text.replace(letter, word)
-    chunks = re.findall(r"[0-9A-Za-zÀ-ÿ]+", text)
+    chunks = re.findall(r"[0-9A-Za-zÀ-ÿ]+", _STARRED.sub("_target", text).translate(_SYMBOLS))
     apart = [[each] if _WHOLE.fullmatch(each) else _PIECE.findall(each) for each in chunks]
     return [piece for each in apart for piece in each]
 
@@ -139,20 +184,47 @@ def _words(pieces: Sequence[str]) -> list[str]:
     """The words of pieces: compounds as several, and as one what is written apart: `i_q`."""
     found: list[str] = []
     for piece in pieces:
-        words = taken_apart(piece.lower())
+        words = _taken_apart(piece.lower())
         last, word = "".join(found[-1:]), words[0]
         if len(words) > 1:
             found += words
         elif (
             last
-            and last + word in KNOWN
+            and last + word in _KNOWN
             and (min(len(last), len(word)) == 1 or len(last + word) > 5)
         ):
             found[-1] = last + word
         else:
             # Behind what moves the motor's, along an axis; elsewhere `mx` is a moment.
-            found += word if last in MOVING and word in ("mx", "my", "mz") else words
+            found += word if last in _MOVING and word in ("mx", "my", "mz") else words
     return found
+
+
+@cache
+def _taken_apart(word: str) -> tuple[str, ...]:
+    """A compound as the known words that make it up (`motorstrom`, `iqref`); else as it is.
+
+    A target must not pass for a measurement: its mark is looked for first.
+    """
+    if word in _KNOWN or len(word) < 2:
+        return (word,)
+    for mark in _MARKS:
+        for rest in (word.removesuffix(mark), word.removeprefix(mark)):
+            if rest in _MOVING | _WORDS["torque"] | _SHORT:
+                return rest, mark
+    if word[-1] in _SHORT and (before := _taken_apart(word[:-1]))[-1] in _KNOWN:
+        return (*before, word[-1])
+    return _cover(word) or (word,)
+
+
+def _cover(word: str) -> tuple[str, ...]:
+    """Words of three letters and more that make up all of it, the longest first; or none."""
+    for end in range(len(word), 2, -1):
+        # German puts an s or n between words.
+        for rest in (word[end:], word[end:].removeprefix("s"), word[end:].removeprefix("n")):
+            if word[:end] in _KNOWN and (not rest or _cover(rest)):
+                return (word[:end], *_cover(rest))
+    return ()
 
 
 def _unit_apart(pieces: list[str]) -> tuple[list[str], str, bool]:
@@ -161,7 +233,7 @@ def _unit_apart(pieces: list[str]) -> tuple[list[str], str, bool]:
     Numbers and words like `raw` may stand behind it.
     """
     end = len(pieces)
-    while end > 1 and (pieces[end - 1].isdigit() or pieces[end - 1].lower() in WORDS["neutral"]):
+    while end > 1 and (pieces[end - 1].isdigit() or pieces[end - 1].lower() in _WORDS["neutral"]):
         end -= 1
     low = [piece.lower() for piece in pieces]
     for first in range(max(1, end - 3), end):
@@ -185,24 +257,26 @@ def _kind(said: Sequence[str], by_unit: str) -> tuple[str, str]:
     """The quantity that words say, and which of them do; a unit outweighs a single letter."""
     found = (
         (len(word) < 2, place, word)
-        for place, kind in enumerate(QUANTITIES)
+        for place, kind in enumerate(_QUANTITIES)
         for word in said
-        if word in WORDS[kind]
+        if word in _WORDS[kind]
     )
     letter, place, why = min(found, default=(True, 0, ""))
-    kind = QUANTITIES[place]
+    kind = [*_QUANTITIES][place]
     told = " ".join(said)
     if not letter:
         return kind, why
-    if kind in (UNKNOWN, TIME) and not WORDS["place"].isdisjoint(said):
+    if kind in (UNKNOWN, TIME) and not _WORDS["place"].isdisjoint(said):
         return "warmth", told
     if said and said[0] in _OF_LETTERS and said[1:] and _CHANGES.issuperset(said[1:]):
         return _OF_LETTERS[said[0]], told
-    if by_unit and by_unit != kind and (why != "u"):
-        if by_unit not in ("angle", TIME, "current") or all(len(w) < 3 or w in KNOWN for w in said):
+    if by_unit and by_unit != kind and why != "u":
+        if by_unit not in ("angle", TIME, "current") or all(
+            len(w) < 3 or w in _KNOWN for w in said
+        ):
             return by_unit, f"{told}, in its unit" if told else BY_UNIT
         return UNKNOWN, ""  # some length, duration or current
-    marks = [w for w in said if w in WORDS["target"] and len(w) > 1 and w != "set"]
+    marks = [w for w in said if w in _WORDS["target"] and len(w) > 1 and w != "set"]
     if not why and marks:
         return "target", marks[0]
     if not why and {"normal", "load"} <= set(said):
@@ -232,6 +306,7 @@ _CHANNELS = (
 )
 """The channel of a quantity of which a word says that; the first that fits."""
 _OF_A_SIDE = {row[-1] for row in _CHANNELS[-6:]} | {channels.DRIVE_TORQUE}
+
 _TURNS = frozenset(("rpm", "drehzahl"))
 """A rate in turns is likely the motor's, and that is all that says so."""
 
@@ -241,7 +316,7 @@ def _role(kind: str, said: Sequence[str], unit: str) -> tuple[str, tuple[str, ..
     if kind in (TIME, INDEX, UNKNOWN):
         return kind, (), True
     said = said[kind == "rate" and said[:1] == ["d"] :]  # in front it is a derivative, no target
-    told = {change for change, words in WORDS.items() if not words.isdisjoint(said)} | {""}
+    told = {change for change, words in _WORDS.items() if not words.isdisjoint(said)} | {""}
     sided = not told.isdisjoint(("motor", "load"))
     if unit == "rpm" or not _TURNS.isdisjoint(said):
         told.add("motor")

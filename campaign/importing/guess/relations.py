@@ -12,9 +12,7 @@ import numpy as np
 
 from campaign import channels
 from campaign.importing.defects.between import Slope, slope
-from campaign.importing.guess.columns import Basis, ColumnGuess
-from campaign.importing.guess.numbers import likely
-from campaign.importing.guess.words import TIME, UNKNOWN
+from campaign.importing.guess.columns import TIME, UNKNOWN, Basis, ColumnGuess
 from campaign.importing.interface import Array
 from campaign.unit_grammar import parse_unit
 
@@ -39,7 +37,9 @@ def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
     angles, rates = ([k for k in part if found[k].role in roles] for roles in (ANGLES, RATES))
     pairs = [(k, j) for k in (*angles, *silent) for j in (*silent, *rates) if k != j]
     pairs = [pair for pair in pairs if not set(silent).isdisjoint(pair)]
-    fits = [(k, j) for k, j in pairs if _is_derivative(time[:ROWS], part[k], part[j])]
+    factors = {(k, j): _factor(time[:ROWS], part[k], part[j]) for k, j in pairs}
+    # Its sign counts, too: of a sine the angle is the negative one of its rate.
+    fits = [p for p, f in factors.items() if f and f.explained > _CERTAIN and f.factor > 0]
     ends = {j for _, j in fits}
     for k, j in (pair for pair in fits if pair[0] not in ends):  # of a rate it is an acceleration
         motor = found[k].role == channels.MOTOR_ANGLE or found[j].role == channels.MOTOR_RATE
@@ -53,12 +53,6 @@ def with_roles(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
         if not any(a.role == b.role and a.axis == b.axis for a in new.values() for b in found):
             found = [new.get(place, column) for place, column in enumerate(found)]
     return found
-
-
-def _is_derivative(time: Array, angle: Array, rate: Array) -> bool:
-    """Whether it is, in its sign, too: of a sine the angle is the negative one of its rate."""
-    found = _factor(time, angle, rate)
-    return found is not None and found.explained > _CERTAIN and found.factor > 0
 
 
 def _factor(time: Array, angle: Array, rate: Array) -> Slope | None:
@@ -82,7 +76,7 @@ def with_units(columns: Sequence[ColumnGuess], series: Series, time: Array) -> l
             why = f"it goes with {found[j].name}, R² {fit:.4f}"
             found[k] = replace(found[k], role=role, why=f"{found[k].why}; {why}")
             if found[k].basis is Basis.UNKNOWN:
-                found[k] = likely(found[k], found[j].unit, why)
+                found[k] = found[k].likely(found[j].unit, why)
     for k, j in _pairs(found, TORQUES, (channels.MOTOR_CURRENT,)):
         size, fit = _beside(series[k], series[j])
         if fit > 0.9999:
@@ -112,7 +106,7 @@ def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> N
         due = _due(angle.unit, unit)
         alike = due and abs(size / due - 1) < max(0.02, 3 * factor.error)
         if alike and rate.basis is Basis.UNKNOWN:
-            rate = likely(rate, unit, told)
+            rate = rate.likely(unit, told)
     due = _due(angle.unit, rate.unit)
     if due and abs(factor.factor / due - 1) <= max(0.1, 3 * factor.error):
         own = RATES[ANGLES.index(angle.role)]
@@ -130,7 +124,7 @@ def _rate_of_angle(found: list[ColumnGuess], k: int, j: int, factor: Slope) -> N
         why = f"as the file has it, but {rate.name} is {told}, and {due:.5g} is due"
         for place, each in enumerate(found):
             if place in (k, j) or (each.role == TIME and each.basis is Basis.STATED):
-                found[place] = likely(each, each.unit, why)
+                found[place] = each.likely(each.unit, why)
 
 
 def _due(angle: str, rate: str) -> float | None:

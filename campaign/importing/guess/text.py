@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from campaign import channels
 from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.importing.defects.defect import counted
-from campaign.importing.guess.columns import Basis, ColumnGuess, Guess
+from campaign.importing.guess.columns import INDEX, TIME, Basis, ColumnGuess, TableGuess
 from campaign.importing.guess.layouts import Layout, Placed, layouts, slug
 from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
-from campaign.importing.guess.words import INDEX, TIME
 from campaign.unit_grammar import parse_unit
 
 _HEAD = """\
@@ -50,14 +49,15 @@ _LACKING = {
 """What an experiment needs, one of each."""
 
 
-def mapping_text(guess: Guess, base: Path | None = None) -> str:
+def mapping_text(tables: Sequence[TableGuess], base: Path | None = None) -> str:
     """A first MAPPING.toml for what was guessed; `base` is the folder of it and of the files."""
-    linear = any(_is_length(column) for table in guess.tables for column in table.columns)
+    columns = [column for table in tables for column in table.columns]
+    linear = any(_same(column.unit, each) for column in columns for each in _due(column)[1:])
     asked = "; some are in m: is the axis linear?" if linear else ""
-    files = sorted({table.file.name for table in guess.tables})
+    files = sorted({table.file.name for table in tables})
     title = _quoted(f"Recordings of {', '.join(files[:3])}" + " and others" * (len(files) > 3))
     lines = [_HEAD.format(kind="linear" if linear else "rotary", asked=asked, title=title)]
-    found = layouts(guess.tables)
+    found = layouts(tables)
     for axis in dict.fromkeys(layout.axis for layout in found):
         lines += ["", "[[test]]", f"name = {_quoted(slug(f'axis {axis}') if axis else 'recorded')}"]
         lines += ['kind = "motion"', _doubt("the rig: see above"), 'bench = "rig.toml"']
@@ -169,13 +169,7 @@ def _due(column: ColumnGuess) -> list[str]:
 
 
 def _same(one: str, other: str) -> bool:
-    return parse_unit(one).dimensions == parse_unit(other).dimensions
-
-
-def _is_length(column: ColumnGuess) -> bool:
-    """Whether a unit says that the channel moves along a line."""
-    due = _due(column)
-    return len(due) > 1 and bool(column.unit) and _same(column.unit, due[1])
+    return bool(one) and parse_unit(one).dimensions == parse_unit(other).dimensions
 
 
 def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
