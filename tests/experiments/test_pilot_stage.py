@@ -358,7 +358,7 @@ def test_intervals_of_platform_are_narrower_than_those_of_the_plain_map() -> Non
     assert narrowing(0, 1) < 1.0
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 @pytest.mark.parametrize("number", [0, 1, 3, 5, 8, 14, 20])
 def test_intervals_are_narrower_than_those_of_the_plain_map(number: int) -> None:
     assert narrowing(number, 3) < 1.0
@@ -384,6 +384,6 @@ def test_intervals_of_a_sample_hold() -> None:
     assert not [group.parameter for group in groups if group.short]
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_intervals_of_all_benches_hold() -> None:
     assert not [group.parameter for group in held(range(BENCHES)) if group.short]

@@ -136,7 +136,7 @@ def too_seldom(held: Held) -> dict[str, float]:
 
 
 quick = pytest.mark.parametrize(
-    ("draws", "seed"), [(25, 31_000), pytest.param(4000, 32_000, marks=pytest.mark.soak)]
+    ("draws", "seed"), [(25, 31_000), pytest.param(4000, 32_000, marks=pytest.mark.statistics)]
 )
 
 
