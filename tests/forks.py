@@ -6,11 +6,14 @@ command does, prints and leaves is that of `python -m campaign`, its exit includ
 
 from __future__ import annotations
 
+import atexit
 import json
+import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 TIMEOUT = 600
@@ -24,11 +27,15 @@ for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
     if not found.name.endswith("__main__"):
         importlib.import_module(found.name)
 """
+LIBRARIES = """
+import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
+"""
+"""What imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
 import gc, json, os, signal, sys
 gc.freeze()  # a collection in a fork would copy every page
 for line in sys.stdin:
-    arguments, folder, out, err = json.loads(line)
+    arguments, folder, out, err, environment = json.loads(line)
     child = os.fork()
     if not child:
         break
@@ -45,6 +52,11 @@ for number, name, flags in (
     os.dup2(opened, number)
     os.close(opened)
 os.chdir(folder)
+if environment is not None:
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.path[1:1] = filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))
+    sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 from campaign.__main__ import main
@@ -61,25 +73,29 @@ class Forks:
     """
 
     def __init__(self, environment: Mapping[str, str], imports: str = PROGRAM) -> None:
-        self.environment = dict(environment)
         self._folder = tempfile.TemporaryDirectory()
         self._process = subprocess.Popen(
             [sys.executable, "-c", imports + SERVER.format(timeout=TIMEOUT)],
-            env=self.environment,
+            env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
 
-    def run(self, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """`campaign` with these arguments in `folder`; its output must be UTF-8."""
+    def run(
+        self, folder: Path, *arguments: str, environment: Mapping[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """`campaign` with these arguments in `folder`; its output must be UTF-8.
+
+        `environment`: variables of this command alone, which count for what it has yet to import.
+        """
         paths = [Path(self._folder.name, name) for name in ("out", "err")]
         assert self._process.stdin
         assert self._process.stdout
-        request = [arguments, str(folder.absolute()), *map(str, paths)]
+        request = [arguments, str(folder.absolute()), *map(str, paths), environment]
         print(json.dumps(request), file=self._process.stdin, flush=True)
         code = int(self._process.stdout.readline())
-        out, err = (path.read_text(encoding="utf-8") for path in paths)
+        out, err = (path.read_bytes().decode("utf-8") for path in paths)
         for path in paths:
             path.unlink()  # what a command has begun may still write into its own
         return subprocess.CompletedProcess([*arguments], code, out, err)
@@ -91,3 +107,11 @@ class Forks:
             stream.close()
         self._process.wait()
         self._folder.cleanup()
+
+
+@cache
+def forks_of_libraries() -> Forks:
+    """The one of this process for commands that differ in what is installed."""
+    made = Forks(os.environ, LIBRARIES)
+    atexit.register(made.close)
+    return made

@@ -283,7 +283,9 @@ def recorded(path: Path) -> dict[tuple[str, str], bytes]:
             except ArchiveError as error:
                 assert str(path) in str(error)  # noqa: PT017 (the line says where)
                 continue
-            found[entry, info.name] = f"{about} {info}".encode() + recording.time.tobytes() + samples
+            found[entry, info.name] = (
+                f"{about} {info}".encode() + recording.time.tobytes() + samples
+            )
     return found
 
 

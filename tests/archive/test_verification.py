@@ -71,7 +71,7 @@ UNNAMED = ("run/outcome/file_sha256", "run/outcome/seal", "run/provenance/format
 
 
 LARGE = "trial_00003/"
-"""What the trial of two chunks has; all else is changed in a run without it, of a tenth the size."""
+"""What the trial of two chunks has; all else is changed in a run without it, which is small."""
 
 
 def test_whatever_dataset_is_changed_it_is_named(good, kit):

@@ -53,37 +53,47 @@ class Done:
         return self.out.splitlines()[-1]
 
 
+USUAL = environment()
+"""Before any test has changed a variable."""
+
+
 @cache
 def forks() -> Forks:
     """The one of this process."""
-    made = Forks(environment())
+    made = Forks(USUAL)
     atexit.register(made.close)
     return made
 
 
-def campaign(folder: Path, *arguments: str, code: int = 0, start: bool = False) -> Done:
-    """Run `campaign` in `folder`; the exit code must be `code`, and no traceback is shown.
+def completed(
+    folder: Path, *arguments: str, start: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Run `campaign` in `folder`, whatever comes of it.
 
     Args:
         folder: the current one of the command.
         arguments: what is typed after `campaign`.
-        code: the exit code expected.
         start: in a Python of its own, as also with variables that the test has changed: they may
             count when something is imported.
     """
-    if start or sys.platform != "linux" or environment() != forks().environment:
-        process = subprocess.run(
-            command(*arguments),
-            cwd=folder,
-            env=environment(),
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            timeout=TIMEOUT,
-            stdin=subprocess.DEVNULL,
-        )
-    else:
-        process = forks().run(folder, *arguments)
+    if not start and sys.platform == "linux" and environment() == USUAL:
+        return forks().run(folder, *arguments)
+    return subprocess.run(
+        command(*arguments),
+        cwd=folder,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=TIMEOUT,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
+
+
+def campaign(folder: Path, *arguments: str, code: int = 0, start: bool = False) -> Done:
+    """As `completed`; the exit code must be `code`, and no traceback is shown."""
+    process = completed(folder, *arguments, start=start)
     assert "Traceback" not in process.stderr, process.stderr
     assert process.returncode == code, process.stdout + process.stderr
     return Done(process.returncode, process.stdout, process.stderr)
