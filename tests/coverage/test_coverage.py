@@ -1,4 +1,4 @@
-"""Intervals hold the truth of benches of which nobody was told: a sample; all in `make statistics`."""
+"""Intervals hold the truth of benches without a word of it: a sample; `make statistics` has all."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ def judge(found: Iterable[Entry]) -> None:
     assert not short, "\n".join(short)
 
 
+@pytest.mark.slow
 def test_a_sample_of_maps_and_waves_holds() -> None:
     """Six benches: what holds in two of six or fewer is found."""
     found = [*estimated("velocity_map", SAMPLE, 1), *estimated("stabilization", SAMPLE, 1)]

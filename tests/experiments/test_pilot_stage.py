@@ -360,6 +360,7 @@ def narrowing(number: int, draws: int) -> float:
     return float(np.exp(np.mean(np.log(ratios))))
 
 
+@pytest.mark.slow
 def test_intervals_of_platform_are_narrower_than_those_of_the_plain_map() -> None:
     assert narrowing(0, 1) < 1.0
 

@@ -182,6 +182,7 @@ def counted(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return parameters[0] * ((v > 0.0) + (end > 0.0)), 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "expected"),
     [
@@ -189,6 +190,7 @@ def counted(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
         (ordered, lambda v, end: (1.0 if v > 0.0 > end else 2.0, 0.0)),
         (counted, lambda v, end: (float((v > 0.0) + (end > 0.0)), 0.0)),
     ],
+    ids=["signs", "ordered", "counted"],
 )
 def test_truth_values_are_numbers_in_company_too(step: Any, expected: Any) -> None:
     """In one bit they would be others: such a function is computed lane by lane."""
