@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
 
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
@@ -128,8 +127,7 @@ def test_the_assumed_damping_stands_beside_the_measured_one() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.statistics)])
-def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals(count: int) -> None:
+def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals() -> None:
     """Noise of its current is as large as the torque, and its loop holds the command."""
     axis, held = load_bench("linear"), 0
     lead = 2.0 * math.pi / 0.01  # rad/m
@@ -139,7 +137,7 @@ def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals(count: int) -> N
         "inertia": 27.9,
     }
     sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
-    for seed in range(1, count + 1):
+    for seed in range(1, 5):
         options = {**sizes, "periods": 4, "seed": seed}
         with speaking_of(axis.sides):
             row = joint(analyse(KIND, execute(trials(KIND, axis, options))))
@@ -147,5 +145,5 @@ def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals(count: int) -> N
             low, high = row[name].combined
             held += low <= truth <= high
             assert row[name].half_width < 0.08 * truth, name
-    # Of 12 intervals of 95 %, 9 or fewer would be a chance of 1 in 50; of 6, 3 or fewer.
-    assert binomtest(held, 3 * count, 0.95, "less").pvalue > 0.02
+    # Of 12 intervals of 95 %, 9 or fewer would be a chance of 1 in 50.
+    assert held > 9
