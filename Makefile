@@ -9,11 +9,12 @@ NPM := tests/browser/node_modules
 NPM_CI := npm ci --prefix tests/browser --ignore-scripts --no-audit --no-fund
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak mutants browser-tools lighthouse check format clean
+.PHONY: help demo test statistics soak mutants browser-tools lighthouse check format clean
 
 help:
 	@echo "make demo     run the quick-start protocol on the simulated bench and report it"
-	@echo "make test     run the whole test suite"
+	@echo "make test     run the test suite; with ROOM=archive that room and those that import it"
+	@echo "make statistics  how often intervals hold, in thousands of draws (long; MINUTES=4 ends it)"
 	@echo "make soak     wear: hundreds of kills, thousands of damaged files, a million frames (long)"
 	@echo "make mutants  put small bugs into what keeps the bench safe: do the tests notice? (long)"
 	@echo "make browser-tools  what tests of the page in a browser need from npm; they skip without"
@@ -36,12 +37,25 @@ demo: $(VENV)/installed
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 # A test that hangs tells where after 20 minutes, and ends its worker.
 # A process of each core with as many threads of its own would wait for each other.
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --max-worker-restart 0
+HANGING = -o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true
+
+ifdef ROOM
 test: $(VENV)/installed-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile --max-worker-restart 0 \
-		-o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true $(PYTEST_OPTIONS)
+	tests=$$($(BIN)/python tests/rooms.py $(ROOM)) && $(PYTEST) --dist loadfile $(HANGING) \
+		-m "not slow and not soak and not statistics" $$tests $(PYTEST_OPTIONS)
+else
+test: $(VENV)/installed-test
+	$(PYTEST) --dist loadfile $(HANGING) $(PYTEST_OPTIONS)
+endif
+
+# MINUTES=... ends it then, with a sample that is another one for each commit.
+statistics: $(VENV)/installed-test
+	$(PYTEST) -m statistics $(PYTEST_OPTIONS) \
+		$(if $(MINUTES),--minutes $(MINUTES) --draw "$$(git rev-parse HEAD)")
 
 soak: $(VENV)/installed-test
-	$(BIN)/python -m pytest -m soak -n auto --max-worker-restart 0 $(PYTEST_OPTIONS)
+	$(PYTEST) -m soak $(PYTEST_OPTIONS)
 
 mutants: $(VENV)/installed-mutants
 	$(BIN)/python tests/mutants/run.py $(MUTANTS_OPTIONS)

@@ -2,10 +2,85 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import signal
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, nullcontext
+from typing import Any
+
+import hypothesis
+import pytest
 
 # Nothing here may need a display, and what a terminal looks like must not depend on the machine.
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 for name in ("FORCE_COLOR", "NO_COLOR", "COLUMNS", "CAMPAIGN_DEBUG"):
     os.environ.pop(name, None)
+
+# No deadline: a busy machine makes a test slower, not red. `--hypothesis-profile=many` for a soak.
+hypothesis.settings.register_profile("usual", deadline=None)
+hypothesis.settings.register_profile("many", deadline=None, max_examples=5000)
+hypothesis.settings.load_profile("usual")
+
+SLOW = 5.0
+"""s of a core, alone, above which a test is to be marked `slow`."""
+LONG = ("slow", "statistics", "soak")
+ENDS = pytest.StashKey[float]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Options of this suite."""
+    group = parser.getgroup("campaign")
+    text = "leave out what has not ended after so many minutes; the order follows from --draw"
+    group.addoption("--minutes", type=float, help=text)
+    group.addoption("--draw", default="", help="any text, which decides what comes first")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The time starts now."""
+    config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """A sample that is cut off is another one for another draw."""
+    if config.getoption("--minutes"):
+        draw = config.getoption("--draw")
+        items.sort(key=lambda item: hashlib.sha256(f"{draw} {item.nodeid}".encode()).digest())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Ends a test as skipped when `--minutes` are over, and notes one that should be `slow`."""
+    before = os.times()[:4]
+    with ended_in_time(item.config) if item.config.getoption("--minutes") else nullcontext():
+        done = yield
+    used = sum(os.times()[:4]) - sum(before)
+    if used > SLOW and not any(map(item.get_closest_marker, LONG)):
+        item.user_properties.append(("core seconds", used))
+    return done
+
+
+@contextmanager
+def ended_in_time(config: pytest.Config) -> Iterator[None]:
+    """Skips what runs inside when the time of the sample is over."""
+
+    def over(*_: object) -> None:
+        pytest.skip("the time of the sample is over")
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, max(config.stash[ENDS] - time.monotonic(), 1e-3))
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """What is to be marked `slow`: told, not failed, as a busy machine takes longer."""
+    for report in terminalreporter.getreports("passed"):
+        for _, used in report.user_properties:
+            line = f"{report.nodeid}: {used:.1f} s of a core, and not marked slow"
+            terminalreporter.write_line(line)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.physics.compiled import cache_folder
+from tests.forks import forks_of_libraries
 
 ROOT = Path(__file__).parents[1]
 
@@ -142,6 +143,9 @@ class Packages:
 
     def campaign(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a command beside the folder."""
+        if sys.platform == "linux":
+            beside = self.folder.parent
+            return forks_of_libraries().run(beside, *arguments, environment=self.environment())
         return self._run("-m", "campaign", *arguments)
 
     def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +28,7 @@ from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.result import Amount, Conclusion, Finding, Result
 from tests.archives import PROTOCOL, simulated_run
+from tests.system.user import completed
 
 PAGE = (Path(__file__).parents[1] / "docs" / "results-as-data.md").read_text(encoding="utf-8")
 MORE = (
@@ -53,14 +52,8 @@ def report(run: Path, output: Path | None = None, **options: bool) -> Path:
     return run
 
 
-def command(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "campaign", *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | environment,
-    )
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return completed(Path.cwd(), *arguments)
 
 
 @pytest.fixture
@@ -142,14 +135,14 @@ def test_the_scoreboard_is_a_table(run):
     np.testing.assert_allclose(tried["deviation"][told], again[told], atol=1e-9)
 
 
-def test_the_same_run_gives_the_same_bytes_wherever_and_whenever(run, tmp_path):
+def test_the_same_run_gives_the_same_bytes_wherever_and_whenever(run, tmp_path, monkeypatch):
     before = results_path(run).read_bytes()
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     shutil.copy(run, elsewhere)
-    done = command(
-        "report", str(elsewhere / run.name), TZ="Asia/Tokyo", PYTHONHASHSEED="7", LC_ALL="C"
-    )
+    for name, value in (("TZ", "Asia/Tokyo"), ("PYTHONHASHSEED", "7"), ("LC_ALL", "C")):
+        monkeypatch.setenv(name, value)  # and so in a Python of its own
+    done = command("report", str(elsewhere / run.name))
     assert done.returncode == ExitCode.DONE, done.stderr
     assert results_path(elsewhere / run.name).read_bytes() == before
 

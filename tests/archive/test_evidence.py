@@ -273,16 +273,19 @@ def recorded(path: Path) -> dict[tuple[str, str], bytes]:
     """Every channel that can be read, by entry and name: trial, time, unit and samples."""
     found = {}
     for entry, archived in attempts(path).items():
+        trial = archived.trial.model_dump_json()
+        about = f"{trial} {archived.ending} {archived.started}"
+        recording = None
         for info in archived.channels():
             try:
-                recording = archived.recording()
+                recording = recording or archived.recording()
                 samples = recording[info.name].tobytes()
             except ArchiveError as error:
                 assert str(path) in str(error)  # noqa: PT017 (the line says where)
                 continue
-            trial = archived.trial.model_dump_json()
-            about = f"{trial} {info} {archived.ending} {archived.started}".encode()
-            found[entry, info.name] = about + recording.time.tobytes() + samples
+            found[entry, info.name] = (
+                f"{about} {info}".encode() + recording.time.tobytes() + samples
+            )
     return found
 
 

@@ -70,16 +70,28 @@ def test_a_sealed_run_is_sound_and_every_dataset_was_read(good):
 UNNAMED = ("run/outcome/file_sha256", "run/outcome/seal", "run/provenance/format")
 
 
-def test_whatever_dataset_is_changed_it_is_named(good):
+LARGE = "trial_00003/"
+"""What the trial of two chunks has; all else is changed in a run without it, which is small."""
+
+
+def test_whatever_dataset_is_changed_it_is_named(good, kit):
     """With a checksum of its own that fits; it is not left to the hash of the file.
 
     But for the seal, which says the same with a space behind it, and the format, of another one of
     which nothing is read.
     """
+    small = kit.run(good.parent / "small", [50, None], **PROVENANCE)
+    large = {name: kind for name, kind in datasets(good).items() if name.startswith(LARGE)}
+    rest = {name: kind for name, kind in datasets(small).items() if name not in UNNAMED}
+    assert {*large, *rest, *UNNAMED} == {*datasets(good)}
+    changed_is_named(good, large)
+    changed_is_named(small, rest)
+
+
+def changed_is_named(good: Path, kinds: dict[str, str]) -> None:
+    """Change each dataset of these names, by its kind, and verify."""
     content = good.read_bytes()
-    for name, kind in datasets(good).items():
-        if name in UNNAMED:
-            continue
+    for name, kind in kinds.items():
         with h5py.File(good, "r+") as file:
             if kind == "S":
                 put_text(file, name, text_of(file, name) + " ")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 import warnings
@@ -264,10 +263,5 @@ def as_before() -> Iterator[None]:
 
 def process(packages: Packages, words: Sequence[str]) -> Done:
     """A command in a process of its own, beside the folder of packages."""
-    folder = packages.folder.parent
-    told = subprocess.run(
-        [sys.executable, "-m", "campaign", *words],
-        cwd=folder, env=packages.environment(), capture_output=True, text=True, encoding="utf-8",
-        timeout=300, check=False, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    return Done(folder, "hostile", told.returncode, told.stdout, told.stderr)
+    told = packages.campaign(*words)
+    return Done(packages.folder.parent, "hostile", told.returncode, told.stdout, told.stderr)

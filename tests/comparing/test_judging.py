@@ -160,7 +160,8 @@ def shares(platform: Bench, count: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(40, id="sample"), pytest.param(1000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(40, id="sample"), pytest.param(1000, id="all", marks=pytest.mark.statistics)],
 )
 def test_of_what_is_declared_at_most_5_percent_is_false(platform: Bench, count: int):
     """30 of 40 pairs are alike, 10 differ by 6 standard errors of one of them."""

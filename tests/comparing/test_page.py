@@ -116,6 +116,7 @@ def pair(results: Path) -> Comparison:
     return compare_runs(runs, experiments())
 
 
+@pytest.mark.slow
 def test_the_same_archives_give_the_same_bytes_and_only_a_comparison_is_replaced(
     pair: Comparison, results: Path, tmp_path: Path
 ):

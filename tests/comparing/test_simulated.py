@@ -36,8 +36,8 @@ def runs(folder: Path, seeds: range, changes: tuple[str, ...] = ()) -> Iterator[
 @pytest.mark.parametrize(
     ("count", "seed"),
     [
-        pytest.param(6, 40_000, id="sample"),
-        pytest.param(160, 50_000, id="all", marks=pytest.mark.soak),
+        pytest.param(4, 40_000, id="sample"),
+        pytest.param(160, 50_000, id="all", marks=pytest.mark.statistics),
     ],
 )
 def test_of_comparisons_without_a_change_one_in_twenty_declares_anything(
@@ -56,8 +56,9 @@ def test_of_comparisons_without_a_change_one_in_twenty_declares_anything(
 @pytest.mark.parametrize(
     ("count", "seed"),
     [
-        pytest.param(2, 41_000, id="sample"),
-        pytest.param(60, 60_000, id="all", marks=pytest.mark.soak),
+        pytest.param(1, 41_000, id="sample"),
+        pytest.param(4, 41_000, id="some", marks=pytest.mark.statistics),
+        pytest.param(60, 60_000, id="all", marks=pytest.mark.statistics),
     ],
 )
 def test_ten_percent_more_coulomb_friction_is_found(tmp_path: Path, count: int, seed: int):
@@ -83,8 +84,9 @@ def test_ten_percent_more_coulomb_friction_is_found(tmp_path: Path, count: int, 
 @pytest.mark.parametrize(
     ("count", "seed"),
     [
-        pytest.param(2, 42_000, id="sample"),
-        pytest.param(30, 80_000, id="all", marks=pytest.mark.soak),
+        pytest.param(1, 42_000, id="sample"),
+        pytest.param(4, 42_000, id="some", marks=pytest.mark.statistics),
+        pytest.param(30, 80_000, id="all", marks=pytest.mark.statistics),
     ],
 )
 def test_draws_in_common_make_no_difference_up(tmp_path: Path, count: int, seed: int):

@@ -1,4 +1,4 @@
-"""Intervals hold the truth of benches of which nobody was told: a sample; all in `make soak`."""
+"""Intervals hold the truth of benches without a word of it: a sample; `make statistics` has all."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ def judge(found: Iterable[Entry]) -> None:
     assert not short, "\n".join(short)
 
 
+@pytest.mark.slow
 def test_a_sample_of_maps_and_waves_holds() -> None:
     """Six benches: what holds in two of six or fewer is found."""
     found = [*estimated("velocity_map", SAMPLE, 1), *estimated("stabilization", SAMPLE, 1)]
@@ -49,13 +50,13 @@ def test_a_sample_of_maps_and_waves_holds() -> None:
     judge(found)
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 @pytest.mark.parametrize("kind", KINDS)
 def test_all_benches_hold(kind: str) -> None:
     judge(estimated(kind, range(BENCHES), DRAWS[kind]))
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_little_is_hidden() -> None:
     """At most a tenth is not determined where a tenth of the value could be known."""
     groups = pooled(estimated("velocity_map", range(BENCHES), 1))

@@ -410,7 +410,7 @@ def test_intervals_hold(case: str) -> None:
     coverage(4, 31, *ENDS[case])
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 @pytest.mark.parametrize("case", ENDS)
 def test_intervals_hold_often(case: str) -> None:
     coverage(1000, 32, *ENDS[case])

@@ -162,6 +162,17 @@ def _done(name: str) -> tuple[Done, ...]:
     return found
 
 
+def analysed(case: Case) -> Result:
+    """What all of its trials lead to; read only."""
+    return _analysed(case.name)
+
+
+@cache
+def _analysed(name: str) -> Result:
+    (case,) = (case for case in CASES if case.name == name)
+    return analyse(case.kind, done(case))
+
+
 def keeping(items: Iterable[Done], keep: Callable[[Trial, str], bool]) -> list[Done]:
     """The same trials with recordings of only some of their channels."""
     kept = []
@@ -213,7 +224,7 @@ def test_every_experiment_declares_channels_of_the_vocabulary(kind: str) -> None
 
 @named
 def test_the_analysis_reads_nothing_that_is_not_declared(case: Case) -> None:
-    whole = analyse(case.kind, done(case))
+    whole = analysed(case)
     declared = keeping(done(case), lambda trial, name: name in (*trial.requires, *trial.can_use))
     assert plain(analyse(case.kind, declared)) == plain(whole)
 
@@ -251,7 +262,7 @@ def test_without_a_required_channel_the_analysis_has_nothing_and_the_plan_refuse
 @pytest.mark.parametrize(("kind", "name"), LOSSES)
 def test_an_optional_channel_costs_what_is_said_of_it_and_no_more(kind: str, name: str) -> None:
     (case, *_) = (case for case in CASES if case.kind == kind)
-    whole = analyse(kind, done(case))
+    whole = analysed(case)
     less = analyse(kind, keeping(done(case), lambda trial, each: each != name))
     loss = LOSSES[kind, name]
     assert plain(less.findings) == plain(whole.findings)

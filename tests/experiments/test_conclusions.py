@@ -35,7 +35,7 @@ from campaign.protocol import load_protocol, make_plan
 from campaign.result import Amount, Conclusion, Factor, Finding, Result
 from campaign.units import Quantity
 from tests.experiments.laboratory import MADE_UP, analyse, execute, failed
-from tests.experiments.test_channels import CASES, Case, done
+from tests.experiments.test_channels import CASES, Case, analysed, done
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 MOST = 3
@@ -122,13 +122,13 @@ def check(result: Result) -> None:
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_kind_comes_to_sentences_from_its_own_numbers(case: Case) -> None:
-    check(analyse(case.kind, done(case)))
+    check(analysed(case))
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_kind_names_its_condition(case: Case) -> None:
     """Something that was set, or a direction or model: no sentence stands for all conditions."""
-    first = analyse(case.kind, done(case)).conclusions[0]
+    first = analysed(case).conclusions[0]
     is_set = any(not isinstance(p, str) and p.estimate.origin is Origin.GIVEN for p in first.parts)
     assert is_set or case.kind == "stribeck_curve", "which tells the rates that were measured"
 
@@ -173,11 +173,11 @@ def test_every_shipped_protocol_comes_to_sentences(name: str) -> None:
 
 def test_what_was_identified_comes_before_what_was_measured() -> None:
     (case,) = [case for case in CASES if case.kind == "velocity_map"]
-    result = analyse(case.kind, done(case))
+    result = analysed(case)
     assert [table.key for table in result.tables] == ["parameters", "models", "map"]
     assert [figure.key for figure in result.figures] == ["map", "fit", "one-point"]
     (case,) = [case for case in CASES if case.name == "frequency_response"]
-    keys = [table.key for table in analyse(case.kind, done(case)).tables]
+    keys = [table.key for table in analysed(case).tables]
     assert keys[:2] == ["servo-characteristics", "compensation-effect"]
 
 

@@ -103,7 +103,7 @@ def test_the_benchs_own_friction_lies_in_the_intervals(told: bool) -> None:
     assert sum(not hit for hits in torque for hit in hits) <= 1
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_intervals_hold_on_the_platform() -> None:
     """40 maps; half-widths of Ts stay below 0.8 % of it, so that they hold by being right."""
     found: dict[str, list[bool]] = {}

@@ -6,7 +6,7 @@ import math
 import random
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
@@ -95,6 +95,12 @@ def run(case: Case, draw: int = 0, **written: object) -> Piloted:
     return Piloted(options, pilot, laboratory.execute(case, then))
 
 
+@cache
+def piloted_by(number: int) -> Piloted:
+    """A bench of the coverage tests with a pilot; it is executed once, and read only."""
+    return run(make_case(number), pilot=True, warm_up_cycles=0)
+
+
 def speeds(done: Iterable[Done]) -> list[float]:
     measured = (item.trial for item in done if item.trial.role is Role.MEASUREMENT)
     return [float(str(trial.point["speed"])) for trial in measured]
@@ -102,7 +108,7 @@ def speeds(done: Iterable[Done]) -> list[float]:
 
 @pytest.fixture(scope="module")
 def soft() -> Piloted:
-    return run(make_case(SOFT), pilot=True, warm_up_cycles=0)
+    return piloted_by(SOFT)
 
 
 # --- what follows ------------------------------------------------------------------------------
@@ -354,11 +360,12 @@ def narrowing(number: int, draws: int) -> float:
     return float(np.exp(np.mean(np.log(ratios))))
 
 
+@pytest.mark.slow
 def test_intervals_of_platform_are_narrower_than_those_of_the_plain_map() -> None:
     assert narrowing(0, 1) < 1.0
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 @pytest.mark.parametrize("number", [0, 1, 3, 5, 8, 14, 20])
 def test_intervals_are_narrower_than_those_of_the_plain_map(number: int) -> None:
     assert narrowing(number, 3) < 1.0
@@ -371,19 +378,21 @@ def held(numbers: Iterable[int]) -> list[Pooled]:
     """How many intervals of piloted maps hold, by parameter and direction."""
     found = []
     for number in numbers:
-        case = make_case(number)
-        piloted = run(case, pilot=True, warm_up_cycles=0)
-        whole = laboratory.Run(case, "velocity_map", piloted.done, piloted.result)
+        piloted = piloted_by(number)
+        whole = laboratory.Run(make_case(number), "velocity_map", piloted.done, piloted.result)
         found += entries(whole, 0)
     return pooled(found)
 
 
-def test_intervals_of_a_sample_hold() -> None:
-    groups = held((4, 8, 20))
+@pytest.mark.parametrize(
+    "numbers", [(SOFT,), pytest.param((4, 8, 20), marks=pytest.mark.statistics)]
+)
+def test_intervals_of_a_sample_hold(numbers: tuple[int, ...]) -> None:
+    groups = held(numbers)
     assert len(groups) >= 10
     assert not [group.parameter for group in groups if group.short]
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_intervals_of_all_benches_hold() -> None:
     assert not [group.parameter for group in held(range(BENCHES)) if group.short]

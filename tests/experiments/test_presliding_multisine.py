@@ -126,6 +126,7 @@ def test_the_assumed_damping_stands_beside_the_measured_one() -> None:
     assert mark.y == pytest.approx(1.6 * math.sqrt(AT_REST * 35.0), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals() -> None:
     """Noise of its current is as large as the torque, and its loop holds the command."""
     axis, held = load_bench("linear"), 0

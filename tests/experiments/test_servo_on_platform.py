@@ -62,7 +62,7 @@ def platform() -> Bench:
 
 
 @pytest.mark.parametrize(
-    ("draws", "seed"), [(2, 50_000), pytest.param(60, 60_000, marks=pytest.mark.soak)]
+    ("draws", "seed"), [(2, 50_000), pytest.param(60, 60_000, marks=pytest.mark.statistics)]
 )
 def test_intervals_hold_on_the_virtual_hardware(draws: int, seed: int) -> None:
     held = defaultdict(list)
@@ -74,7 +74,7 @@ def test_intervals_hold_on_the_virtual_hardware(draws: int, seed: int) -> None:
     assert all(any(inside) for inside in held.values())
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_the_truth() -> None:
     tree = platform().model_dump(mode="json")
     tree["sensors"] = {name: {} for name in tree["sensors"]}

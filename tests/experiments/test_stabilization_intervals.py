@@ -160,7 +160,8 @@ def _together(planned: Sequence[Trial], values: Sequence[float]) -> list[Done]:
 
 
 draws = pytest.mark.parametrize(
-    "count", [pytest.param(60, id="sample"), pytest.param(600, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(60, id="sample"), pytest.param(600, id="all", marks=pytest.mark.statistics)],
 )
 
 

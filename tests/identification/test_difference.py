@@ -274,7 +274,8 @@ def covered(kind: str, count: int) -> int:
 
 @pytest.mark.parametrize("kind", ["welch", "lopsided", "shared"])
 @pytest.mark.parametrize(
-    "count", [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 def test_the_interval_of_a_difference_holds_the_truth(kind: str, count: int):
     """Not less often than 95 %; Welch's freedom and half-widths in squares may hold more."""

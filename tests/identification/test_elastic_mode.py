@@ -71,7 +71,7 @@ def held(draws: int, seed: int) -> dict[str, list[bool]]:
 
 
 @pytest.mark.parametrize(
-    ("draws", "seed"), [(40, 1201), pytest.param(4000, 1202, marks=pytest.mark.soak)]
+    ("draws", "seed"), [(40, 1201), pytest.param(4000, 1202, marks=pytest.mark.statistics)]
 )
 def test_intervals_of_a_mode_hold_its_truth(draws: int, seed: int) -> None:
     assert rejected(held(draws, seed)) == {}

@@ -21,7 +21,8 @@ def test_the_next_value_of_three() -> None:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 def test_the_next_value_lies_there(count: int) -> None:
     held = {}

@@ -222,22 +222,22 @@ def test_readings_of_a_coarse_sensor() -> None:
     assert not rejected(of_readings(150, 3), "less")
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 @pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
 def test_stiffness_often(interfaces: tuple[Interface, ...]) -> None:
     assert not rejected(of_stiffness(4000, 11, interfaces))
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_no_number_leaves_out_an_interface_that_noise_hides_often() -> None:
     assert not rejected(of_hidden(400, 14), "less")
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_breakaway_torque_often() -> None:
     assert not rejected(of_torque(4000, 12))
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_readings_often() -> None:
     assert not rejected(of_readings(4000, 13), "less")

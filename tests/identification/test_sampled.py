@@ -148,7 +148,7 @@ def test_the_largest_of_several_is_held() -> None:
     coverage_of_the_largest(500, seed=812)
 
 
-@pytest.mark.soak
+@pytest.mark.statistics
 def test_the_largest_of_several_is_held_in_4000_draws() -> None:
     coverage_of_the_largest(4000, seed=813)
 

@@ -135,33 +135,47 @@ def too_seldom(held: Held) -> dict[str, float]:
     return rejected(well, "less") | rejected(rest, "less", 0.9)
 
 
-quick = pytest.mark.parametrize(
-    ("draws", "seed"), [(25, 31_000), pytest.param(4000, 32_000, marks=pytest.mark.soak)]
-)
+def of_all(held: Held) -> Held:
+    """By quantity, all cases together: what a few draws of each can tell."""
+    found: Held = defaultdict(list)
+    for name, inside in held.items():
+        found[name.rpartition(": ")[2]] += inside
+    return found
 
 
-@quick
+def few(draws: int) -> pytest.MarkDecorator:
+    """So many draws, and more of them in `make statistics`."""
+    many = [(25, 31_000), (4000, 32_000)]
+    marked = [pytest.param(*each, marks=pytest.mark.statistics) for each in many]
+    return pytest.mark.parametrize(("draws", "seed"), [(draws, 31_000), *marked])
+
+
+@few(8)
 def test_close_points(draws: int, seed: int) -> None:
     held = pooled(CLOSE, draws, seed)
     assert too_seldom(held) == {}
+    assert too_seldom(of_all(held)) == {}
     noisy = {name: inside for name, inside in held.items() if name.startswith("much noise")}
     narrow = {name: inside for name, inside in noisy.items() if name.endswith(WELL)}
     assert rejected(narrow, "greater", TOO_WIDE) == {}
 
 
-@quick
+@few(8)
 def test_far_points(draws: int, seed: int) -> None:
-    assert too_seldom(pooled(FAR, draws, seed + 100)) == {}
+    held = pooled(FAR, draws, seed + 100)
+    assert too_seldom(held) == {}
+    assert too_seldom(of_all(held)) == {}
 
 
-@quick
+@few(16)
 def test_sweeps_that_end_below_the_crossing(draws: int, seed: int) -> None:
     held = pooled(SHORT, draws, seed + 200)
     assert sum(len(inside) for name, inside in held.items() if name.endswith("hull")) > draws / 10
     assert too_seldom(held) == {}
+    assert too_seldom(of_all(held)) == {}
 
 
-@quick
+@few(8)
 def test_a_second_stage_makes_the_interval_narrow_and_keeps_it_honest(
     draws: int, seed: int
 ) -> None:
@@ -169,7 +183,7 @@ def test_a_second_stage_makes_the_interval_narrow_and_keeps_it_honest(
     held = collected(case, draws, seed + 300, refined)
     assert too_seldom(held) == {}
     random = np.random.default_rng(seed + 301)
-    widths = np.array([_widths(case, random_loop(random), random) for _ in range(30)])
+    widths = np.array([_widths(case, random_loop(random), random) for _ in range(min(draws, 30))])
     assert np.median(widths[:, 1] / widths[:, 0]) < 0.6
 
 

@@ -24,7 +24,8 @@ def test_amplitude_with_offset_and_whole_cycles_only_in_its_scatter() -> None:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 def test_the_interval_holds_the_amplitude(count: int) -> None:
     held = {}

@@ -143,7 +143,8 @@ def resonance_deviation(period: float, damping: float) -> float:
 
 
 draws = pytest.mark.parametrize(
-    "count", [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 Draw = Callable[[np.random.Generator], bool]
 

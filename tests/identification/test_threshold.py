@@ -132,7 +132,8 @@ def drawn(curve, random, repeats, deviation, ratio) -> Estimate:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(80, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(80, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 def test_the_interval_holds_where_the_true_curve_passes(count: int) -> None:
     """Straight between the changes, of known scatter: as promised. With few repeats a little more

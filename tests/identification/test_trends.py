@@ -85,7 +85,7 @@ def test_units_and_origins_change_nothing():
     ("n", "rho", "count"),
     [(5, 0.0, 100), (5, 0.5, 100), (10, 0.0, 60), (10, 0.5, 60), (30, 0.5, 40)]
     + [
-        pytest.param(n, rho, 1000, marks=pytest.mark.soak)
+        pytest.param(n, rho, 1000, marks=pytest.mark.statistics)
         for n in (5, 10, 30)
         for rho in (0.0, 0.5)
     ],

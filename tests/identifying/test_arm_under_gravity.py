@@ -107,6 +107,7 @@ def test_gravity_is_no_friction(results: Path) -> None:
     assert "In the negative direction static friction is not told from Coulomb friction" in said
 
 
+@pytest.mark.slow
 def test_strokes_with_clocks_of_their_own_are_fitted_together(results: Path) -> None:
     found = told(identified(results, "inverse_dynamics"))
     assert holds(found["gravity_sine"], GRAVITY) or found["gravity_sine"].value == pytest.approx(

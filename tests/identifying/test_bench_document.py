@@ -93,6 +93,7 @@ def write(results: Path):  # type: ignore[no-untyped-def]
     return written
 
 
+@pytest.mark.slow
 def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # type: ignore[no-untyped-def]
     bench = write(HEAD + LUGRE, friction_map=Identified(CURVE, Result(), settings=STRIBECK))
     load = bench.friction["load"]

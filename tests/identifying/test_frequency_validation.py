@@ -221,10 +221,18 @@ def identified(path: Path, unseen: Path | None = None) -> Identification:
     )
 
 
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory: pytest.TempPathFactory) -> tuple[Identification, Path]:
+    """The linear bench with its appendage, held against an unseen run, and its page."""
+    folder = tmp_path_factory.mktemp("linear")
+    found = identified(shaken(folder / "a", 0), shaken(folder / "b", 100))
+    page = write_identification(found, folder / "page", templates_folder(), "campaign identify")
+    return found, page
+
+
 @pytest.mark.slow
-def test_a_linear_bench_has_masses_in_its_own_units(tmp_path: Path) -> None:
-    run, unseen = shaken(tmp_path / "a", 0), shaken(tmp_path / "b", 100)
-    found = identified(run, unseen)
+def test_a_linear_bench_has_masses_in_its_own_units(linear: tuple[Identification, Path]) -> None:
+    found, page = linear
     told = {each.estimate.name: each for each in found.parameters}
     stiffness = (2 * np.pi * 25.0) ** 2 * 5.0
     for name, truth, unit in (
@@ -255,7 +263,6 @@ def test_a_linear_bench_has_masses_in_its_own_units(tmp_path: Path) -> None:
     assert verdicts["shaken, force, rms 300 N", "two masses"] == "as closely as scatter allows"
     assert "times the square" in str(verdicts["shaken, force, rms 150 N", "two masses"])
     assert any("before the force" in note for note in result.notes)
-    page = write_identification(found, tmp_path / "page", templates_folder(), "campaign identify")
     text = page.read_text(encoding="utf-8")
     assert "Problems with this page" not in text
     assert "kg·m²" not in text
@@ -271,7 +278,7 @@ def axis_units(found: Identification) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [0, 1000, 5000])
+@pytest.mark.parametrize("first", [0, pytest.param(1000, marks=pytest.mark.statistics), 5000])
 def test_a_rigid_carriage_is_one_mass(tmp_path: Path, first: int) -> None:
     """With the last two a second mass that nothing tells fits better by Schwarz' criterion."""
     found = identified(shaken(tmp_path / "rigid", first, False, (140.0, 280.0)))
@@ -282,11 +289,11 @@ def test_a_rigid_carriage_is_one_mass(tmp_path: Path, first: int) -> None:
     assert "one mass explains" in str(told["stiffness"].estimate.reason)
 
 
-def test_a_model_has_one_colour_all_over_the_page(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_a_model_has_one_colour_all_over_the_page(linear: tuple[Identification, Path]) -> None:
     """It stands beside the measurement in one figure, and alone in another."""
-    found = identified(shaken(tmp_path / "a", 0), shaken(tmp_path / "b", 100))
-    write_identification(found, tmp_path / "page", templates_folder(), "campaign identify")
-    figures = sorted((tmp_path / "page" / "figures").glob("*.svg"))
+    found, page = linear
+    figures = sorted((page.parent / "figures").glob("*.svg"))
     told = {path.name: path.read_text(encoding="utf-8") for path in figures}
     prediction = next(text for name, text in told.items() if "prediction-1" in name)
     residuals = next(text for name, text in told.items() if "residuals-1" in name)

@@ -86,6 +86,7 @@ def words(found: Identified) -> str:
     )
 
 
+@pytest.mark.slow
 def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
     found = identified(AMPLITUDES[0])
     for name, parameter in told(found).items():
@@ -105,6 +106,7 @@ def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
     assert any("Repeat it at half the amplitude" in note for note in found.result.notes)
 
 
+@pytest.mark.slow
 def test_two_amplitudes_tell_the_axis() -> None:
     found = identified(*AMPLITUDES)
     parameters, whose = told(found), rows(found)

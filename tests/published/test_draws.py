@@ -82,7 +82,8 @@ def test_without_scatter_there_is_no_spread() -> None:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.soak)]
+    "count",
+    [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
 )
 def test_the_interval_holds_one_more(count: int) -> None:
     """Of normal ones whatever their number, of deviations of ten and of steps from 39 on."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -52,8 +53,9 @@ def planned(path: Path, *overrides: str) -> tuple[dict[str, AnalysedTest], RunHe
     return tests, header
 
 
+@cache
 def conditions(path: Path, *overrides: str) -> dict[str, dict[str, str]]:
-    """By test: the conditions that its section lists."""
+    """By test: the conditions that its section lists; read only, of a file that stays as it is."""
     tests, header = planned(path, *overrides)
     units = units_of(tests.values(), header)
     return {name: dict(conditions_of(test, units[name])) for name, test in tests.items()}

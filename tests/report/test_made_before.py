@@ -8,8 +8,6 @@ import json
 import os
 import pickle
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +18,7 @@ from campaign.errors import ExitCode, UsageError
 from campaign.report import processes
 from campaign.report.made_before import MADE
 from tests.archives import simulated_run
+from tests.system.user import completed
 
 
 @pytest.fixture(scope="module")
@@ -143,14 +142,7 @@ def test_the_page_tells_the_command_as_it_was_typed(
 def test_one_figure_and_a_page_do_not_go_together(
     run: Path, tmp_path: Path, options: tuple[str, ...], told: str
 ) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "campaign", "report", str(run), *options],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env=dict(os.environ),
-    )
+    done = completed(tmp_path, "report", str(run), *options)
     assert done.returncode == ExitCode.USAGE
     assert told in done.stderr
     assert not done.stdout

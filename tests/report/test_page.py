@@ -301,7 +301,11 @@ def test_provenance_comes_from_the_archive(made_up: ModuleType, page: Page, tmp_
 
 def test_the_command_repeats_what_was_asked(made_up: ModuleType, tmp_path: Path) -> None:
     run = made_up.made_up_run(
-        tmp_path, only=("a b",), overrides={"bench.gear.ratio": "100"}, backend="serial"
+        tmp_path,
+        tests={},
+        only=("a b",),
+        overrides={"bench.gear.ratio": "100"},
+        backend="serial",
     )
     build(made_up, run, tmp_path / "out")
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
@@ -313,7 +317,7 @@ def test_the_command_repeats_what_was_asked(made_up: ModuleType, tmp_path: Path)
 def test_options_of_the_backend_are_told_in_words(made_up: ModuleType, tmp_path: Path) -> None:
     """Neither Python nor JSON: an option that says nothing is left out, a number is SI."""
     options = {"check_step": False, "longest_step": None, "timeout": 2.0}
-    run = made_up.made_up_run(tmp_path, backend_options=options)
+    run = made_up.made_up_run(tmp_path, tests={}, backend_options=options)
     build(made_up, run, tmp_path / "out")
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
     assert "sim, check step: no, timeout: 2 (SI)" in text
@@ -379,7 +383,8 @@ def test_own_templates_win_one_by_one(made_up: ModuleType, tmp_path: Path) -> No
     own = tmp_path / "own"
     own.mkdir()
     (own / "provenance.html").write_text("<p>Made at {{ header.name }}</p>")
-    build(made_up, made_up.made_up_run(tmp_path), tmp_path / "out", templates=own)
+    run = made_up.made_up_run(tmp_path, tests={"stabilization": ("5.2",)})
+    build(made_up, run, tmp_path / "out", templates=own)
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
     assert "Made at 2026-11-21T09-36-58-made-up" in text
     assert "Archive SHA-256" not in text
@@ -444,7 +449,9 @@ def test_a_laboratory_compares_with_its_own_numbers(made_up: ModuleType, tmp_pat
 def test_nothing_published_is_a_report_without_a_scoreboard(
     made_up: ModuleType, tmp_path: Path
 ) -> None:
-    run = made_up.made_up_run(tmp_path, normalised={"published": "none"})
+    run = made_up.made_up_run(
+        tmp_path, tests={"stabilization": ("5.2",)}, normalised={"published": "none"}
+    )
     build(made_up, run, tmp_path / "out")
     assert not (tmp_path / "out/tables/scoreboard.csv").exists()
     assert "Scoreboard" not in (tmp_path / "out/report.html").read_text()

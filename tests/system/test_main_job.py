@@ -73,7 +73,7 @@ def test_the_scoreboard_reproduces_the_published_stabilization_error(tmp_path: P
 def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart, tmp_path: Path):
     _, archive = quickstart
     copy = Path(shutil.copy(archive, tmp_path))
-    campaign(tmp_path, "report", copy.name, "--output", "page")
+    campaign(tmp_path, "report", copy.name, "--output", "page", start=True)  # other hashes of texts
     first = archive.with_name(f"{archive.stem}-report")
     for file in sorted(path for path in first.rglob("*") if path.is_file()):
         same = tmp_path / "page" / file.relative_to(first)

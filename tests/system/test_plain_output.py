@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from campaign.cli.output import PlainConsole, PlainStream
-from tests.system.user import ROOT, command, environment
+from tests.system.user import ROOT, command, completed, environment
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\u202e\u2066\x9b31m\x7f\r[red]x[/red]"
 """A window's title, a cleared screen, writing turned round, colours in C1 and in rich's markup."""
@@ -80,11 +80,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(folder: Path, *arguments: str) -> str:
     """Everything that a command prints."""
-    done = subprocess.run(
-        command(*arguments), cwd=folder, env=environment(), capture_output=True, timeout=300,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    return (done.stdout + done.stderr).decode("utf-8")
+    done = completed(folder, *arguments)
+    return done.stdout + done.stderr
 
 
 def on_a_terminal(folder: Path, *arguments: str) -> bytes:

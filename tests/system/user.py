@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+
+from tests.forks import TIMEOUT, Forks
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,7 +31,8 @@ compensation = ["none", "lugre"]
 
 def environment() -> dict[str, str]:
     """This process's, with the program importable from any folder and a plain terminal."""
-    kept = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "FORCE_COLOR")}
+    dropped = ("COLUMNS", "FORCE_COLOR", "PYTEST_CURRENT_TEST")
+    kept = {k: v for k, v in os.environ.items() if k not in dropped}
     return {**kept, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error", "TERM": "dumb"}
 
 
@@ -48,18 +53,47 @@ class Done:
         return self.out.splitlines()[-1]
 
 
-def campaign(folder: Path, *arguments: str, code: int = 0) -> Done:
-    """Run `campaign` in `folder`; the exit code must be `code`, and no traceback is shown."""
-    process = subprocess.run(
+USUAL = environment()
+"""Before any test has changed a variable."""
+
+
+@cache
+def forks() -> Forks:
+    """The one of this process."""
+    made = Forks(USUAL)
+    atexit.register(made.close)
+    return made
+
+
+def completed(
+    folder: Path, *arguments: str, start: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Run `campaign` in `folder`, whatever comes of it.
+
+    Args:
+        folder: the current one of the command.
+        arguments: what is typed after `campaign`.
+        start: in a Python of its own, as also with variables that the test has changed: they may
+            count when something is imported.
+    """
+    if not start and sys.platform == "linux" and environment() == USUAL:
+        return forks().run(folder, *arguments)
+    return subprocess.run(
         command(*arguments),
         cwd=folder,
         env=environment(),
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=600,  # the first one compiles the engine
+        timeout=TIMEOUT,
         stdin=subprocess.DEVNULL,
+        check=False,
     )
+
+
+def campaign(folder: Path, *arguments: str, code: int = 0, start: bool = False) -> Done:
+    """As `completed`; the exit code must be `code`, and no traceback is shown."""
+    process = completed(folder, *arguments, start=start)
     assert "Traceback" not in process.stderr, process.stderr
     assert process.returncode == code, process.stdout + process.stderr
     return Done(process.returncode, process.stdout, process.stderr)

@@ -19,6 +19,7 @@ import pytest
 from campaign.archive import find_run, open_run
 from campaign.recording import Fault, Outcome, SafeState
 from campaign.testing import backend_checks
+from tests.forks import forks_of_libraries
 from tests.testing.drive import Drive
 
 ROOT = Path(__file__).parents[2]
@@ -116,14 +117,8 @@ seed = 1
 
 def campaign(package: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(package), str(ROOT), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-m", "campaign", *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
+    return forks_of_libraries().run(
+        folder, *arguments, environment={**os.environ, "PYTHONPATH": path}
     )
 
 
