@@ -92,7 +92,8 @@ class Forks:
         paths = [Path(self._folder.name, name) for name in ("out", "err")]
         assert self._process.stdin
         assert self._process.stdout
-        request = [arguments, str(folder.absolute()), *map(str, paths), environment]
+        words = [*map(str, arguments)]
+        request = [words, str(folder.absolute()), *map(str, paths), environment]
         print(json.dumps(request), file=self._process.stdin, flush=True)
         code = int(self._process.stdout.readline())
         out, err = (path.read_bytes().decode("utf-8") for path in paths)
