@@ -77,7 +77,9 @@ class Helpers:
     def wait(self) -> dict[str, Made]:
         """What they have made, by name, when they have ended; one that failed made less."""
         for process in self._processes:
-            process.wait(LONGEST)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(LONGEST)
+            process.kill()  # one that hangs
         lines = [line for each in self._processes for line in each.stdout or ()]
         made = [Made(**json.loads(line)) for line in lines]
         return {each.name: each for each in made}

@@ -31,8 +31,8 @@ from campaign.identification.gate import USELESS, admitted, mattering, refused
 from campaign.identification.intervals import shifted_by, student, with_error
 from campaign.identification.least_squares import Array, profile_limit, refuse_too_few
 from campaign.identification.point_weights import (
-    LEAST,
-    between_deviation,
+    Scatter,
+    fit_with_scatter,
     lack_of_fit,
     smoothed_deviation,
 )
@@ -52,10 +52,6 @@ Model = Literal["free", "2", "none"]
 MODELS: tuple[Model, ...] = ("free", "2", "none")
 """How the Stribeck effect is modelled: delta free, delta = 2, none."""
 HELD = {"free": None, "2": 2.0}
-ROUNDS = 20
-"""of fit and deviation in turn, at most; usually five."""
-SETTLED = 1e-3
-"""relative change of the deviation between points below which the rounds end."""
 DOUBTED = 0.2
 """p-value below which the points contradict a model that holds a parameter."""
 EFFECT = 1e-3
@@ -67,10 +63,6 @@ BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_expone
 STRAIGHT = 0.2
 """Half-width of vs over it up to which intervals follow from the slopes of the curve."""
 TINY = 1e-300
-LIKELIER = 4.0
-"""Difference of twice the log-likelihoods from which on points tell which friction scatters."""
-LEAST_DRY = 0.1
-"""Smallest part of a torque that scatters: beyond it, weights would rest on one fast point."""
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
 HELD_EXPONENT = Cause("held", "held at {value:g}")
@@ -97,8 +89,7 @@ class DirectionFit:
         place: what repeats had in common: the commanded speed; without repeats, `speed`.
         speed, torque: positive (rad/s, N m).
         window: deviation of each torque that its window shows (N m, 1 sigma).
-        between: relative deviation from point to point beyond that, of the part that scatters.
-        steady_viscous: viscous friction that does not scatter (N m s/rad); 0: all of it does.
+        scatters: how points deviate beyond that; by the larger, where they do not tell which.
         fits: by model.
         lack_of_fit: p-value of `free` against repeated points; None without repeats.
     """
@@ -107,8 +98,7 @@ class DirectionFit:
     speed: Array
     torque: Array
     window: Array
-    between: float
-    steady_viscous: float
+    scatters: tuple[Scatter, ...]
     fits: Mapping[Model, StribeckFit]
     lack_of_fit: float | None = None
 
@@ -201,7 +191,7 @@ def fit_direction(
 
     means, level = mean(speed), mean(torque)
     scatter = smoothed_deviation(np.sqrt(mean(window**2) / count), np.log(means))
-    between, steady, free = _between(means, level, scatter)
+    scatters, free = fit_with_scatter(means, level, scatter)
     held = with_misfit(
         fit_stribeck(means, level, free.deviation, HELD["2"], near=free.values), means, level
     )
@@ -210,68 +200,10 @@ def fit_direction(
         "2": held,
         "none": fit_line(means, level, free.deviation),
     }
-    part = scattering(means, level, steady)
+    part = scatters[0].part(means, level)
     lacking = lack_of_fit(torque, level, part, member, free.residuals, len(level) - len(free.free))
     named = means if repeat_of is None else np.asarray(shared, dtype=float)
-    return DirectionFit(named, means, level, scatter, between, steady, fits, lacking)
-
-
-def scattering(speed: Array | float, torque: Array | float, steady_viscous: float) -> Array:
-    """The part of friction torques (N m) that changes from point to point, shape of `torque`."""
-    return np.asarray(np.maximum(torque - steady_viscous * speed, LEAST_DRY * torque))
-
-
-def _between(speed: Array, torque: Array, window: Array) -> tuple[float, float, StribeckFit]:
-    """`between` and `steady_viscous` of a direction, and the fit with delta free.
-
-    They depend on each other. All friction scatters, or its dry part, whichever is likelier. Where
-    neither clearly is, a point deviates by the larger of the two: with weights of the wrong one, vs
-    and Ts held in 92 of 100 maps.
-    """
-    whole, dry = (_by_scatter(speed, torque, window, dry=dry) for dry in (False, True))
-    rise = _unlikely(whole[2]) - _unlikely(dry[2])
-    if abs(rise) > LIKELIER:
-        return dry if rise > 0 else whole
-    between, steady, found = whole
-    deviation = np.maximum(found.deviation, dry[2].deviation)
-    return between, steady, fit_stribeck(speed, torque, deviation, start=found.values)
-
-
-def _unlikely(found: StribeckFit) -> float:
-    """-2 times the logarithm of the likelihood of the residuals, less a constant."""
-    return found.chi_square + 2.0 * float(np.sum(np.log(found.deviation)))
-
-
-def _by_scatter(
-    speed: Array, torque: Array, window: Array, *, dry: bool
-) -> tuple[float, float, StribeckFit]:
-    """As `_between`, for friction that scatters as a whole, or in its dry part alone.
-
-    Where windows alone explain more than there is (in a closed loop they do), a common factor makes
-    chi-square equal to its degrees of freedom on that side, too.
-    """
-    between, steady = 1e-3, 0.0
-    found = fit_stribeck(speed, torque, _deviation(torque, torque, window, between))
-    for _ in range(ROUNDS):
-        freedom = len(speed) - len(found.free)
-        steady = found.values["viscous_friction"] if dry else 0.0
-        part = scattering(speed, torque, steady)
-        new = between_deviation(found.residuals / part, window / part, freedom)
-        settled = abs(new - between) <= SETTLED * between
-        between = new
-        deviation = _deviation(torque, part, window, between)
-        found = fit_stribeck(speed, torque, deviation, start=found.values)
-        if settled:
-            break
-    if between > 0:
-        return between, steady, found
-    factor = math.sqrt(found.chi_square / (len(speed) - len(found.free)))
-    deviation = np.maximum(factor * deviation, LEAST * torque)
-    return between, steady, replace(found, deviation=deviation)
-
-
-def _deviation(torque: Array, part: Array, window: Array, between: float) -> Array:
-    return np.sqrt(window**2 + (between * part) ** 2 + (LEAST * torque) ** 2)
+    return DirectionFit(named, means, level, scatter, scatters, fits, lacking)
 
 
 def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:

@@ -395,6 +395,7 @@ print(limit)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_kill_before_any_single_step_loses_nothing(tmp_path, kit):
     trials = [kit.trial(1), kit.trial(2)]

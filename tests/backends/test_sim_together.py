@@ -179,6 +179,7 @@ settle_cycles = 1
 """
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_together_and_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,6 +33,7 @@ def runs(folder: Path, seeds: range, changes: tuple[str, ...] = ()) -> Iterator[
         yield from simulated(folder, PLATFORM, seeds[first : first + TOGETHER], changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "seed"),
     [

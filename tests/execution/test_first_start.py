@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from dataclasses import asdict
@@ -67,6 +68,17 @@ def test_what_a_helper_compiled_is_loaded_and_told_with_what_it_took(monkeypatch
     assert told[1] == Made(TOGETHER, 30.0, compiled=True)
 
 
+def test_a_helper_that_hangs_is_ended_and_what_it_had_to_make_is_made_here(
+    monkeypatch, small_engine
+):
+    started = helper(monkeypatch, "import time; time.sleep(20)")
+    monkeypatch.setattr(first_start, "LONGEST", 0.1)
+    with Helpers() as helpers:
+        make_all(lambda made: None, helpers)
+        assert [each.wait(10) for each in started] == [-signal.SIGKILL]
+    assert small_engine == [ALONE, 1, TOGETHER, LANES]
+
+
 def test_what_a_helper_did_not_make_is_made_here(monkeypatch, small_engine):
     helper(monkeypatch, "raise SystemExit(1)")
     told: list[Made] = []
@@ -77,7 +89,7 @@ def test_what_a_helper_did_not_make_is_made_here(monkeypatch, small_engine):
 
 
 def test_helpers_do_not_stay_behind(monkeypatch):
-    started = helper(monkeypatch, "import time; time.sleep(600)")
+    started = helper(monkeypatch, "import time; time.sleep(20)")
     with Helpers():
         assert started[0].poll() is None
     assert started[0].returncode

@@ -113,6 +113,7 @@ def test_a_clean_torque_is_taken_as_it_was_measured() -> None:
         assert doubt.shape == (COUNT, 0)
 
 
+@pytest.mark.slow
 def test_a_torque_with_little_noise_is_regressed_where_the_rate_has_less() -> None:
     held = dict.fromkeys(TRUTH, 0)
     for seed in range(8):
@@ -160,6 +161,7 @@ def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque
     assert identify_presliding_dynamics(records).plant.inertia > 1.05 * INERTIA
 
 
+@pytest.mark.slow
 def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
     hits = {doubt: dict.fromkeys(TRUTH, 0) for doubt in (True, False)}
     for seed in range(16):

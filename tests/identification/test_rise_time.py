@@ -47,6 +47,7 @@ def true_rise(loop: str) -> float:
     return step_characteristics(TIME, LOOPS[loop], 0.0, 1.0).rise_time
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("memory", "sizes"), [(0.0, (0.003, 0.03)), (0.7, (0.01,))])
 def test_intervals_hold_as_often_as_they_say(memory: float, sizes: tuple[float, ...]) -> None:
     held: dict[str, list[bool]] = {}

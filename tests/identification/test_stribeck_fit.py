@@ -113,6 +113,7 @@ def test_a_map_without_slow_points_doubts_its_parameters() -> None:
     assert direction_estimates(found, "free")["stribeck_velocity"].origin == "not determined"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slowest", [0.035, 0.04])
 def test_static_torque_of_maps_that_begin_above_vs_holds_where_it_is_told(slowest: float) -> None:
     """vs is 0.03: by the slopes of the curve half of those that were told missed the truth."""
@@ -259,6 +260,7 @@ def lines(count: int) -> list[DirectionFit]:
     return [fit_direction(speed, line * each, np.full(20, 1e-3)) for each in scatter]
 
 
+@pytest.mark.slow
 def test_a_line_shows_no_stribeck_effect_and_its_intervals_hold() -> None:
     """Ts and Tc of the curve are apart by their interval in 6 of 100. Of the fit with delta = 2,
     which bends somewhere, the intervals alone hold Tc and viscous friction in 86 of 100.
@@ -302,6 +304,19 @@ def test_what_rests_on_an_exponent_at_its_limit_is_left_open() -> None:
     assert told["coulomb_torque"].origin is Origin.MEASURED
 
 
+def bound_of_viscous(speed: np.ndarray, viscous: float, deviation: np.ndarray) -> float:
+    """Cramér-Rao half-width of viscous friction (95 %, Student's t), by differences of 4.6."""
+    true, columns = TRUE | {"viscous_friction": viscous}, []
+    for name in PARAMETERS:
+        step = 1e-6 * true[name]
+        up, down = (equation_4_6(speed, **true | {name: true[name] + s}) for s in (step, -step))
+        columns.append((up - down) / (2 * step) / deviation)
+    scale = np.linalg.norm(columns, axis=1)
+    jacobian = np.array(columns).T / scale
+    error = np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[0, 0]) / scale[0]
+    return float(t_distribution.ppf(0.975, len(speed) - len(PARAMETERS)) * error)
+
+
 @pytest.mark.parametrize("dry", [True, False])
 def test_points_say_which_part_of_friction_scatters(dry: bool) -> None:
     """Where its dry part scatters alone, weights of all friction make the intervals of viscous
@@ -309,17 +324,19 @@ def test_points_say_which_part_of_friction_scatters(dry: bool) -> None:
     """
     speed, held, steady, widths = np.geomspace(0.0015, 3.0, 36), [], 0, []
     torque = equation_4_6(speed, viscous_friction=50.0)
+    part = torque - 50.0 * speed if dry else torque
     for seed in range(60):
         noise = 0.003 * np.random.default_rng([seed, 9]).standard_normal(36)
-        part = torque - 50.0 * speed if dry else torque
         fit = fit_direction(speed, torque + part * noise, np.zeros(36))
+        between = np.max([each.deviation(speed, fit.torque) for each in fit.scatters], axis=0)
+        np.testing.assert_allclose(fit.deviation, between, rtol=1e-6)
         one = direction_estimates(fit, "free")["viscous_friction"]
         held.append(one.low <= 50.0 <= one.high)
         widths.append(one.half_width)
-        steady += fit.steady_viscous > 0
+        steady += fit.scatters[0].steady_viscous > 0
     assert held.count(False) <= 7  # binomial, 60 of 0.05, 99 %
     assert steady >= 45 if dry else steady <= 3
-    assert np.median(widths) < 0.07 if dry else np.median(widths) > 0.15
+    assert np.median(widths) == pytest.approx(bound_of_viscous(speed, 50.0, 0.003 * part), rel=0.15)
 
 
 @pytest.mark.parametrize(("fastest", "told"), [(2.5, False), (30.0, True)])

@@ -79,6 +79,7 @@ def test_a_line_has_no_stribeck_part(tmp_path: Path) -> None:
     assert "below Coulomb" not in notes(section)
 
 
+@pytest.mark.slow
 def test_motion_in_one_direction(tmp_path: Path) -> None:
     """Inertia, and what that direction takes; the sensor's noise at rest is no other direction."""
     time = np.arange(8000) / RATE

@@ -34,6 +34,7 @@ def test_there_are_forty_of_them():
     assert len(FILES) == len({wild.name for wild in wild_files()}) == len(wild_files())
 
 
+@pytest.mark.slow
 def test_nine_of_ten_roles_are_right(tmp_path):
     right, wrong = 0, []
     for wild in wild_files():

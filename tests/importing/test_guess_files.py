@@ -43,6 +43,7 @@ def test_two_joints_every_15_ms_with_odd_names(tmp_path: Path):
         assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
 
 
+@pytest.mark.slow
 def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     m = rig.trapezoids(72, rate=500.0, length=20.0)
     acceleration = np.gradient(m.v, 1 / 500.0)

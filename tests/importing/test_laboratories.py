@@ -43,6 +43,7 @@ def bench_of(folder: Path, laboratory: Laboratory, capsys: pytest.CaptureFixture
     return load_bench("bench.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("laboratory", LABORATORIES, ids=lambda each: each.name)
 def test_a_bench_from_files(
     tmp_path: Path,

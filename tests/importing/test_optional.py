@@ -163,6 +163,7 @@ def asammdf():
     return pytest.importorskip("asammdf", reason="asammdf is not installed")
 
 
+@pytest.mark.slow
 def test_groups_are_tables_with_clocks_of_their_own(tmp_path, asammdf, monkeypatch):
     fast = [
         asammdf.Signal(RATE, TIME, name="w", unit="rad/s"),

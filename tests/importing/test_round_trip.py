@@ -121,6 +121,7 @@ def test_recordings_of_planned_trials(tmp_path: Path, run: Any, jitter: float, r
     assert any("resampled" in text for text in told) is bool(repair)
 
 
+@pytest.mark.slow
 def test_recordings_that_nobody_planned(tmp_path: Path, run: Any):
     parts = [columns_toml(COLUMNS)]
     for name, test in TESTS.items():

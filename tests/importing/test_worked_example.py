@@ -75,6 +75,7 @@ def findings(run: Any, test: str) -> dict[tuple[str, str], Any]:
     return {(row.quantity, row.direction): row for _, row in own.iterrows()}
 
 
+@pytest.mark.slow
 def test_a_stand_in_comes_out_as_it_was_made(tmp_path: Path):
     coulomb, viscous = (20.0, 22.0), (160.0, 240.0)
     for seed, name in enumerate(("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"), start=1):
@@ -105,6 +106,7 @@ def test_a_stand_in_comes_out_as_it_was_made(tmp_path: Path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DATA.is_dir(), reason="the EMPS files are not here")
 def test_the_real_one(tmp_path: Path):
     for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"):

@@ -80,6 +80,7 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
+@pytest.mark.slow
 def test_damaged_protocols_and_benches(tmp_path: Path) -> None:
     came = attacks(tmp_path, range(100))
     assert came["refused"] > 30

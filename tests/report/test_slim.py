@@ -90,6 +90,7 @@ def test_the_same_drawing_gives_the_same_bytes(made_up: ModuleType) -> None:
         assert used == set(ids) - {"figure-3-title", "figure-3-alt"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parts", "about"), [(CURVES, ABOUT), (SIGNS, ABOUT_SIGNS)])
 def test_paths_of_steps_do_not_drift(parts: int, about: float) -> None:
     """Twenty thousand random steps end where they should: rounding errors do not add up."""

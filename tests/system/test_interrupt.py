@@ -19,6 +19,7 @@ LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 3000\n", 1)
 STOPPING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "number", [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
 )
@@ -51,6 +52,7 @@ def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.S
     campaign(tmp_path, "report", str(archive))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
     """The real thing: afterwards every write to the terminal fails, and that ends nothing."""
@@ -85,6 +87,7 @@ def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
     assert "safe state:  confirmed" in shown
 
 
+@pytest.mark.slow
 def test_a_killed_run_is_readable_and_says_that_it_has_no_end(tmp_path: Path):
     write(tmp_path, LONG)
     with subprocess.Popen(

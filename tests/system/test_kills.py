@@ -127,6 +127,7 @@ def kill_again_and_again(folder: Path, kills: int, seed: int) -> int:
     return met
 
 
+@pytest.mark.slow
 def test_a_killed_run_loses_no_finished_trial_and_goes_on(tmp_path: Path):
     assert kill_again_and_again(tmp_path, kills=3, seed=1) >= 3
 

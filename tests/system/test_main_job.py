@@ -70,6 +70,7 @@ def test_the_scoreboard_reproduces_the_published_stabilization_error(tmp_path: P
     assert (none[0]["status"], none[0]["source"]) == ("selected", "simulation")
 
 
+@pytest.mark.slow
 def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart, tmp_path: Path):
     _, archive = quickstart
     copy = Path(shutil.copy(archive, tmp_path))

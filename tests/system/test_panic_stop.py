@@ -259,6 +259,7 @@ def test_while_the_line_is_cut(tmp_path: Path) -> None:
         rig.judged(process, began=True)
 
 
+@pytest.mark.slow
 def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Path) -> None:
     """As when a laptop is closed in a rest and opened again: it and its relay did not run."""
     text = PROTOCOL.replace('pause = "1 s"\n\n[[', 'pause = "100 s"\n\n[[')

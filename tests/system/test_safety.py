@@ -117,6 +117,7 @@ def test_a_plan_is_refused_without_a_port(tmp_path: Path) -> None:
     assert "--port" in campaign(tmp_path, "run", "protocol.toml", *ON, "--yes", code=2).err
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_in_the_safe_state(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
         process.send_signal(signal.SIGINT)
@@ -131,6 +132,7 @@ def test_ctrl_c_ends_in_the_safe_state(tmp_path: Path) -> None:
         assert not status.drive_on
 
 
+@pytest.mark.slow
 def test_a_killed_host_leaves_a_safe_bench(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
         os.kill(program_of(process), signal.SIGKILL)
@@ -144,6 +146,7 @@ def test_a_killed_host_leaves_a_safe_bench(tmp_path: Path) -> None:
         assert "--clear-stop 1" in refused.err
 
 
+@pytest.mark.slow
 def test_a_host_whose_guardian_is_killed_stops_in_order(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
         process.kill()
@@ -154,6 +157,7 @@ def test_a_host_whose_guardian_is_killed_stops_in_order(tmp_path: Path) -> None:
         assert is_safe(status_of(port))
 
 
+@pytest.mark.slow
 def test_the_panic_stop_works_while_the_host_hangs(tmp_path: Path) -> None:
     with controller(*PATIENT) as port, running(tmp_path, port) as process:
         program = program_of(process)
@@ -181,6 +185,7 @@ def test_a_pulled_plug_is_not_confirmed_until_the_line_is_back(tmp_path: Path) -
     assert second.recording().ending.outcome is Outcome.COMPLETED
 
 
+@pytest.mark.slow
 def test_a_controller_that_has_gone_is_said_with_its_own_exit_code(tmp_path: Path) -> None:
     with controller() as port:
         starting = running(tmp_path, port)

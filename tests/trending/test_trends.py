@@ -124,6 +124,7 @@ def test_runs_of_one_moment_have_an_order_and_no_time(tmp_path: Path):
     assert not any(JUMP in each.p for each in ordered.followed)  # three runs
 
 
+@pytest.mark.slow
 def test_what_follows_the_temperature_is_told_per_kelvin(tmp_path: Path):
     rng = np.random.default_rng(5)
     warm = rng.permutation(np.linspace(15, 35, 8))
@@ -176,6 +177,7 @@ def test_a_damaged_temperature_is_refused(tmp_path: Path):
         follow([open_run(path) for path in paths], experiments(), "temperature")
 
 
+@pytest.mark.slow
 def test_another_number_of_the_runs_may_be_followed(drift: Trends, runs: Path):
     readers = [member.run for member in drift.members]
     found = follow(readers, experiments(), "breakaway torque mean")

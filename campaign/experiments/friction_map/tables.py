@@ -16,13 +16,7 @@ from campaign.identification.both_directions import correlation
 from campaign.identification.intervals import with_error
 from campaign.identification.sampled import where_it_scatters
 from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
-from campaign.identification.velocity_map import (
-    MODELS,
-    DirectionFit,
-    Model,
-    doubts,
-    scattering,
-)
+from campaign.identification.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.units import angle_here
@@ -189,10 +183,14 @@ def map_notes(fits: MapFits, where: str) -> Iterator[str]:
 
 
 def _scatter(fit: DirectionFit) -> str:
-    if fit.between == 0:
+    if not any(each.relative for each in fit.scatters):
         return "points scatter by no more than their windows show"
-    of = "friction without its viscous part" if fit.steady_viscous else "their torque"
-    return f"points scatter by {100 * fit.between:.2g} % of {of} beyond their windows"
+    shares = " or ".join(
+        f"{100 * each.relative:.2g} % of "
+        + ("friction without its viscous part" if each.steady_viscous else "their torque")
+        for each in fit.scatters
+    )
+    return f"points scatter by {shares} beyond their windows"
 
 
 def _ripple(fits: MapFits, direction: str) -> str:
@@ -219,7 +217,7 @@ def fitted_torque(point: MapPoint, fits: MapFits) -> Estimate:
     """A point's torque without ripple, with its whole deviation: window and between points."""
     fit = fits.fits["positive" if point.sign > 0 else "negative"]
     value = point.torque.value - point.ripple
-    part = float(scattering(abs(point.speed), abs(value), fit.steady_viscous))
-    error = float(np.hypot(np.nan_to_num(point.error), fit.between * part))
+    between = max(each.deviation(abs(point.speed), abs(value)) for each in fit.scatters)
+    error = float(np.hypot(np.nan_to_num(point.error), between))
     told = with_error("friction_torque", value, "N m", error, fit.freedom, "window and scatter")
     return with_systematic(told, fits.bench, TORQUE_CONSTANT, value)

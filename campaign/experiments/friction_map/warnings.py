@@ -91,7 +91,7 @@ def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> I
     if not short or len(showing) >= LEAST_RUNS:
         return
     told = f"a period of friction's ripple, {angle_here(period)}"
-    if options.max_travel < period:
+    if options.max_travel < period and not options.spread_starts:
         yield (
             f"max_travel of {angle_here(options.max_travel)} is shorter than {told}: every run "
             "sees it at one place; raise it, or write two start_angles half a period apart"

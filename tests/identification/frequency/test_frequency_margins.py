@@ -72,6 +72,7 @@ def test_beyond_the_last_frequency_there_is_a_bound() -> None:
     )
 
 
+@pytest.mark.slow
 def test_margins_hold_the_truth_as_often_as_they_say() -> None:
     held: dict[str, list[bool]] = defaultdict(list)
     wide: dict[str, list[float]] = defaultdict(list)
@@ -126,6 +127,7 @@ def test_margins_near_the_last_frequency_hold_the_truth() -> None:
     assert not rejected(held, "less")
 
 
+@pytest.mark.slow
 def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that() -> None:
     """Of a loop with -3 dB at 7.914 Hz, measured to hardly more: bounds count as intervals do."""
     width, held = 7.9141274721853, defaultdict(list)
@@ -170,6 +172,7 @@ def test_an_end_that_may_lie_beyond_the_band_is_open() -> None:
     assert np.mean(kinds) > 0.8
 
 
+@pytest.mark.slow
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:
     frequency = np.geomspace(0.5, 60.0, 40)
     truth = loop(frequency)
@@ -185,6 +188,7 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
         assert ratio == pytest.approx(1, abs=0.16), name  # 150 tell it within 6 %
 
 
+@pytest.mark.slow
 def test_what_other_orders_say_is_a_systematic_part() -> None:
     """With a lag that scatter nearly hides, the order is open, and the interval says so."""
     shifts = []

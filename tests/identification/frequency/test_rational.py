@@ -35,6 +35,7 @@ def test_without_noise_the_function_is_found(delay: float) -> None:
     assert abs(zero) / 2 / np.pi == pytest.approx(DRIVE.antiresonance)
 
 
+@pytest.mark.slow
 def test_modes_and_delay_are_held_as_often_as_is_said() -> None:
     held: dict[str, list[bool]] = {"pole": [], "zero": [], "damping": [], "delay": []}
     orders = []
