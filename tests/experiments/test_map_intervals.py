@@ -13,7 +13,8 @@ import pytest
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.friction_map.figures import falls
 from campaign.experiments.friction_map.fits import MapFits, fit_map
-from campaign.experiments.friction_map.points import map_points, measure
+from campaign.experiments.friction_map.points import MapPoint, map_points, measure
+from campaign.experiments.friction_map.tables import fitted_torque
 from campaign.experiments.interface import bench_of
 from campaign.identification.gate import TOO_WIDE
 from campaign.identification.velocity_map import direction_estimates, fit_direction
@@ -252,6 +253,21 @@ def without(item: Done, lost: np.ndarray) -> Done:
         for name, each in item.samples.channels.items()
     }
     return replace(item, samples=replace(item.samples, channels=channels))
+
+
+def test_the_error_of_a_point_is_that_of_its_weight() -> None:
+    """Window and scatter between points together, as the fit has them; no repeats here."""
+    fits = fitted(1, told=False)
+    for direction, sign in (("positive", 1), ("negative", -1)):
+        fit, own = fits.fits[direction], [p for p in fits.points if p.sign == sign]
+        errors = [fitted_torque(p, fits).standard_error for p in sorted(own, key=measured_speed)]
+        between = np.sqrt(fit.deviation**2 - fit.window**2)
+        windows = [p.error for p in sorted(own, key=measured_speed)]
+        np.testing.assert_allclose(errors, np.hypot(windows, between), rtol=1e-3)
+
+
+def measured_speed(point: MapPoint) -> float:
+    return abs(point.rate.value)
 
 
 def test_a_map_that_bends_is_said_to_fall_although_its_static_friction_is_not_known() -> None:

@@ -117,6 +117,8 @@ def test_a_travel_shorter_than_the_ripple() -> None:
     (told,) = warned(bench(rippled(20)), speeds=EIGHT[:6], max_travel="10 deg")
     assert told.startswith("max_travel of 10 deg is shorter than a period of friction's ripple, 18")
     assert warned(bench(rippled(60)), speeds=EIGHT[:6], max_travel="10 deg") == []
+    spread = warned(bench(rippled(20)), speeds=EIGHT[:6], max_travel="10 deg", spread_starts=True)
+    assert not any("at one place" in told for told in spread)
 
 
 @pytest.mark.parametrize("name", ["velocity_map", "repeatability", "quickstart"])
