@@ -190,7 +190,8 @@ def _scatter(fit: DirectionFit) -> str:
         + ("friction without its viscous part" if each.steady_viscous else "their torque")
         for each in fit.scatters
     )
-    return f"points scatter by {shares} beyond their windows"
+    undecided = "; they do not tell which" if len(fit.scatters) > 1 else ""
+    return f"points scatter by {shares} beyond their windows{undecided}"
 
 
 def _ripple(fits: MapFits, direction: str) -> str:
