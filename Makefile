@@ -34,19 +34,21 @@ demo: $(VENV)/installed
 		&& echo && $(BIN)/python -c '$(ANSWERS)' "$$report/report.json" \
 		&& echo "archive  $$run" && echo "report   $$report/report.html"
 
+# Files stay whole, for what their tests share, in the order that tests/conftest.py gives them.
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 # A test that hangs tells where after 20 minutes, and ends its worker.
 # A process of each core with as many threads of its own would wait for each other.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --max-worker-restart 0
+WHOLE_FILES = --dist loadfile --no-loadscope-reorder
 HANGING = -o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true
 
 ifdef ROOM
 test: $(VENV)/installed-test
-	tests=$$($(BIN)/python tests/rooms.py $(ROOM)) && $(PYTEST) --dist loadfile $(HANGING) \
+	tests=$$($(BIN)/python tests/rooms.py $(ROOM)) && $(PYTEST) $(WHOLE_FILES) $(HANGING) \
 		-m "not slow and not soak and not statistics" $$tests $(PYTEST_OPTIONS)
 else
 test: $(VENV)/installed-test
-	$(PYTEST) --dist loadfile $(HANGING) $(PYTEST_OPTIONS)
+	$(PYTEST) $(WHOLE_FILES) $(HANGING) $(PYTEST_OPTIONS)
 endif
 
 # MINUTES=... ends it then, with a sample that is another one for each commit.

@@ -40,6 +40,12 @@ class Reason:
     def __str__(self) -> str:
         return self.text
 
+    def columns(self) -> dict[str, object]:
+        """As tables and JSON have it: the text, the code, and the values by name."""
+        return {
+            "reason": self.text, "reason_code": self.code, "reason_values": dict(self.values)
+        }  # fmt: skip
+
 
 NONE = Reason()
 OLDER = "text"

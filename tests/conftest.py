@@ -6,6 +6,7 @@ import hashlib
 import os
 import signal
 import time
+from collections import Counter
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext
 from typing import Any
@@ -43,8 +44,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Two workers a core: tests of processes, archives and signals wait about half of their time."""
+    return 2 * (os.cpu_count() or 1)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """A sample that is cut off is another one for another draw."""
+    """Files with the most slow tests come first; a sample that is cut off is one of a draw."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: -slow[item.path])
     if config.getoption("--minutes"):
         draw = config.getoption("--draw")
         items.sort(key=lambda item: hashlib.sha256(f"{draw} {item.nodeid}".encode()).digest())

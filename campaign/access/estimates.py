@@ -78,16 +78,8 @@ def row_of(estimate: Estimate) -> dict[str, object]:
         "scatter_low": estimate.low,
         "scatter_high": estimate.high,
         "systematic": {part.source: part.standard_uncertainty for part in estimate.systematic},
-        **reason_of(estimate),
+        **estimate.reason.columns(),
     }
-
-
-def reason_of(estimate: Estimate) -> dict[str, object]:
-    """Its reason by the names of `COLUMNS`: the text, the code, and the values."""
-    reason = estimate.reason
-    return {
-        "reason": reason.text, "reason_code": reason.code, "reason_values": dict(reason.values)
-    }  # fmt: skip
 
 
 def _condition(name: str) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from campaign.access.estimates import reason_of
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.header import Truth
 from campaign.archive.layout.journal import (
@@ -144,7 +143,9 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
                 "safe_state": trial.ending.safe_state,
                 "started": trial.started,
                 "ended": trial.ended,
-                "metrics": [plain(asdict(found)) | reason_of(found) for found in trial.estimates],
+                "metrics": [
+                    plain(asdict(found)) | found.reason.columns() for found in trial.estimates
+                ],
                 "measured_by": trial.measured_by,
             }
             for trial in run.trials

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import queue
+import random
 import resource
 import shutil
 import signal
@@ -31,6 +32,10 @@ from tests.mutants.mutations import Mutant, mutants
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 MAY_SURVIVE = 0.05
+PATIENCE = 1800.0
+"""s for the tests of a room with a bug that was drawn."""
+SEED = 30
+"""Of the bugs drawn by `--draw`."""
 SAID = "said-by-pytest.txt"
 MEMORY = 6 * 2**30
 """bytes; a bug may ask for any amount."""
@@ -91,9 +96,15 @@ class Copy:
         before = file.read_bytes()
         file.write_text(mutant.source, encoding="utf-8")
         try:
-            return self.tests_pass(tests, self.patience[tests])
+            return self.tests_pass(tests, self.patience.get(tests, PATIENCE))
         finally:
             file.write_bytes(before)
+
+
+    def failed(self) -> str:
+        """The test that failed last, as pytest names it."""
+        said = (self.root / SAID).read_text(encoding="utf-8", errors="replace").splitlines()
+        return next((line for line in said if line.startswith(("FAILED", "ERROR"))), "no answer")
 
 
 def main() -> int:
@@ -101,9 +112,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("files", nargs="*", help="only these of attacked.toml")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--draw", type=int, metavar="N", help="N bugs, from all rooms in turn")
     arguments = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     table = tomllib.loads((HERE / "attacked.toml").read_text(encoding="utf-8"))
+    elsewhere = table.pop("rooms")
+    if arguments.draw:
+        return _attack_drawn(arguments.draw, elsewhere, arguments.workers)
     attacked = {file: tuple(table[file]) for file in arguments.files or table}
     listed = {
         (one["file"], one["function"], one["was"], one["now"])
@@ -122,7 +137,30 @@ def main() -> int:
     return int(share > MAY_SURVIVE or bool(gone))
 
 
-def _attack(todo: list[Mutant], attacked: dict[str, tuple[str, ...]], workers: int) -> list[Mutant]:
+def _attack_drawn(count: int, elsewhere: dict[str, list[str]], workers: int) -> int:
+    """Attack every room in turn, each bug in any of its files; its tests are those of the room."""
+    chosen = random.Random(SEED)
+    rooms: dict[str, list[Path]] = {}
+    for path in sorted((ROOT / "campaign").rglob("*.py")):
+        if len(parts := path.relative_to(ROOT / "campaign").parts) > 1:
+            rooms.setdefault(parts[0], []).append(path)
+    todo, attacked = [], {}
+    while len(todo) < count:
+        room = sorted(rooms)[len(todo) % len(rooms)]
+        path = chosen.choice(rooms[room])
+        file = path.relative_to(ROOT).as_posix()
+        if some := mutants(file, path.read_text(encoding="utf-8")):
+            todo.append(chosen.choice(some))
+            attacked[file] = tuple(elsewhere.get(room, [f"tests/{room}"]))
+    survivors = _attack(todo, attacked, workers, drawn=True)
+    _tell(todo, survivors, set())
+    return int(bool(survivors))
+
+
+def _attack(
+    todo: list[Mutant], attacked: dict[str, tuple[str, ...]], workers: int, *, drawn: bool = False
+) -> list[Mutant]:
+    """The survivors. `drawn`: rooms pass without a bug by `make test`; who noticed is told."""
     waiting: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
     survivors: list[Mutant] = []
     failed: list[BaseException] = []
@@ -131,14 +169,16 @@ def _attack(todo: list[Mutant], attacked: dict[str, tuple[str, ...]], workers: i
 
     def work(copy: Copy) -> None:
         try:
-            for tests in dict.fromkeys(attacked.values()):
+            for tests in dict.fromkeys(() if drawn else attacked.values()):
                 copy.baseline(tests)
             while not failed:
                 mutant = waiting.get_nowait()
-                if copy.survives(mutant, attacked[mutant.file]):
+                if survives := copy.survives(mutant, attacked[mutant.file]):
                     survivors.append(mutant)
+                if survives or drawn:
                     place = f"{mutant.file}:{mutant.line} {mutant.function}"
-                    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}", flush=True)
+                    noticed = "" if survives else f"\n    {copy.failed()}"
+                    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}{noticed}", flush=True)
                 if not waiting.qsize() % 100:
                     print(f"{waiting.qsize()} to go, {len(survivors)} survivors", flush=True)
         except queue.Empty:

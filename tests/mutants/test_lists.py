@@ -10,6 +10,7 @@ import pytest
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 ATTACKED: dict[str, list[str]] = tomllib.loads((HERE / "attacked.toml").read_text("utf-8"))
+ELSEWHERE = ATTACKED.pop("rooms")
 EQUIVALENTS: list[dict[str, str]] = tomllib.loads((HERE / "equivalents.toml").read_text("utf-8"))[
     "mutant"
 ]
