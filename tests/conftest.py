@@ -45,7 +45,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Two workers a core: tests of processes, archives and signals wait about half of their time."""
+    """Two a core: tests of processes, archives and pages wait half of their time."""
     return 2 * (os.cpu_count() or 1)
 
 

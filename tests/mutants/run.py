@@ -173,12 +173,11 @@ def _attack(
                 copy.baseline(tests)
             while not failed:
                 mutant = waiting.get_nowait()
-                if survives := copy.survives(mutant, attacked[mutant.file]):
+                if copy.survives(mutant, attacked[mutant.file]):
                     survivors.append(mutant)
-                if survives or drawn:
-                    place = f"{mutant.file}:{mutant.line} {mutant.function}"
-                    noticed = "" if survives else f"\n    {copy.failed()}"
-                    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}{noticed}", flush=True)
+                    _tell_one(mutant)
+                elif drawn:
+                    _tell_one(mutant, f"\n    {copy.failed()}")
                 if not waiting.qsize() % 100:
                     print(f"{waiting.qsize()} to go, {len(survivors)} survivors", flush=True)
         except queue.Empty:
@@ -198,6 +197,11 @@ def _attack(
     if failed:
         raise failed[0]
     return survivors
+
+
+def _tell_one(mutant: Mutant, noticed: str = "") -> None:
+    place = f"{mutant.file}:{mutant.line} {mutant.function}"
+    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}{noticed}", flush=True)
 
 
 def _tell(every: list[Mutant], survivors: list[Mutant], listed: set[tuple[str, ...]]) -> None:
