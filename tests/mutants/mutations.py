@@ -53,6 +53,10 @@ class Mutant:
     source: str
 
     @property
+    def place(self) -> str:
+        return f"{self.file}:{self.line} {self.function}"
+
+    @property
     def key(self) -> tuple[str, str, str, str]:
         return self.file, self.function, self.was, self.now
 

@@ -88,21 +88,21 @@ class Copy:
             raise SystemExit(f"without any bug these fail: {' '.join(tests)}\n{said}")
         self.patience[tests] = 10.0 + 5.0 * (time.monotonic() - begun)
 
-    def survives(self, mutant: Mutant, tests: tuple[str, ...]) -> bool:
-        """Whether the tests pass with this bug in place."""
+    def noticed(self, mutant: Mutant, tests: tuple[str, ...]) -> str:
+        """Which test fails with this bug in place, as pytest names it; nothing: it survives."""
+        if tests not in self.patience:
+            self.baseline(tests)
         file = self.root / mutant.file
         for stale in (file.parent / "__pycache__").glob(f"{file.stem}.*"):
             stale.unlink()
         before = file.read_bytes()
         file.write_text(mutant.source, encoding="utf-8")
         try:
-            return self.tests_pass(tests, self.patience.get(tests, PATIENCE))
+            return "" if self.tests_pass(tests, self.patience[tests]) else self._failed()
         finally:
             file.write_bytes(before)
 
-
-    def failed(self) -> str:
-        """The test that failed last, as pytest names it."""
+    def _failed(self) -> str:
         said = (self.root / SAID).read_text(encoding="utf-8", errors="replace").splitlines()
         return next((line for line in said if line.startswith(("FAILED", "ERROR"))), "no answer")
 
@@ -127,7 +127,8 @@ def main() -> int:
     }
     every = [m for f in attacked for m in mutants(f, (ROOT / f).read_text(encoding="utf-8"))]
     todo = [mutant for mutant in every if mutant.key not in listed]
-    survivors = _attack(todo, attacked, arguments.workers)
+    noticed = _attack(todo, attacked, arguments.workers, {})
+    survivors = [mutant for mutant, test in noticed.items() if not test]
     _tell(every, survivors, listed)
     gone = listed - {mutant.key for mutant in every}
     for key in sorted(gone):
@@ -152,34 +153,39 @@ def _attack_drawn(count: int, elsewhere: dict[str, list[str]], workers: int) -> 
         if some := mutants(file, path.read_text(encoding="utf-8")):
             todo.append(chosen.choice(some))
             attacked[file] = tuple(elsewhere.get(room, [f"tests/{room}"]))
-    survivors = _attack(todo, attacked, workers, drawn=True)
+    # `make test` says that all rooms pass without a bug.
+    noticed = _attack(todo, attacked, workers, dict.fromkeys(attacked.values(), PATIENCE))
+    print(*(f"{mutant.place}: {test}" for mutant, test in noticed.items() if test), sep="\n")
+    survivors = [mutant for mutant, test in noticed.items() if not test]
     _tell(todo, survivors, set())
     return int(bool(survivors))
 
 
 def _attack(
-    todo: list[Mutant], attacked: dict[str, tuple[str, ...]], workers: int, *, drawn: bool = False
-) -> list[Mutant]:
-    """The survivors. `drawn`: rooms pass without a bug by `make test`; who noticed is told."""
+    todo: list[Mutant],
+    attacked: dict[str, tuple[str, ...]],
+    workers: int,
+    patience: dict[tuple[str, ...], float],
+) -> dict[Mutant, str]:
+    """Which test noticed each bug; survivors are told at once.
+
+    `patience`: s, of tests that are known to pass without one.
+    """
     waiting: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
-    survivors: list[Mutant] = []
+    noticed: dict[Mutant, str] = {}
     failed: list[BaseException] = []
     for mutant in todo:
         waiting.put(mutant)
 
     def work(copy: Copy) -> None:
         try:
-            for tests in dict.fromkeys(() if drawn else attacked.values()):
-                copy.baseline(tests)
             while not failed:
                 mutant = waiting.get_nowait()
-                if copy.survives(mutant, attacked[mutant.file]):
-                    survivors.append(mutant)
-                    _tell_one(mutant)
-                elif drawn:
-                    _tell_one(mutant, f"\n    {copy.failed()}")
+                noticed[mutant] = copy.noticed(mutant, attacked[mutant.file])
+                if not noticed[mutant]:
+                    print(f"{mutant.place}\n    - {mutant.was}\n    + {mutant.now}", flush=True)
                 if not waiting.qsize() % 100:
-                    print(f"{waiting.qsize()} to go, {len(survivors)} survivors", flush=True)
+                    print(f"{waiting.qsize()} to go", flush=True)
         except queue.Empty:
             pass
         except BaseException as error:  # noqa: BLE001 - raised again below
@@ -190,18 +196,13 @@ def _attack(
         for number in range(workers):
             root = Path(folder).resolve() / str(number)
             shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
-            threads.append(threading.Thread(target=work, args=(Copy(root),)))
+            threads.append(threading.Thread(target=work, args=(Copy(root, dict(patience)),)))
             threads[-1].start()
         for thread in threads:
             thread.join()
     if failed:
         raise failed[0]
-    return survivors
-
-
-def _tell_one(mutant: Mutant, noticed: str = "") -> None:
-    place = f"{mutant.file}:{mutant.line} {mutant.function}"
-    print(f"{place}\n    - {mutant.was}\n    + {mutant.now}{noticed}", flush=True)
+    return noticed
 
 
 def _tell(every: list[Mutant], survivors: list[Mutant], listed: set[tuple[str, ...]]) -> None:
