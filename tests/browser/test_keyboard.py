@@ -14,7 +14,7 @@ PER_FIGURE = 3
 
 
 @pytest.mark.parametrize("name", ["usual", "long"])
-def test_any_figure_is_a_few_strokes_away(show, name):
+def test_figures_are_a_few_strokes_away_with_few_stops_and_focus_is_seen(show, name):
     page = show(name).page
     found = stops(page)
     places = page.evaluate(
@@ -24,11 +24,6 @@ def test_any_figure_is_a_few_strokes_away(show, name):
     assert places
     far = {place: count for place in places if (count := strokes(found, place)) > FEW}
     assert far == {}
-
-
-@pytest.mark.parametrize("name", ["usual", "long"])
-def test_a_figure_has_few_stops_and_focus_is_seen_everywhere(show, name):
-    found = stops(show(name).page)
     within = [stop.figure for stop in found if stop.figure >= 0]
     assert {n: within.count(n) for n in within if within.count(n) > PER_FIGURE} == {}
     assert [stop.what for stop in found if not stop.shown] == []
