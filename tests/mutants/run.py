@@ -39,7 +39,7 @@ SEED = 30
 SAID = "said-by-pytest.txt"
 MEMORY = 6 * 2**30
 """bytes; a bug may ask for any amount."""
-LEFT_OUT = (".*", "results", "build", "dist", "__pycache__", "*.egg-info")
+LEFT_OUT = shutil.ignore_patterns(".*", "build", "dist", "__pycache__", "*.egg-info")
 PYTEST = ("-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0", "--tb=no")
 
 
@@ -195,7 +195,7 @@ def _attack(
         threads = []
         for number in range(workers):
             root = Path(folder).resolve() / str(number)
-            shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
+            shutil.copytree(ROOT, root, ignore=_left_out)
             threads.append(threading.Thread(target=work, args=(Copy(root, dict(patience)),)))
             threads[-1].start()
         for thread in threads:
@@ -203,6 +203,11 @@ def _attack(
     if failed:
         raise failed[0]
     return noticed
+
+
+def _left_out(folder: str, names: list[str]) -> set[str]:
+    results = {"results"} if Path(folder) == ROOT else set()  # not `campaign/experiments/results`
+    return LEFT_OUT(folder, names) | results
 
 
 def _tell(every: list[Mutant], survivors: list[Mutant], listed: set[tuple[str, ...]]) -> None:
