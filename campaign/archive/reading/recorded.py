@@ -97,6 +97,26 @@ class RecordedSamples:
         return self.path, self.entry
 
 
+@dataclass(frozen=True)
+class HeldSamples(RecordedSamples):
+    """The same of a trial that has just ended, which need not be read from its file.
+
+    Attributes:
+        rows: time and every channel as they were written, shape (1 + channels, n).
+    """
+
+    rows: Array = field(kw_only=True, repr=False)
+
+    def _time(self) -> Array:
+        return self.rows[0]
+
+    def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
+        """From memory."""
+        places = {told.name: place for place, told in enumerate(self.record.channels, 1)}
+        for told in channels:
+            yield told.info.with_samples(self.rows[places[told.name]])
+
+
 class _Named(Protocol):
     """What an archive says of a channel besides its samples."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
@@ -29,7 +29,7 @@ from campaign.archive.layout.record import (
     trees_text,
 )
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.recorded import trial_of_record
+from campaign.archive.reading.recorded import HeldSamples, trial_of_record
 from campaign.archive.writing import hdf5
 from campaign.archive.writing.default_plot import Aim, beside
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
@@ -50,7 +50,7 @@ class FinishedFile:
     """A trial file that is whole and on the disk, under its real name.
 
     Attributes:
-        archived: the trial as the file has it.
+        archived: the trial as the file has it; a short recording is still in memory.
         sha256: of the file.
         record: digest of the trial's record.
     """
@@ -80,6 +80,7 @@ class TrialFile:
         self._columns: hdf5.SampleColumns | None = None
         self._preview = Preview()
         self._events: list[Event] = []
+        self._whole: Array | None = None  # a recording that was one chunk
         try:
             self._file = hdf5.create_file(self._part)
         except OSError as error:
@@ -150,7 +151,10 @@ class TrialFile:
             digest, size = sha256_of(self._part), self._part.stat().st_size
             publish(self._part, self._final)
         place = self._final, entry_name(self._trial.number), record, self._not_kept
-        return FinishedFile(trial_of_record(self._trial, *place), digest, size, record.sha256)
+        archived = trial_of_record(self._trial, *place)
+        if self._whole is not None and not self._not_kept:
+            archived = replace(archived, samples=HeldSamples(*place, rows=self._whole))
+        return FinishedFile(archived, digest, size, record.sha256)
 
     def discard(self) -> None:
         """Leave nothing of it. Never fails: what cannot be removed is no archive by its name."""
@@ -164,6 +168,7 @@ class TrialFile:
         if self._columns is None:
             return None, None
         rest, (time, *digests) = self._columns.finish()
+        self._whole = rest if rest.shape[1] == self._columns.length else None
         self._add_to_preview(rest)
         told = zip(self._channels, digests, strict=True)
         series = self._columns.length, time, [SeriesRecord.of(*both) for both in told]
