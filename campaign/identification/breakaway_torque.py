@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from campaign.estimate import Estimate
 from campaign.identification.autocorrelated import Array, FitErrors, errors_of
@@ -197,8 +198,10 @@ class _Fit:
     @property
     def peak_time(self) -> float:
         """When friction is largest (s)."""
-        tried = self.centre + self.half * np.linspace(-INNER, INNER, 1001)
-        return float(max(tried, key=lambda time: self.friction(time)[0]))
+        places = np.linspace(-INNER, INNER, 1001)
+        slopes = polynomial.polyval(places, polynomial.polyder(self.of_rate)) / self.half
+        friction = self.of_torque[1] * places - self.inertia * slopes
+        return self.centre + self.half * float(places[np.argmax(friction)])
 
     def _slope(self, time: float) -> Array:
         """Of each power of the polynomial (1/s)."""
