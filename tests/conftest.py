@@ -44,6 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
 
 
+@pytest.hookimpl(optionalhook=True)  # `make mutants` runs without xdist
 def pytest_xdist_auto_num_workers() -> int:
     """Two a core: tests of processes, archives and pages wait half of their time."""
     return 2 * (os.cpu_count() or 1)
