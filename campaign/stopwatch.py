@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
@@ -54,6 +54,9 @@ class Timing(Protocol):
     def add(self, work: Work, processor: float) -> None:
         """Processor time (s) that was spent on `work` beside all spans."""
 
+    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
+        """Another process of this run has spent that besides."""
+
 
 class Stopwatch:
     """Measures. Any thread may use it."""
@@ -63,6 +66,7 @@ class Stopwatch:
         self._thread = threading.local()
         self._lock = threading.Lock()
         self._spent: dict[Work, Spent] = {}
+        self._elsewhere = 0.0
 
     @contextmanager
     def span(self, work: Work) -> Iterator[None]:
@@ -90,9 +94,26 @@ class Stopwatch:
         with self._lock:
             self._spent.setdefault(work, Spent()).processor += processor
 
+    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
+        """See `Timing`."""
+        with self._lock:
+            for work, each in spent.items():
+                own = self._spent.setdefault(work, Spent())
+                own.others += each.main + each.others
+                own.processor += each.processor
+                self._elsewhere += each.processor
+
+    def taken(self) -> dict[Work, Spent]:
+        """What was measured since this was last asked, in this thread and all that have ended."""
+        self._begin(getattr(self._thread, "work", None))
+        with self._lock:
+            found, self._spent = self._spent, {}
+        return found
+
     def elapsed(self) -> tuple[float, float]:
-        """Seconds since it was made: on the clock, and of processors in this process."""
-        return time.perf_counter() - self._began[0], time.process_time() - self._began[1]
+        """Seconds since it was made: on the clock, and of this run's processors."""
+        used = time.process_time() - self._began[1] + self._elsewhere
+        return time.perf_counter() - self._began[0], used
 
     def spent(self) -> dict[Work, Spent]:
         """What was measured so far; of work under way, only what has ended or was interrupted."""
@@ -127,6 +148,9 @@ class Untimed:
         return items
 
     def add(self, work: Work, processor: float) -> None:
+        """See `Timing`."""
+
+    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
         """See `Timing`."""
 
 

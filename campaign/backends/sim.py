@@ -79,6 +79,10 @@ class SimBackend:
         self.timing: Timing = UNTIMED
         self.has_blocks = True
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """For another process: what it was told, and nothing of what it has worked out."""
+        return _again, (self._options, self._truths, self.has_blocks)
+
     def __enter__(self) -> SimBackend:
         return self
 
@@ -233,6 +237,13 @@ _NAMES = frozenset(channel.name for channel in CHANNELS)
 _MEASURED = frozenset(channel.name for channel in MEASURED)
 
 
+def _again(options: SimOptions, truths: Mapping[str, Tree], has_blocks: bool) -> SimBackend:
+    backend = SimBackend(options)
+    backend.simulate_instead(truths)
+    backend.has_blocks = has_blocks
+    return backend
+
+
 def _open(options: Options) -> SimBackend:
     return SimBackend(SimOptions.model_validate(options.model_dump(), context={"si": True}))
 
@@ -244,6 +255,7 @@ BACKEND = BackendKind(
     open=_open,
     source=Source.SIMULATION,
     several=True,
+    apart=True,
     simulates=True,
     needs=tuple(PURPOSES),
 )

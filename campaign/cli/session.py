@@ -28,6 +28,7 @@ from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
+from campaign.execution.crew import WORTHWHILE
 from campaign.execution.display import clock, progress_display
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
@@ -91,6 +92,12 @@ class Session:
     def source(self) -> RunReader | None:
         """The archived run that this one is made from, if any."""
         return self.repeats or archive_of(self.backend)
+
+    @property
+    def in_processes(self) -> bool:
+        """Whether that is worth while."""
+        several = self.kind.apart and self.workers > 1
+        return several and sum(1 for _ in self.left) >= WORTHWHILE
 
     @property
     def left(self) -> Iterator[Trial]:
@@ -216,6 +223,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
             measure=measuring,
             finished=session.finished,
+            in_processes=session.in_processes,
             stages=Stages(
                 session.stages,
                 session.trials,

@@ -14,7 +14,7 @@ from campaign.errors import ArchiveError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
-from campaign.execution.writer import PlanWriter, TrialWriter
+from campaign.execution.writer import Begins, TrialWriter
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.stopwatch import Work
 from campaign.trial import Trial
@@ -48,7 +48,7 @@ class Conditions:
     """
 
     backend: Backend
-    writer: PlanWriter
+    writer: Begins
     halted: Callable[[], bool]
     supervision: Supervision
     measure: Measure | None = None

@@ -8,22 +8,21 @@ last, and the archive says what happened.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from queue import SimpleQueue
 from types import MappingProxyType
 
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, KnowsCost
+from campaign.execution.attempt import Conditions
 from campaign.execution.attendance import UNATTENDED, Attendance
+from campaign.execution.crew import apart, threads
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
-from campaign.execution.sequence import Begin, TrialSequence
+from campaign.execution.sequence import TrialSequence
 from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
@@ -51,6 +50,7 @@ def run_plan(
     measure: Measure | None = None,
     finished: Mapping[int, Outcome] = _NOTHING,
     stages: Stages | None = None,
+    in_processes: bool = False,
 ) -> RunOutcome:
     """Execute `trials` in order on a connected backend and seal the archive.
 
@@ -65,6 +65,8 @@ def run_plan(
         measure: what a recording says by itself, to be archived with it; absent: nothing is.
         finished: trials of the plan that are not to be executed again, by number.
         stages: what may follow from the trials.
+        in_processes: whether the workers are processes: of a backend that can be handed to them,
+            with the experiments of this installation.
 
     Raises:
         NotSafeError: in place of any of the others, when the bench was not seen safe either.
@@ -87,17 +89,18 @@ def run_plan(
         stop,
         policy or Policy(),
         attendance,
-        supervision,
         stages,
-        measure,
+        live=supervision.live,
     )
+    conditions = Conditions(backend, writer, sequence.halted, supervision, measure)
+    crew = apart(workers, conditions, writer) if in_processes else threads(workers, conditions)
     with unsafe_first(ended):
         with (
             supervision.timing.span(Work.WAITING),
             safe_afterwards(backend, ended),
-            _threads(workers) as begin,
+            crew as at_work,
         ):
-            sequence.execute(begin)
+            sequence.execute(at_work)
         sequence.outside.look()  # it may have come after the last trial
         outside = sequence.outside.stop
         status, reason = _verdict(ledger, ended, stop, outside, stages)
@@ -106,27 +109,6 @@ def run_plan(
         if ended.bug:
             raise ended.bug
     return RunOutcome(status, reason, ended.safe_state, ledger.outcomes, ended.kept)
-
-
-@contextmanager
-def _threads(workers: int) -> Iterator[Begin]:
-    """What begins work in one of `workers` threads. None of them keeps the program from ending."""
-    waiting: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-
-    def serve() -> None:
-        while (work := waiting.get()) is not None:
-            work()
-
-    threads = [threading.Thread(target=serve, name="trial", daemon=True) for _ in range(workers)]
-    for thread in threads:
-        thread.start()
-    try:
-        yield waiting.put
-    finally:
-        for _ in threads:
-            waiting.put(None)
-    for thread in threads:
-        thread.join()  # nothing hangs: all trials have ended
 
 
 def _verdict(

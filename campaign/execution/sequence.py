@@ -1,27 +1,27 @@
 """The order of things during a run: trials, retries, rests, steps of the operator, stops.
 
-Decisions are made in one thread, between trials; only the trials themselves have threads of their
-own. Each decision is in the journal before it is acted upon.
+Decisions are made in one thread, between trials; only the trials themselves are executed elsewhere
+(`crew.py`). Each decision is in the journal before it is acted upon.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from queue import Empty, SimpleQueue
 
-from campaign.archive.reading.measured import Measure
+from campaign.archive.layout.journal import Entry
 from campaign.backends.interface import Backend
-from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
+from campaign.execution.attempt import Executed
 from campaign.execution.attendance import Attendance, SetUp
 from campaign.execution.batches import Batches
+from campaign.execution.crew import Crew, LostProcessError
 from campaign.execution.decisions import Responses, Rests
 from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
 from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
-from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
 from campaign.recording import Ending, Outcome, PanicStop, SafeState
@@ -31,9 +31,9 @@ LOOK = 1.0
 """s after which a display is told how far the running trials are."""
 ENDING = 10.0
 """s that the other trials may take to end when the run cannot go on."""
-Begin = Callable[[Callable[[], None]], None]
-"""Has a worker do something, and returns at once."""
-_Told = tuple[Trial, Executed]
+MOST_LOST = 3
+"""Processes that may end before the run does, which costs their trials' time."""
+_Told = tuple[Trial, Executed, Sequence[Entry]]
 
 
 class TrialSequence:
@@ -54,14 +54,14 @@ class TrialSequence:
         stop: StopSwitch,
         policy: Policy,
         attendance: Attendance,
-        supervision: Supervision,
         stages: Stages,
-        measure: Measure | None = None,
+        *,
+        live: bool,
     ) -> None:
         self._stages = stages
-        self._batches = Batches(trials, backend, workers, live=supervision.live)
-        self._workers = workers
-        self._running: set[Future[None]] = set()
+        self._batches = Batches(trials, backend, workers, live=live)
+        self._running: dict[Future[None], Sequence[Trial]] = {}
+        self._lost = 0
         self._under_way: dict[int, Trial] = {}
         self._news: SimpleQueue[_Told | Future[None]] = SimpleQueue()  # trials that ended, batches
         self._backend = backend
@@ -74,49 +74,29 @@ class TrialSequence:
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
-        self._conditions = Conditions(backend, writer, self._halted, supervision, measure)
         self._said: set[tuple[str, str]] = set()
 
-    def execute(self, begin: Begin) -> None:
-        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt."""
+    def execute(self, crew: Crew) -> None:
+        """Keep the crew busy. Raises what the archive raises, and KeyboardInterrupt."""
         try:
             while True:
-                while len(self._running) < self._workers and (batch := self._next()):
+                while len(self._running) < crew.at_once and (batch := self._next()):
                     for trial in batch:
                         self._ledger.begin(trial)
                         self._under_way[trial.number] = trial
-                    begin(self._work(batch))
+                    future = crew.begin(batch, lambda *told: self._news.put(told))
+                    self._running[future] = batch
+                    future.add_done_callback(self._news.put)
                 if not self._running:
                     break
                 self._hear()
+                if self.halted():
+                    crew.halt()
         except BaseException as error:
             self._fail("the run cannot go on")  # lets the other trials end
             if not isinstance(error, KeyboardInterrupt):
                 wait(self._running, timeout=ENDING)
             raise
-
-    def _work(self, batch: Sequence[Trial]) -> Callable[[], None]:
-        """What a thread does with a batch. It is running from now on."""
-        future: Future[None] = Future()
-        self._running.add(future)
-        future.add_done_callback(self._news.put)
-
-        def work() -> None:
-            try:
-                self._execute(batch)
-            except BaseException as error:  # noqa: BLE001 - from the archive, for `_hear`
-                future.set_exception(error)
-            else:
-                future.set_result(None)
-
-        return work
-
-    def _execute(self, batch: Sequence[Trial]) -> None:
-        """In a worker: what becomes of each trial is told as soon as it is archived."""
-        if len(batch) == 1:
-            self._news.put((batch[0], execute_once(batch[0], self._conditions)))
-        else:
-            execute_together(batch, self._conditions, lambda *told: self._news.put(told))
 
     def _hear(self) -> None:
         """Wait for news, and act on all there is."""
@@ -128,14 +108,31 @@ class TrialSequence:
         while not self._news.empty():
             news.append(self._news.get())
         told = [each for each in news if isinstance(each, tuple)]
-        for trial, executed in sorted(told, key=lambda each: each[0].number):
+        for trial, executed, entries in sorted(told, key=lambda each: each[0].number):
+            for entry in entries:
+                self._writer.note(entry)
             self._settle(trial, executed)
         for each in news:
             if isinstance(each, Future):
-                self._running.remove(each)
-                each.result()  # raises what it raised
+                batch = self._running.pop(each)
+                if isinstance(each.exception(), LostProcessError):
+                    self._begin_again(batch)
+                else:
+                    each.result()  # raises what it raised
 
-    def _halted(self) -> bool:
+    def _begin_again(self, batch: Sequence[Trial]) -> None:
+        """A process has died: its trials come next, those that had ended apart."""
+        self._lost += 1
+        again = [t for t in batch if self._under_way.pop(t.number, None) is not None]
+        names = f"{again[0].name} and {len(again) - 1} more" if again else "no trial"
+        self._writer.decision("process lost", f"it was executing {names}")
+        self._ledger.remark(f"a process of this run ended; {names} is executed again")
+        if self._lost > MOST_LOST:
+            self._fail("processes of this run end before their trials do: out of memory?")
+        self._batches.insert(again)
+
+    def halted(self) -> bool:
+        """Whether the run is to end."""
         return self._stop() or bool(self._ended.fault)
 
     def _fail(self, reason: str) -> None:
@@ -172,8 +169,8 @@ class TrialSequence:
                 self._ledger.remark(remark)
 
     def _is_over(self) -> bool:
-        """As `_halted`, between trials, when the bench can be asked as well."""
-        return self._halted() if self._running else self.outside() or self._halted()
+        """As `halted`, between trials, when the bench can be asked as well."""
+        return self.halted() if self._running else self.outside() or self.halted()
 
     def _stopped_outside(self, stop: PanicStop) -> None:
         reason = f"by {stop.by}, stop number {stop.count}"
@@ -199,10 +196,10 @@ class TrialSequence:
         if executed.gave_up:
             self._ended.bug = self._ended.bug or executed.bug
             self._fail(ending.reason)
-        elif ending.outcome is Outcome.INTERRUPTED and not self._halted():
+        elif ending.outcome is Outcome.INTERRUPTED and not self.halted():
             self.outside.look()
             self._stop.request(ending.reason or "the bench")  # somebody stands there
-        elif ending.safe_state is not SafeState.CONFIRMED and not self._halted():
+        elif ending.safe_state is not SafeState.CONFIRMED and not self.halted():
             self._make_safe(trial)
         if self._is_final(trial, ending):
             self._ledger.end(trial, ending)

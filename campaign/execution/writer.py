@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.journal import Entry
 from campaign.archive.reading.measured import Measure
 from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState
 from campaign.trial import Trial
@@ -33,15 +34,25 @@ class TrialWriter(Protocol):
         """
 
 
-class PlanWriter(Protocol):
+class Begins(Protocol):
+    """Opens a file for each attempt at a trial."""
+
+    def begin(self, trial: Trial) -> TrialWriter:
+        """Open the next attempt at a trial for its samples."""
+
+
+class PlanWriter(Begins, Protocol):
     """Takes the trials of a run; `begin` and what it returns may be used from several threads."""
 
     @property
     def folder(self) -> Path:
         """Where the run lies until it is sealed."""
 
-    def begin(self, trial: Trial) -> TrialWriter:
-        """Open the next attempt at a trial for its samples."""
+    def attempt(self, trial: Trial) -> int:
+        """Which one that is, from 1."""
+
+    def note(self, entry: Entry) -> None:
+        """Keep what another process tells of a trial that it has written. Raises ArchiveError."""
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
         """Note what the run did besides its plan. Raises ArchiveError."""

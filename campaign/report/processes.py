@@ -12,9 +12,6 @@ import gc
 import multiprocessing
 import os
 import pickle
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -24,6 +21,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from campaign import processes
 from campaign.archive import RunReader
 from campaign.archive.reading.heaps import known_heaps, told_of_heaps
 from campaign.trial import Tree
@@ -52,9 +50,9 @@ def begin_early(path: Path) -> None:
 
     A guess that was wrong costs a moment of another core, and none where there is but one.
     """
-    method, _ = _context()
+    processes.context(PRELOADED)
     large = path.is_file() and path.stat().st_size >= LARGE
-    if large and method == "forkserver" and (os.cpu_count() or 1) > 1:
+    if large and processes.METHOD == "forkserver" and (os.cpu_count() or 1) > 1:
         from multiprocessing import forkserver  # which is not everywhere
 
         forkserver.ensure_running()
@@ -147,28 +145,27 @@ def _result(future: Future[Any]) -> Any:
 
 
 @contextmanager
-def workers(run: RunReader, processes: int, *, measure_anew: bool = False) -> Iterator[Workers]:
+def workers(run: RunReader, count: int, *, measure_anew: bool = False) -> Iterator[Workers]:
     """So many processes, for as long as the block lasts; fewer than two are none.
 
     They begin to analyse at once.
     """
-    if processes < 2:
+    if count < 2:
         yield Workers(run, measure_anew=measure_anew)
         return
-    with _pool(run, processes) as pool:
+    with _pool(run, count) as pool:
         at_work = Workers(run, pool, measure_anew)
         _ = at_work.found
         yield at_work
 
 
 @contextmanager
-def _pool(run: RunReader, processes: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(run: RunReader, count: int) -> Iterator[ProcessPoolExecutor]:
     """Processes that have the run open; when the block is left early, they are ended."""
-    _, context = _context()
     others = set(multiprocessing.active_children())
     # What was read and checked here is handed over: reading it again takes ten times as long.
     handed = pickle.dumps((run, known_heaps()), pickle.HIGHEST_PROTOCOL)
-    pool = ProcessPoolExecutor(processes, context, _begin, (handed,))
+    pool = ProcessPoolExecutor(count, processes.context(PRELOADED), _begin, (handed,))
     try:
         yield pool
     except BaseException:  # Ctrl-C: nobody waits for an analysis that nobody wants
@@ -179,38 +176,17 @@ def _pool(run: RunReader, processes: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _context() -> tuple[str, Any]:
-    """How processes are begun here. Not by fork: this process has threads, and whatever they hold
-    would stay locked.
-    """
-    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    context = multiprocessing.get_context(method)
-    context.set_forkserver_preload(list(PRELOADED))
-    return method, context
-
-
 _run: RunReader | None = None
 """Of a process of the pool: the run that it works on."""
 
 
 def _begin(handed: bytes) -> None:
-    """Ctrl-C is for the process that asked, which ends this one; it ends with that one, too."""
     global _run
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.stdout = sys.stderr  # what a plug-in prints
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    processes.begin_here()
     gc.set_threshold(*SELDOM)
     _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
     told_of_heaps(heaps)
     gc.freeze()
-
-
-def _end_with_parent() -> None:
-    """A process of a pool would wait for its next task for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _find(test: Tree, measure_anew: bool) -> Found:

@@ -108,7 +108,8 @@ class HeldSamples(RecordedSamples):
     rows: Array = field(kw_only=True, repr=False)
 
     def _time(self) -> Array:
-        return self.rows[0]
+        time: Array = self.rows[0]
+        return time
 
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
         """From memory."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,32 @@ if TYPE_CHECKING:
     from campaign.archive.writing.trial_file import TrialFile
 
 Array = NDArray[np.float64]
+
+
+class FolderWriter:
+    """Writes trials into the folder of a run whose journal another process has.
+
+    Args:
+        folder: of the run.
+        attempts: how often each trial is executed with this one, by number.
+    """
+
+    def __init__(self, folder: Path, attempts: Mapping[int, int], timing: Timing = UNTIMED) -> None:
+        self._folder = folder
+        self._attempts = attempts
+        self._timing = timing
+        self._entries: list[Entry] = []
+
+    def begin(self, trial: Trial) -> TrialWriter:
+        """As `RunWriter.begin`."""
+        note, attempt = self._entries.append, self._attempts[trial.number]
+        return TrialWriter.open(self._folder, trial, attempt, note, self._timing)
+
+    def taken(self) -> tuple[Entry, ...]:
+        """What the journal is to say, since this was last asked."""
+        taken = tuple(self._entries)
+        self._entries.clear()
+        return taken
 
 
 class TrialWriter:
@@ -47,6 +74,23 @@ class TrialWriter:
         self._timing = timing
         self._open = True
         self._kept: tuple[TrialFinished, ArchivedTrial] | None = None
+
+    @classmethod
+    def open(
+        cls,
+        folder: Path,
+        trial: Trial,
+        attempt: int,
+        note: Callable[[Entry], None],
+        timing: Timing,
+        not_kept: str = "",
+    ) -> Self:
+        """Begin the trial's file in the folder of its run; see `RunWriter.begin`."""
+        from campaign.archive.writing.trial_file import TrialFile
+
+        with timing.span(Work.TRIAL_FILES):
+            file = TrialFile(folder, trial, attempt, not_kept)
+        return cls(trial, attempt, file, note, timing)
 
     @property
     def attempt(self) -> int:

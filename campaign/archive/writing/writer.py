@@ -156,27 +156,27 @@ class RunWriter:
         A trial is executed by one thread at a time. `not_kept` says why its samples are not to be
         kept: their digests are, and all else that there is to say of it.
         """
-        from campaign.archive.writing.trial_file import TrialFile
-
-        with self._lock:
-            last = self._last.get(trial.number)
-        attempt = last.attempt + 1 if last else 1
-        with self.timing.span(Work.TRIAL_FILES):
-            file = TrialFile(self._folder, trial, attempt, not_kept)
-        writer = TrialWriter(trial, attempt, file, self._note, self.timing)
+        attempt, note = self.attempt(trial), self.note
+        writer = TrialWriter.open(self._folder, trial, attempt, note, self.timing, not_kept)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
         return writer
+
+    def attempt(self, trial: Trial) -> int:
+        """Which one the next attempt at `trial` is, from 1."""
+        with self._lock:
+            last = self._last.get(trial.number)
+        return last.attempt + 1 if last else 1
 
     def decision(
         self, decision: str, reason: str, trial: int | None = None, *, at: str = ""
     ) -> None:
         """Note what the run does besides its plan; `at` is now unless it is given."""
-        self._note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
+        self.note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
 
     def trials_followed(self, followed: TrialsFollowed) -> None:
         """Note which trials follow from others, before the first of them is begun."""
-        self._note(followed)
+        self.note(followed)
 
     def archived(self, number: int) -> ArchivedTrial:
         """The last finished attempt at a trial of this run, read from its file, with its metrics.
@@ -193,7 +193,7 @@ class RunWriter:
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
         """Note what a person was asked to do before `trial`, and the answer."""
-        self._note(OperatorStep(at=at or utc_now(), trial=trial, step=step, answer=answer))
+        self.note(OperatorStep(at=at or utc_now(), trial=trial, step=step, answer=answer))
 
     def seal(
         self,
@@ -212,7 +212,7 @@ class RunWriter:
         """
         try:
             self._abandon_open(ended)
-            self._note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
+            self.note(RunEnded(at=ended, status=status, reason=reason, safe_state=safe_state))
             self._journal.close()
             with self.timing.span(Work.SEALING):
                 return self._shown.with_name(self._sealer.seal().name)
@@ -231,7 +231,8 @@ class RunWriter:
         for writer in writers:
             writer.abandon(at, "the run ended")
 
-    def _note(self, entry: Entry) -> None:
+    def note(self, entry: Entry) -> None:
+        """Put a line into the journal; of a finished trial its file is on the disk."""
         self._journal.append(entry)
         if isinstance(entry, TrialFinished):
             with self._lock:

@@ -1,0 +1,37 @@
+"""Processes that work for this one: how they are begun, and how they end with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterable
+from multiprocessing.context import BaseContext
+
+METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+"""How processes are begun here. Not by fork: this process has threads, and whatever they hold would
+stay locked."""
+
+
+def context(preloaded: Iterable[str]) -> BaseContext:
+    """What begins processes. `preloaded`: modules that are imported once for all of them."""
+    found = multiprocessing.get_context(METHOD)
+    found.set_forkserver_preload(list(preloaded))
+    return found
+
+
+def begin_here() -> None:
+    """To be called first in a process: Ctrl-C is for the one that began it, with which it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout = sys.stderr  # what a plug-in prints
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A process of a pool would wait for its next task for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
