@@ -65,7 +65,15 @@ class Crew(Protocol):
 
 
 class LostProcessError(Exception):
-    """A process died; of its trials those that nobody was told of are to be executed again."""
+    """A process died; of its trials those that nobody was told of are to be executed again.
+
+    Attributes:
+        times: how often that has happened in this run.
+    """
+
+    def __init__(self, times: int) -> None:
+        super().__init__(f"a process that executes trials has died, {times} times in this run")
+        self.times = times
 
 
 @dataclass
@@ -166,19 +174,21 @@ class Processes:
         self._context = processes.context(PRELOADED)
         self._halted = self._context.Event()
         self._pool: ProcessPoolExecutor | None = None
+        self._losing = threading.Lock()
+        self._times = 0  # that it was lost
         self._others = set(multiprocessing.active_children())
 
     def begin(self, batch: Sequence[Trial], tell: Tell) -> Future[None]:
         """See `Crew`."""
         future: Future[None] = Future()
         attempts = {trial.number: self._writer.attempt(trial) for trial in batch}
-        self._pool = self._pool or self._begun()
+        pool = self._pool = self._pool or self._begun()
         try:
-            done = self._pool.submit(_execute, batch, attempts)
+            done = pool.submit(_execute, batch, attempts)
         except BrokenProcessPool:
-            self._lost(future)
+            self._lose(pool, future)
         else:
-            done.add_done_callback(partial(self._ended, {t.number: t for t in batch}, tell, future))
+            done.add_done_callback(partial(self._ended, pool, batch, tell, future))
         return future
 
     def halt(self) -> None:
@@ -209,28 +219,39 @@ class Processes:
         return ProcessPoolExecutor(self._count, self._context, _begin, told)
 
     def _ended(
-        self, batch: Mapping[int, Trial], tell: Tell, future: Future[None], done: Future[_Done]
+        self,
+        pool: ProcessPoolExecutor,
+        batch: Sequence[Trial],
+        tell: Tell,
+        future: Future[None],
+        done: Future[_Done],
     ) -> None:
         """In a thread of the pool."""
         try:
             found = done.result()
         except BrokenProcessPool:
-            self._lost(future)
+            self._lose(pool, future)
             return
         except BaseException as error:  # noqa: BLE001 - a bug, for whoever waits
             future.set_exception(error)
             return
+        trials = {trial.number: trial for trial in batch}
         for number, executed, entries in found.told:
-            tell(batch[number], executed, entries)
+            tell(trials[number], executed, entries)
         self._conditions.supervision.timing.spent_elsewhere(found.spent)
         if found.error is None:
             future.set_result(None)
         else:
             future.set_exception(found.error)
 
-    def _lost(self, future: Future[None]) -> None:
-        self._pool = None
-        future.set_exception(LostProcessError("a process that executes trials ended"))
+    def _lose(self, pool: ProcessPoolExecutor, future: Future[None]) -> None:
+        """The death of one process ends the pool, and all that it has been given."""
+        with self._losing:
+            if self._pool is pool:
+                self._pool = None
+                self._times += 1
+            times = self._times
+        future.set_exception(LostProcessError(times))
 
 
 @contextmanager

@@ -27,12 +27,12 @@ from campaign.policy import Policy
 from campaign.recording import Ending, Outcome, PanicStop, SafeState
 from campaign.trial import Trial
 
-LOOK = 1.0
-"""s after which a display is told how far the running trials are."""
+LOOK = 0.25
+"""s after which a display is told how far the running trials are, and a crew that the run ends."""
 ENDING = 10.0
 """s that the other trials may take to end when the run cannot go on."""
 MOST_LOST = 3
-"""Processes that may end before the run does, which costs their trials' time."""
+"""times that a process may die: what it does to others may be its trials' own doing."""
 _Told = tuple[Trial, Executed, Sequence[Entry]]
 
 
@@ -61,7 +61,6 @@ class TrialSequence:
         self._stages = stages
         self._batches = Batches(trials, backend, workers, live=live)
         self._running: dict[Future[None], Sequence[Trial]] = {}
-        self._lost = 0
         self._under_way: dict[int, Trial] = {}
         self._news: SimpleQueue[_Told | Future[None]] = SimpleQueue()  # trials that ended, batches
         self._backend = backend
@@ -108,27 +107,27 @@ class TrialSequence:
         while not self._news.empty():
             news.append(self._news.get())
         told = [each for each in news if isinstance(each, tuple)]
-        for trial, executed, entries in sorted(told, key=lambda each: each[0].number):
-            for entry in entries:
-                self._writer.note(entry)
+        told.sort(key=lambda each: each[0].number)
+        if entries := [entry for each in told for entry in each[2]]:
+            self._writer.note(*entries)  # before anybody is told
+        for trial, executed, _ in told:
             self._settle(trial, executed)
         for each in news:
             if isinstance(each, Future):
                 batch = self._running.pop(each)
-                if isinstance(each.exception(), LostProcessError):
-                    self._begin_again(batch)
+                if isinstance(error := each.exception(), LostProcessError):
+                    self._begin_again(batch, error)
                 else:
                     each.result()  # raises what it raised
 
-    def _begin_again(self, batch: Sequence[Trial]) -> None:
-        """A process has died: its trials come next, those that had ended apart."""
-        self._lost += 1
+    def _begin_again(self, batch: Sequence[Trial], error: LostProcessError) -> None:
+        """Its trials come next, those that had ended apart."""
         again = [t for t in batch if self._under_way.pop(t.number, None) is not None]
         names = f"{again[0].name} and {len(again) - 1} more" if again else "no trial"
-        self._writer.decision("process lost", f"it was executing {names}")
-        self._ledger.remark(f"a process of this run ended; {names} is executed again")
-        if self._lost > MOST_LOST:
-            self._fail("processes of this run end before their trials do: out of memory?")
+        self._writer.decision("process lost", f"{error}; again come {names}")
+        self._ledger.remark(f"{error}; again come {names}")
+        if error.times > MOST_LOST:
+            self._fail(f"{error}: out of memory? `--workers 1` needs less")
         self._batches.insert(again)
 
     def halted(self) -> bool:

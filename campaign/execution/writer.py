@@ -51,8 +51,8 @@ class PlanWriter(Begins, Protocol):
     def attempt(self, trial: Trial) -> int:
         """Which one that is, from 1."""
 
-    def note(self, entry: Entry) -> None:
-        """Keep what another process tells of a trial that it has written. Raises ArchiveError."""
+    def note(self, *entries: Entry) -> None:
+        """Keep what processes tell of trials that they have written. Raises ArchiveError."""
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
         """Note what the run did besides its plan. Raises ArchiveError."""

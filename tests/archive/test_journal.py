@@ -248,7 +248,7 @@ def test_half_a_line_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     journal.append(STARTED)
     before, write = path.read_bytes(), os.write
     monkeypatch.setattr(os, "write", lambda where, data: write(where, data[: len(data) - 1]))
-    with pytest.raises(ArchiveError, match="no space for a whole line"):
+    with pytest.raises(ArchiveError, match="no space for whole lines"):
         journal.append(finished(1))
     monkeypatch.undo()
     assert path.read_bytes() == before

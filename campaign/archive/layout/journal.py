@@ -218,15 +218,16 @@ class Journal:
             os.ftruncate(self._descriptor, whole)
             os.fsync(self._descriptor)
 
-    def append(self, entry: Entry) -> None:
-        """Add one line. Raises ArchiveError, leaving the journal as it was, when that fails."""
-        line = canonical_json(entry.model_dump(mode="json")).encode() + b"\n"
+    def append(self, *entries: Entry) -> None:
+        """Add a line for each. Raises ArchiveError, leaving all as it was, when that fails."""
+        texts = [canonical_json(entry.model_dump(mode="json")) for entry in entries]
+        lines = "".join(f"{text}\n" for text in texts).encode()
         with self._lock:
             before = os.fstat(self._descriptor).st_size
             try:
-                written = os.write(self._descriptor, line)
-                if written < len(line):
-                    raise OSError("no space for a whole line")
+                written = os.write(self._descriptor, lines)
+                if written < len(lines):
+                    raise OSError("no space for whole lines")
                 os.fsync(self._descriptor)
             except OSError as error:
                 os.ftruncate(self._descriptor, before)

@@ -231,15 +231,16 @@ class RunWriter:
         for writer in writers:
             writer.abandon(at, "the run ended")
 
-    def note(self, entry: Entry) -> None:
-        """Put a line into the journal; of a finished trial its file is on the disk."""
-        self._journal.append(entry)
-        if isinstance(entry, TrialFinished):
-            with self._lock:
-                self._last[entry.trial] = entry
-                self._sealer.add(entry)
-            with self.timing.span(Work.SEALING):
-                self._sealer.advance()
-        elif isinstance(entry, TrialMeasured):
-            with self._lock:
-                self._measured[entry.record] = entry
+    def note(self, *entries: Entry) -> None:
+        """Put lines into the journal, all or none; of a finished trial its file is on the disk."""
+        self._journal.append(*entries)
+        for entry in entries:
+            if isinstance(entry, TrialFinished):
+                with self._lock:
+                    self._last[entry.trial] = entry
+                    self._sealer.add(entry)
+                with self.timing.span(Work.SEALING):
+                    self._sealer.advance()
+            elif isinstance(entry, TrialMeasured):
+                with self._lock:
+                    self._measured[entry.record] = entry

@@ -1,0 +1,236 @@
+"""Trials in processes: the archive that threads make, whoever stops them, dies or hangs."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.journal import JOURNAL, Decision
+from campaign.backends.sim import SimBackend, SimOptions
+from campaign.errors import ArchiveError
+from campaign.execution.attempt import Conditions
+from campaign.execution.crew import Processes, apart
+from campaign.execution.measuring import Measuring
+from campaign.execution.outcome import RunOutcome
+from campaign.execution.progress import Progress
+from campaign.execution.runner import run_plan
+from campaign.execution.stop import StopSwitch
+from campaign.execution.supervision import Supervision
+from campaign.experiments import experiments
+from campaign.protocol import Plan
+from campaign.recording import Outcome
+from tests.archives import plan_of
+from tests.system.user import environment
+
+PROTOCOL = """
+title = "Drawn"
+
+[[test]]
+name = "sea"
+kind = "stabilization"
+bench = "simulink"
+seed = 5
+frequency = "2 Hz"
+acceleration = "18 deg/s^2"
+settle_cycles = 1
+cycles = 1
+repeat = 12
+
+[test.matrix]
+compensation = ["none", "lugre", "static"]
+"""
+TRIALS = 36
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    return plan_of(tmp_path_factory.mktemp("plan"), PROTOCOL)
+
+
+def run(
+    plan: Plan,
+    folder: Path,
+    *,
+    in_processes: bool = True,
+    display: Callable[[Progress], object] = lambda progress: None,
+    stop: StopSwitch | None = None,
+    writer: RunWriter | None = None,
+) -> RunOutcome:
+    header = RunHeader(name="run", created="2026-11-21T09:36:58Z", trials=len(plan.trials))
+    writer = writer or RunWriter.create(folder, header, plan.trials)
+    with closing(writer), SimBackend(SimOptions()) as backend:
+        return run_plan(
+            plan.trials,
+            backend,
+            writer,
+            workers=2,
+            display=display,
+            stop=stop or StopSwitch(),
+            measure=Measuring(experiments()),
+            finished={n: o for n, o in writer.finished.items() if o is Outcome.COMPLETED},
+            in_processes=in_processes,
+        )
+
+
+@pytest.fixture(scope="module")
+def by_threads(plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> RunReader:
+    return open_run(run(plan, tmp_path_factory.mktemp("threads"), in_processes=False).archive)
+
+
+def told(trial: ArchivedTrial) -> object:
+    """All that an archive has of a trial but when it was executed."""
+    samples = {name: c.samples.tobytes() for name, c in trial.recording().channels.items()}
+    return trial.trial.fingerprint, trial.ending, samples, trial.estimates, trial.measured_by
+
+
+def assert_same(archive: Path, expected: RunReader) -> None:
+    found = open_run(archive)
+    assert [told(trial) for trial in found.trials] == [told(trial) for trial in expected.trials]
+    assert not found.damaged
+
+
+def test_processes_archive_what_threads_archive(
+    plan: Plan, by_threads: RunReader, tmp_path: Path
+) -> None:
+    """Nobody is told of a trial before the journal has it."""
+    assert by_threads.trials[0].estimates
+    journal = tmp_path / "run.partial" / JOURNAL
+
+    def display(progress: Progress) -> None:
+        if not progress.closing:
+            lines = journal.read_text(encoding="utf-8").splitlines()
+            assert progress.done <= sum('"trial finished"' in line for line in lines)
+
+    outcome = run(plan, tmp_path, display=display)
+    assert outcome.status is RunStatus.COMPLETE
+    assert_same(outcome.archive, by_threads)
+    assert not multiprocessing.active_children()
+
+
+def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
+    plan: Plan, by_threads: RunReader, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    halt, halts = Processes.halt, []
+    monkeypatch.setattr(Processes, "halt", lambda crew: halts.append(halt(crew)))
+    stop = StopSwitch()
+
+    def display(progress: Progress) -> None:
+        if progress.done:
+            stop.request("somebody")
+
+    outcome = run(plan, tmp_path, display=display, stop=stop)
+    assert outcome.status is RunStatus.INTERRUPTED
+    assert halts
+    assert len(open_run(outcome.archive).trials) < TRIALS
+    writer = RunWriter.resume(
+        outcome.archive, at="2026-11-21T10:00:00Z", host={}, versions={}, command=()
+    )
+    outcome = run(plan, tmp_path, writer=writer, in_processes=False)
+    assert_same(outcome.archive, by_threads)
+
+
+def test_what_is_under_way_in_processes_ends_when_the_crew_is_halted(
+    plan: Plan, tmp_path: Path
+) -> None:
+    header = RunHeader(name="run", created="2026-11-21T09:36:58Z", trials=len(plan.trials))
+    told: list[Outcome] = []
+    with closing(RunWriter.create(tmp_path, header, plan.trials)) as writer:
+        conditions = Conditions(SimBackend(SimOptions()), writer, lambda: False, Supervision())
+        with apart(1, conditions, writer) as crew:
+            crew.halt()
+            crew.begin(
+                plan.trials[:1], lambda trial, done, _: told.append(done.ending.outcome)
+            ).result()
+    assert told == [Outcome.INTERRUPTED]
+
+
+def kill_one() -> None:
+    """The first process that works for this one."""
+    children = [c for c in multiprocessing.active_children() if c.pid]
+    os.kill(children[0].pid or 0, signal.SIGKILL)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_process_that_is_killed_costs_time(
+    plan: Plan, by_threads: RunReader, tmp_path: Path
+) -> None:
+    left = [kill_one]
+
+    def display(progress: Progress) -> None:
+        if progress.done and left:
+            left.pop()()
+
+    outcome = run(plan, tmp_path, display=display)
+    assert outcome.status is RunStatus.COMPLETE
+    assert_same(outcome.archive, by_threads)
+    decisions = open_run(outcome.archive).story.all(Decision)
+    assert [each.decision for each in decisions] == ["process lost"] * len(decisions)
+    assert decisions
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_processes_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> None:
+    def display(progress: Progress) -> None:
+        if multiprocessing.active_children():
+            kill_one()
+
+    outcome = run(plan, tmp_path, display=display)
+    assert outcome.status is RunStatus.FAULT
+    assert "out of memory?" in outcome.reason
+
+
+def test_a_folder_that_is_taken_away_ends_the_run(plan: Plan, tmp_path: Path) -> None:
+    def display(progress: Progress) -> None:
+        if progress.done:
+            shutil.rmtree(tmp_path / "results", ignore_errors=True)
+
+    with pytest.raises(ArchiveError, match="is gone"):
+        run(plan, tmp_path / "results", display=display)
+    assert not multiprocessing.active_children()
+
+
+ALONE = """
+import sys
+from pathlib import Path
+from tests.archives import plan_of
+from tests.execution.test_crew import PROTOCOL, run
+
+def display(progress):
+    if progress.done:
+        print("under way", flush=True)
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    run(plan_of(folder, PROTOCOL), folder / "results", display=display)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_processes_end_with_a_run_that_is_killed_and_it_goes_on(
+    plan: Plan, by_threads: RunReader, tmp_path: Path
+) -> None:
+    (tmp_path / "alone.py").write_text(ALONE, encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "alone.py"), str(tmp_path)]
+    root = str(Path(__file__).parents[2])
+    path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+    with subprocess.Popen(
+        command, env=environment() | {"PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout
+        assert process.stdout.readline()
+        process.kill()
+        process.stdout.read()  # to its end: nobody has it open any more
+    [folder] = (tmp_path / "results").glob("*.partial")
+    writer = RunWriter.resume(folder, at="2026-11-21T10:00:00Z", host={}, versions={}, command=())
+    outcome = run(plan, tmp_path, writer=writer, in_processes=False)
+    assert_same(outcome.archive, by_threads)
