@@ -22,6 +22,25 @@ def context(preloaded: Iterable[str]) -> BaseContext:
     return found
 
 
+def begin_early(preloaded: Iterable[str]) -> None:
+    """Have what processes need imported meanwhile; where nothing can be done early, do nothing."""
+    context(preloaded)
+    if METHOD != "forkserver":
+        return
+    from multiprocessing import forkserver, resource_tracker  # which are not everywhere
+
+    before = os.environ.get("PYTHONWARNINGS")
+    # Who leaves at once leaves semaphores, which the tracker removes: nobody need be told.
+    os.environ["PYTHONWARNINGS"] = "ignore:resource_tracker"
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        del os.environ["PYTHONWARNINGS"]
+        if before is not None:
+            os.environ["PYTHONWARNINGS"] = before
+    forkserver.ensure_running()
+
+
 def begin_here() -> None:
     """To be called first in a process: Ctrl-C is for the one that began it, with which it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

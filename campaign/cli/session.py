@@ -28,7 +28,7 @@ from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
-from campaign.execution.crew import WORTHWHILE
+from campaign.execution.crew import PRELOADED, WORTHWHILE
 from campaign.execution.display import clock, progress_display
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
@@ -48,6 +48,7 @@ from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
+from campaign.processes import begin_early
 from campaign.protocol import PlannedStage
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
@@ -92,12 +93,6 @@ class Session:
     def source(self) -> RunReader | None:
         """The archived run that this one is made from, if any."""
         return self.repeats or archive_of(self.backend)
-
-    @property
-    def in_processes(self) -> bool:
-        """Whether that is worth while."""
-        several = self.kind.apart and self.workers > 1
-        return several and sum(1 for _ in self.left) >= WORTHWHILE
 
     @property
     def left(self) -> Iterator[Trial]:
@@ -223,7 +218,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
             measure=measuring,
             finished=session.finished,
-            in_processes=session.in_processes,
+            in_processes=in_processes(session.kind, session.workers, sum(1 for _ in session.left)),
             stages=Stages(
                 session.stages,
                 session.trials,
@@ -238,7 +233,10 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
 
 
 def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
-    """How many trials at once: what was asked for, else what backend and machine allow."""
+    """How many trials at once: what was asked for, else what backend and machine allow.
+
+    Where they are processes, what these need is imported from now on.
+    """
     if not kind.several:
         if wanted is not None and wanted > 1:
             raise UsageError(
@@ -246,7 +244,15 @@ def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
                 f"leave --workers {wanted} out"
             )
         return 1
-    return min(wanted or os.cpu_count() or 1, max(1, trials))
+    workers = min(wanted or os.cpu_count() or 1, max(1, trials))
+    if in_processes(kind, workers, trials):
+        begin_early(PRELOADED)
+    return workers
+
+
+def in_processes(kind: BackendKind, workers: int, trials: int) -> bool:
+    """Whether the workers are processes: where they take less time than they cost to begin."""
+    return kind.apart and workers > 1 and trials >= WORTHWHILE
 
 
 def say_outcome(outcome: RunOutcome, elapsed: float) -> None:

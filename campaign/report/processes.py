@@ -50,12 +50,9 @@ def begin_early(path: Path) -> None:
 
     A guess that was wrong costs a moment of another core, and none where there is but one.
     """
-    processes.context(PRELOADED)
     large = path.is_file() and path.stat().st_size >= LARGE
-    if large and processes.METHOD == "forkserver" and (os.cpu_count() or 1) > 1:
-        from multiprocessing import forkserver  # which is not everywhere
-
-        forkserver.ensure_running()
+    if large and (os.cpu_count() or 1) > 1:
+        processes.begin_early(PRELOADED)
 
 
 SELDOM = 100_000, 50, 50
