@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import sys
 
-from campaign import interrupts
+from campaign import garbage, interrupts
 
 
 def main() -> None:
     """Run the command line."""
     interrupts.listen()
+    garbage.seldom()
     # pydantic looks into every installed package for plug-ins of its own, and a broken one ends it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:

@@ -10,6 +10,8 @@ import threading
 from collections.abc import Iterable
 from multiprocessing.context import BaseContext
 
+from campaign import garbage
+
 METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 """How processes are begun here. Not by fork: this process has threads, and whatever they hold would
 stay locked."""
@@ -44,6 +46,7 @@ def begin_early(preloaded: Iterable[str]) -> None:
 def begin_here() -> None:
     """To be called first in a process: Ctrl-C is for the one that began it, with which it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    garbage.seldom()
     sys.stdout = sys.stderr  # what a plug-in prints
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

@@ -20,7 +20,6 @@ from campaign.report.processes import (
     Workers,
     begin_early,
     choose_processes,
-    seldom_collecting,
     workers,
 )
 
@@ -33,7 +32,6 @@ LISTED = 4
 
 
 @unwinding()
-@seldom_collecting()
 def report_run(
     name: str | None,
     results: Path,

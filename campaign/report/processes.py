@@ -55,24 +55,6 @@ def begin_early(path: Path) -> None:
         processes.begin_early(PRELOADED)
 
 
-SELDOM = 100_000, 50, 50
-"""When garbage is looked for, as `gc.set_threshold` has it."""
-
-
-@contextmanager
-def seldom_collecting() -> Iterator[None]:
-    """Look for garbage less often: a run's trials are a million objects, and none of them is any.
-
-    Cycles are still found, a hundred thousand objects later.
-    """
-    before = gc.get_threshold()
-    gc.set_threshold(*SELDOM)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
 @dataclass
 class Workers:
     """Processes that have a run open; none of them, and all is done where it is needed.
@@ -180,7 +162,6 @@ _run: RunReader | None = None
 def _begin(handed: bytes) -> None:
     global _run
     processes.begin_here()
-    gc.set_threshold(*SELDOM)
     _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
     told_of_heaps(heaps)
     gc.freeze()

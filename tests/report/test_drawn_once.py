@@ -1,6 +1,5 @@
 """What drawing costs is done once: the picture, the renderer, the thinning out of lines."""
 
-import gc
 from itertools import pairwise
 
 import matplotlib.backends.backend_svg as backend
@@ -12,7 +11,6 @@ from matplotlib.figure import Figure as Canvas
 from campaign.report.drawing.decimate import kept
 from campaign.report.drawing.figures import canvas, draw
 from campaign.report.drawing.settled import settled
-from campaign.report.processes import seldom_collecting
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 X, Y = Axis("x", "s"), Axis("y", "rad")
@@ -99,18 +97,3 @@ def test_each_stretch_keeps_the_first_of_its_extremes(points: int) -> None:
     y[random.random(2000) < 0.2] = np.inf
     y[700:1100] = -np.inf
     assert kept(x, y, points).tolist() == slowly_kept(x, y, points)
-
-
-def test_garbage_is_looked_for_as_before_when_the_report_is_done() -> None:
-    before = gc.get_threshold()
-    within: list[tuple[int, int, int]] = []
-
-    @seldom_collecting()
-    def fail() -> None:
-        within.append(gc.get_threshold())
-        raise KeyError
-
-    with pytest.raises(KeyError):
-        fail()
-    assert within[0] > before
-    assert gc.get_threshold() == before

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign import garbage
 from campaign.archive.layout.results import results_path
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
@@ -197,7 +198,7 @@ def test_a_process_seldom_looks_for_garbage() -> None:
     signals = signal.getsignal(signal.SIGINT)
     try:
         processes._begin(pickle.dumps((None, {})))
-        assert gc.get_threshold() == processes.SELDOM
+        assert gc.get_threshold() == garbage.SELDOM
     finally:
         gc.set_threshold(*before)
         gc.unfreeze()
