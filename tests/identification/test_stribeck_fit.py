@@ -119,7 +119,12 @@ MANY = pytest.mark.statistics
 
 @pytest.mark.parametrize(
     ("slowest", "count"),
-    [(0.035, 40), pytest.param(0.035, 400, marks=MANY), pytest.param(0.04, 400, marks=MANY)],
+    [
+        (0.035, 20),
+        (0.04, 15),
+        pytest.param(0.035, 400, marks=MANY),
+        pytest.param(0.04, 400, marks=MANY),
+    ],
 )
 def test_static_torque_of_maps_that_begin_above_vs_holds_where_it_is_told(
     slowest: float, count: int
@@ -134,7 +139,7 @@ def test_static_torque_of_maps_that_begin_above_vs_holds_where_it_is_told(
             assert one.low is not None
             assert one.high is not None
             told.append(one.low <= TRUE["static_torque"] <= one.high)
-    assert len(told) >= 9
+    assert len(told) > count / 40
     assert not rejected({"static_torque": told}, "less")
 
 

@@ -62,7 +62,7 @@ def modes(best: BestLinear) -> tuple[Mode, Mode]:
     ("benches", "realisations", "friction"),
     [
         (40, 1, 0.0),
-        (20, 3, 0.0),
+        (40, 3, 0.0),
         (40, 1, 0.03),
     ],
 )
