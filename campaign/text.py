@@ -1,7 +1,8 @@
-"""Numbers and units as people read them."""
+"""Numbers, units and names as people read them."""
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -165,3 +166,10 @@ def path_words(path: str) -> str:
         if parts[0] in _SAID_BY_THE_FIELD and len(parts) > 2:
             parts = parts[1:]
     return words_here(" ".join(" ".join(parts).replace("_", " ").split()))
+
+
+def nearest(word: object, names: Iterable[str]) -> str:
+    """What to append to a message when `word` looks like a slip for one of `names`."""
+    known = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.6)
+    return f"; did you mean {known[close[0]]!r}?" if close else ""

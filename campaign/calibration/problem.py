@@ -21,9 +21,10 @@ from campaign.physics.known import number_at
 from campaign.protocol import Protocol
 from campaign.protocol.calibration import Calibration, CalibrationOptions, CalibrationParameter
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, find_faults, nearest, shown
+from campaign.protocol.problems import allowed, find_faults, shown
 from campaign.protocol.schema import Test
 from campaign.published.values import Cell, Published
+from campaign.text import nearest
 from campaign.units import Quantity, split_quantity
 
 MANY_PARAMETERS = 12

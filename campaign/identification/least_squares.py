@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,11 +101,14 @@ def minimum(
             break
         part = jacobian[:, free]
         square = part.T @ part
-        scale = np.diag(np.maximum(np.diag(square), 1e-30 * max(float(np.trace(square)), 1e-300)))
+        diagonal = square.diagonal()
+        scale = np.maximum(diagonal, 1e-30 * max(float(diagonal.sum()), 1e-300))
+        descent = -gradient[free]
         while damping < 1e12:
-            step = np.zeros_like(point)
-            step[free] = np.linalg.solve(square + damping * scale, -gradient[free])
-            new = np.clip(point + step, lower, upper)
+            damped, new = square.copy(), point.copy()
+            damped.ravel()[:: len(free) + 1] += damping * scale
+            new[free] += np.linalg.solve(damped, descent)
+            new = np.minimum(np.maximum(new, lower), upper)
             new_residuals, new_jacobian = function(new)
             new_cost = float(new_residuals @ new_residuals)
             if new_cost <= cost:
@@ -139,6 +143,7 @@ def profile_limit(
     """
     from scipy.optimize import brentq
 
+    cost_at = cache(cost_at)  # the ends are asked for by the search between them again
     bottom = cost_at(start)
     inner, outer = start, start + step
     for _ in range(60):

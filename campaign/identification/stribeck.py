@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,31 +147,37 @@ class Problem:
         slope = level / float(speed.max())
         return cls(speed, torque, deviation, np.array(lower), np.array(upper), level, slope)
 
-    @property
+    @cached_property
+    def log_speed(self) -> Array:
+        """Its natural logarithm, shape (n,)."""
+        return np.log(self.speed)
+
+    @cached_property
+    def weight(self) -> Array:
+        """One over the deviation (1/(N m)), shape (n,)."""
+        return 1.0 / self.deviation
+
+    @cached_property
     def scale(self) -> Array:
         """By which the linear elements of the vector are multiplied, shape (3,)."""
         return np.array([self.slope, self.level, self.level])
 
     def __call__(self, vector: Array) -> tuple[Array, Array]:
         """Weighted residuals (n,) and their Jacobian (n, 5), as `minimum` wants them."""
-        viscous, coulomb, static = vector[:3] * self.scale
-        delta = np.exp(vector[4])
-        power = np.exp(delta * (np.log(self.speed) - vector[3]))
+        viscous, coulomb, static = (vector[:3] * self.scale).tolist()
+        delta = float(np.exp(vector[4]))
+        power = np.exp(delta * (self.log_speed - vector[3]))
         fall = np.exp(-power)
         model = coulomb + (static - coulomb) * fall + viscous * self.speed
         bend = (static - coulomb) * fall * power
-        jacobian = np.stack(
-            [
-                self.slope * self.speed,
-                self.level * (1.0 - fall),
-                self.level * fall,
-                bend * delta,
-                -bend * np.log(np.maximum(power, 1e-300)),
-            ],
-            axis=1,
-        )
-        weight = 1.0 / self.deviation
-        return (model - self.torque) * weight, jacobian * weight[:, None]
+        jacobian = np.empty((len(fall), len(PARAMETERS)))
+        jacobian[:, 0] = self.slope * self.speed
+        jacobian[:, 1] = self.level * (1.0 - fall)
+        jacobian[:, 2] = self.level * fall
+        jacobian[:, 3] = bend * delta
+        jacobian[:, 4] = -bend * np.log(np.maximum(power, 1e-300))
+        jacobian *= self.weight[:, None]
+        return (model - self.torque) * self.weight, jacobian
 
     def values(self, vector: Array) -> dict[str, float]:
         """Parameters by name (SI)."""

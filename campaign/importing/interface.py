@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.errors import Problem, UsageError
-from campaign.protocol.problems import nearest
+from campaign.text import nearest
 
 Array = NDArray[np.float64]
 HEAD = 1 << 16

@@ -17,7 +17,8 @@ from campaign.importing.defects import CHANNEL_KINDS
 from campaign.options import Options, spelled
 from campaign.protocol.files import Origin, Within
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import Fault, allowed, nearest, shown, validate
+from campaign.protocol.problems import Fault, allowed, shown, validate
+from campaign.text import nearest
 from campaign.units import Frequency, Time
 
 TIME = "time"

@@ -18,7 +18,7 @@ from campaign.importing.described import Cells, ClockUsed
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import Array, Column, RecordingError, Table
 from campaign.importing.mapping import ColumnPlace
-from campaign.protocol.problems import nearest
+from campaign.text import nearest
 
 NAMED = 12
 """columns that a message lists."""

@@ -25,8 +25,9 @@ from campaign.importing.opened import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Origin, Within
-from campaign.protocol.problems import allowed, nearest, shown
+from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import ExperimentKind, Protocol, Test
+from campaign.text import nearest
 from campaign.trial import Offered, Task, TrialRequest
 from campaign.units import to_si
 

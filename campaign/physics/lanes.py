@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,9 +113,7 @@ class Lane:
             g=g,
             h=h,
             inputs=_inputs(task, grid),
-            friction=tuple(
-                Interface.of(each, 1.0, bench, moves) for each in bench.friction.values()
-            ),
+            friction=_plant(bench, moves=moves),
             compensation=tuple(
                 Interface.of(each, gain, bench, moves and not grid.per_control and jumps(each))
                 for each, gain in compensator.friction
@@ -168,6 +166,18 @@ class Lanes:
     memory: Memory
     random: tuple[np.random.Generator, ...]
 
+    def anew(self, friction: Mapping[str, Any]) -> Lanes:
+        """A single prescribed motion before its first step, with other friction."""
+        (trial,) = self.trials
+        bench = as_it_is(trial.bench.with_friction(friction), trial.seed)
+        lane = replace(trial, bench=bench, friction=_plant(bench, moves=False))
+        return replace(
+            self,
+            trials=(lane,),
+            friction=plant_elements([lane.friction], [lane.grid.step], [_rate_at_start(lane)]),
+            memory=_memory([lane], self.controller),
+        )
+
     def signals(self, at: Array) -> Array:
         """The inputs over the step grid `at` (steps + 1,), shape (inputs, steps + 1, width)."""
         inputs = self.trials[0].inputs
@@ -213,6 +223,11 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
         memory=_memory(lanes, controller),
         random=tuple(np.random.Generator(np.random.PCG64(trial.seed)) for trial in trials),
     )
+
+
+def _plant(bench: CompleteBench, *, moves: bool) -> tuple[Interface, ...]:
+    """Its friction; `moves`: there is a plant, so that the engine solves for what is dry."""
+    return tuple(Interface.of(each, 1.0, bench, moves) for each in bench.friction.values())
 
 
 def _loop(

@@ -6,7 +6,8 @@ the bit, what they are when it is simulated alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +18,11 @@ from campaign.physics.grid import Grid, make_grid
 from campaign.physics.lanes import Lane, Lanes, together
 from campaign.physics.loop import Array
 from campaign.physics.prescribed import drive_block, drive_one
-from campaign.physics.rows import OUTPUTS
+from campaign.physics.rows import OUT_FRICTION, OUTPUTS
 from campaign.physics.vector import LANES
 from campaign.trial import Task
 
-__all__ = ["make_grid", "simulate", "simulate_together"]
+__all__ = ["FrictionAlong", "make_grid", "simulate", "simulate_together"]
 
 STRETCH_STEPS = 20_000
 """Steps of a trial between two looks at limits and stops."""
@@ -53,7 +54,7 @@ def simulate_together(
         stretch = samples_at_a_time(grid, alone=alone)
     for first in range(0, longest, stretch):
         count = min(stretch, longest - first)
-        at: Array = (first * grid.every + np.arange(count * grid.every + 1.0)) * grid.step
+        at = _steps(grid, first, count)
         out = zeros(len(OUTPUTS), count, lanes.width)
         _advance(lanes, trials[0].prescribed, alone, at, grid.every, out)
         # n / rate, not n steps: whoever knows the rate has the same times to the bit.
@@ -61,6 +62,39 @@ def simulate_together(
         left = (max(0, min(count, trial.grid.samples - first)) for trial in trials)
         by_trial = np.ascontiguousarray(out.transpose(2, 0, 1))
         yield time, tuple(by_trial[k, :, :n] for k, n in enumerate(left))
+
+
+class FrictionAlong:
+    """A prescribed motion, made ready once for friction that meets it again and again."""
+
+    def __init__(self, bench: CompleteBench, task: Task, longest_step: float) -> None:
+        """Raises ValueError when the task's rates do not fit the bench's."""
+        lane = Lane.of(bench, task, 1, longest_step)
+        self._lanes, self._every = together([lane], 1), lane.grid.every
+        stretch = samples_at_a_time(lane.grid, alone=True)
+        self._stretches: list[tuple[int, Array]] = []
+        for first in range(0, lane.grid.samples, stretch):
+            count = min(stretch, lane.grid.samples - first)
+            (rates,) = self._lanes.signals(_steps(lane.grid, first, count))
+            self._stretches.append((count, rates))
+
+    def of(self, friction: Mapping[str, Any]) -> Array:
+        """Friction torque (N m, or N), shape (samples,), as `simulate` of the bench with it."""
+        lanes = self._lanes.anew(friction)
+        parts = []
+        for count, rates in self._stretches:
+            out = zeros(len(OUTPUTS), count, 1)
+            drive_one(
+                lanes.friction, lanes.compensation, lanes.memory, rates,
+                lanes.system.step, self._every, out,
+            )  # fmt: skip
+            parts.append(out[OUT_FRICTION, :, 0])
+        return np.concatenate(parts)
+
+
+def _steps(grid: Grid, first: int, count: int) -> Array:
+    """Times (s) of the step grid over so many samples, shape (steps + 1,)."""
+    return np.asarray((first * grid.every + np.arange(count * grid.every + 1.0)) * grid.step)
 
 
 def samples_at_a_time(grid: Grid, *, alone: bool) -> int:

@@ -20,9 +20,10 @@ from campaign.protocol.matrix import (
     make_range,
 )
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, find_faults, nearest, shown, validate
+from campaign.protocol.problems import allowed, find_faults, shown, validate
 from campaign.protocol.schema import Test, TestEntry, replaced
 from campaign.protocol.shapes import Shape
+from campaign.text import nearest
 
 
 def make_axis(

@@ -23,8 +23,9 @@ from campaign.protocol.files import (
 from campaign.protocol.matrix import flatten
 from campaign.protocol.overrides import Override
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, nearest, shown, validate
+from campaign.protocol.problems import allowed, shown, validate
 from campaign.protocol.schema import ProtocolFile, replaced
+from campaign.text import nearest
 
 DEEPEST_INCLUDE = 16
 MOST_FILES = 256

@@ -8,9 +8,10 @@ from pathlib import Path
 from campaign.errors import Problem, UsageError
 from campaign.physics.known import KnownOptions
 from campaign.protocol.files import Origin, UnreadableError, looked_for, read_text
-from campaign.protocol.problems import nearest, shown
+from campaign.protocol.problems import shown
 from campaign.published.patterns import covers
 from campaign.published.values import THESIS, Published, read_published, thesis
+from campaign.text import nearest
 
 
 def cell_problems(

@@ -40,7 +40,7 @@ from campaign.protocol.operator import operator_problems
 from campaign.protocol.overrides import Override, parse_overrides
 from campaign.protocol.points import PointError, points_of
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, nearest, shown, validate
+from campaign.protocol.problems import allowed, shown, validate
 from campaign.protocol.schema import (
     Check,
     CheckEntry,
@@ -53,6 +53,7 @@ from campaign.protocol.schema import (
     split_entry,
 )
 from campaign.protocol.truth_file import Truths
+from campaign.text import nearest
 
 
 def load_protocol(

@@ -14,9 +14,10 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.protocol.points import Point
 from campaign.protocol.positions import Keys
-from campaign.protocol.problems import allowed, nearest, shown
+from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import OperatorEntry, Test
 from campaign.protocol.shapes import shape_at
+from campaign.text import nearest
 from campaign.units import convert
 
 

@@ -30,9 +30,10 @@ from campaign.protocol.expand import (
 from campaign.protocol.lacking import not_predicted
 from campaign.protocol.matrix import LARGEST_PLAN, count_points
 from campaign.protocol.points import PointError, incomplete, points_of
-from campaign.protocol.problems import allowed, nearest, shown
+from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import Protocol, Test
 from campaign.protocol.stages import PlannedStage, most_of
+from campaign.text import nearest
 from campaign.trial import Most, Task, Tree, Trial, canonical_json
 
 STRUCTURE = 32_000

@@ -5,7 +5,6 @@ A message says what stands there, what is allowed, and the nearest valid name fo
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -19,6 +18,7 @@ from campaign.errors import Problem
 from campaign.protocol.files import Origin
 from campaign.protocol.positions import Aim, Keys
 from campaign.protocol.shapes import Shape, from_location, shape_at
+from campaign.text import nearest
 
 Model = TypeVar("Model", bound=BaseModel)
 Fault = tuple[Keys, Aim, str]
@@ -50,13 +50,6 @@ def find_faults(
             if not faults:
                 return valid
     return _once_per_place(faults)
-
-
-def nearest(word: object, names: Iterable[str]) -> str:
-    """What to append to a message when `word` looks like a slip for one of `names`."""
-    known = {name.lower(): name for name in names}
-    close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.6)
-    return f"; did you mean {known[close[0]]!r}?" if close else ""
 
 
 def allowed(names: Iterable[str]) -> str:

@@ -21,7 +21,8 @@ from campaign.protocol.files import (
 )
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Aim, Keys
-from campaign.protocol.problems import allowed, nearest, shown, validate
+from campaign.protocol.problems import allowed, shown, validate
+from campaign.text import nearest
 from campaign.trial import Tree
 
 

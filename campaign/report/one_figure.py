@@ -12,10 +12,11 @@ from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
-from campaign.protocol.problems import allowed, nearest
+from campaign.protocol.problems import allowed
 from campaign.report.content.document import document_of
 from campaign.report.page.damage_notice import told_on_page
 from campaign.report.page.layout import lay_out
+from campaign.text import nearest
 
 WRITTEN = ".campaign-figures"
 """Of a folder of figures: SHA-256 and name of each file that was written there, a line each."""

@@ -65,8 +65,8 @@ kind = "stabilization"
 bench = "bench.toml"
 reproduces = ["A.1"]
 acceleration = "2 rad/s^2"
-cycles = 3
-settle_cycles = 3
+cycles = 2
+settle_cycles = 1
 matrix = { frequency = ["1 Hz", "3 Hz", "6 Hz", "10 Hz"] }
 [calibration]
 bench = "bench.toml"

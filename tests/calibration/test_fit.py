@@ -30,7 +30,6 @@ def run(path: Path, workers: int = 1, leave_out: bool = False) -> CalibrationOut
     )
 
 
-@pytest.mark.slow
 def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
     outcome = run(write(tmp_path), leave_out=True)
     inertia, viscous = outcome.values
@@ -56,7 +55,6 @@ def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
     assert result["leave_one_out"]["worst_deviation_percent"] < 1
 
 
-@pytest.mark.slow
 def test_disagreeing_cells_widen_the_intervals_and_spoil_predictions(tmp_path: Path) -> None:
     scale = (1.1, 0.9, 1.1, 0.9)
     outcome = run(write(tmp_path, published=table(scale)), leave_out=True)

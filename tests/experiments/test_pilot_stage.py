@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from campaign.estimate import Estimate
 from campaign.experiments.friction_map.choice import choose
 from campaign.experiments.friction_map.pilot import (
     FEWEST,
@@ -26,7 +27,7 @@ from campaign.experiments.friction_map.runs import (
     run_requests,
     settled_angle,
 )
-from campaign.experiments.interface import TestData
+from campaign.experiments.interface import TestData, measured
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.velocity_map import EXPERIMENT
 from campaign.physics.bench import Bench
@@ -82,6 +83,18 @@ def numbered(
     ]  # fmt: skip
 
 
+def measured_once(done: Iterable[Done]) -> tuple[Done, ...]:
+    """With what each recording says by itself, as a run has it when a trial has ended."""
+    return tuple(replace(item, estimates=_of(item)) for item in done)
+
+
+def _of(item: Done) -> tuple[Estimate, ...]:
+    try:
+        return tuple(measured(EXPERIMENT, item))
+    except ValueError:  # it says nothing
+        return ()
+
+
 def asked(case: Case, options: PilotedMapOptions, done: tuple[Done, ...]) -> list[TrialRequest]:
     return list(STAGE.trials(options, case.stated, TestData("map", "velocity_map", {}, done)))
 
@@ -89,11 +102,11 @@ def asked(case: Case, options: PilotedMapOptions, done: tuple[Done, ...]) -> lis
 def run(case: Case, draw: int = 0, **written: object) -> Piloted:
     options, _ = fitted("velocity_map", case.stated, **written)
     first = numbered(case, options, EXPERIMENT.trials(options, case.stated), 1, draw)
-    pilot = laboratory.execute(case, first)
+    pilot = measured_once(laboratory.execute(case, first))
     if not options.pilot:
         return Piloted(options, pilot, ())
     then = numbered(case, options, asked(case, options, pilot), len(pilot) + 1, draw)
-    return Piloted(options, pilot, laboratory.execute(case, then))
+    return Piloted(options, pilot, measured_once(laboratory.execute(case, then)))
 
 
 @cache
@@ -181,7 +194,9 @@ def test_what_is_found_holds_the_truth(soft: Piloted) -> None:
 
 def test_a_bias_of_the_gyro_is_not_taken_for_motion(soft: Piloted) -> None:
     """0.01 deg/s adds up to 0.3 deg in half a minute, as much as the memory itself."""
-    biased = tuple(replace(item, samples=shifted(item.samples, 0.01 * DEG)) for item in soft.pilot)
+    biased = measured_once(
+        replace(item, samples=shifted(item.samples, 0.01 * DEG)) for item in soft.pilot
+    )
     plain, other = (
         choose(soft.options, make_case(SOFT).stated, each).options for each in (soft.pilot, biased)
     )

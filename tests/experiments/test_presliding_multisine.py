@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -126,24 +127,49 @@ def test_the_assumed_damping_stands_beside_the_measured_one() -> None:
     assert mark.y == pytest.approx(1.6 * math.sqrt(AT_REST * 35.0), rel=2e-3)
 
 
+AXIS = load_bench("linear")
+LEAD = 2.0 * math.pi / 0.01  # rad/m
+TRUTHS = {
+    "stiffness_at_rest": 2e6 + 5.0 * LEAD**2,
+    "damping_at_rest": 3150.0 + 0.01 * LEAD**2,
+    "inertia": 27.9,
+}
+
+
+def short_runs(seed: int) -> Result:
+    """Noise of the axis' current is as large as the torque, and its loop holds the command."""
+    sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
+    with speaking_of(AXIS.sides):
+        return analyse(KIND, execute(trials(KIND, AXIS, {**sizes, "periods": 4, "seed": seed})))
+
+
+def held(row: Mapping[str, Any]) -> int:
+    """How many intervals hold the truth."""
+    intervals = {name: row[name].combined for name in TRUTHS}
+    return sum(low <= TRUTHS[name] <= high for name, (low, high) in intervals.items())
+
+
+def assert_narrow(result: Result) -> None:
+    for name, truth in TRUTHS.items():
+        assert joint(result)[name].half_width < 0.08 * truth, name
+
+
+# Of 12 intervals of 95 %, 9 or fewer would be a chance of 1 in 50.
+
+
 @pytest.mark.slow
 def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals() -> None:
-    """Noise of its current is as large as the torque, and its loop holds the command."""
-    axis, held = load_bench("linear"), 0
-    lead = 2.0 * math.pi / 0.01  # rad/m
-    truths = {
-        "stiffness_at_rest": 2e6 + 5.0 * lead**2,
-        "damping_at_rest": 3150.0 + 0.01 * lead**2,
-        "inertia": 27.9,
-    }
-    sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
-    for seed in range(1, 5):
-        options = {**sizes, "periods": 4, "seed": seed}
-        with speaking_of(axis.sides):
-            row = joint(analyse(KIND, execute(trials(KIND, axis, options))))
-        for name, truth in truths.items():
-            low, high = row[name].combined
-            held += low <= truth <= high
-            assert row[name].half_width < 0.08 * truth, name
-    # Of 12 intervals of 95 %, 9 or fewer would be a chance of 1 in 50.
-    assert held > 9
+    """Of each amplitude, and of all; intervals of half the width hold 8."""
+    result = short_runs(3)
+    assert_narrow(result)
+    rows = result.tables[0].rows
+    assert len(rows) == 4
+    assert sum(map(held, rows)) > 9
+
+
+@pytest.mark.statistics
+def test_intervals_of_all_amplitudes_hold_in_several_short_runs() -> None:
+    several = [short_runs(seed) for seed in range(1, 5)]
+    for result in several:
+        assert_narrow(result)
+    assert sum(held(joint(result)) for result in several) > 9

@@ -477,7 +477,7 @@ def moved(rig: Rig, filtering: Filtering) -> Moved:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [8, pytest.param(24, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [4, pytest.param(24, marks=pytest.mark.statistics)])
 def test_intervals_hold_on_rigs_of_all_sizes(count: int) -> None:
     """Of 100 other rigs 96 to 99 % hold, each coefficient for itself, and 95 % of the delays."""
     held: dict[str, list[bool]] = {}

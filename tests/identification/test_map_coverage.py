@@ -106,7 +106,7 @@ def held_of(case: str, count: int, seed: int) -> dict[str, list[bool]]:
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_sample_of_intervals_holds(case: str) -> None:
-    assert rejected(held_of(case, 60, 1001)) == {}
+    assert rejected(held_of(case, 30, 1001)) == {}
 
 
 @pytest.mark.statistics
@@ -162,7 +162,7 @@ def held_with_ripple(count: int, seed: int, amplitudes: tuple[float, ...]) -> di
 
 
 def test_a_sample_holds_with_ripple() -> None:
-    assert rejected(held_with_ripple(25, 31, (0.005, 0.02))) == {}
+    assert rejected(held_with_ripple(15, 31, (0.005, 0.02))) == {}
 
 
 @pytest.mark.statistics
@@ -191,7 +191,7 @@ def held_nominal(count: int, seed: int, together: float) -> dict[str, list[bool]
 
 @pytest.mark.parametrize("together", [0.0, 0.9])
 def test_a_sample_of_nominal_values_holds(together: float) -> None:
-    assert rejected(held_nominal(60, 77, together)) == {}
+    assert rejected(held_nominal(30, 77, together)) == {}
 
 
 @pytest.mark.statistics
@@ -319,7 +319,7 @@ def coulomb_at_zero(coulomb: float, count: int, seed: int) -> dict[str, list[boo
     return held
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(100, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.statistics)])
 def test_a_coulomb_torque_that_the_map_does_not_tell_has_no_limit(count: int) -> None:
     """25.3 N m or 0 with forty times the viscous friction: the curves are the same there."""
     held = coulomb_at_zero(25.3, count, 43)
@@ -384,7 +384,7 @@ def hides_nothing(told: dict[str, Random16]) -> None:
 
 
 def test_a_sample_of_random_maps_hides_nothing() -> None:
-    hides_nothing(random_maps(60, 700))
+    hides_nothing(random_maps(40, 700))
 
 
 @pytest.mark.statistics

@@ -183,7 +183,7 @@ def rubbing(commands: Sequence[Signal], duration: float) -> Answer:
     torques = np.array([each.sample(half) for each in commands])
     steps = FINE // 4
     rates = with_coulomb(
-        DRIVE, 1.0, lambda time: torques[:, round(time * 2 * steps)], count // 4, steps
+        [DRIVE], 1.0, lambda time: torques[:, round(time * 2 * steps)], count // 4, steps
     )
     rates += 1e-4 * np.random.default_rng(5).standard_normal(rates.shape)
     left = iter(np.repeat(rates, 4, axis=1))

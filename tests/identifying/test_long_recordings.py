@@ -121,7 +121,7 @@ def test_of_a_long_motion_the_parts_that_slide_slowly_are_among_those_fitted(
 
 @pytest.mark.slow
 def test_every_model_and_every_fit_of_it_is_told_as_it_begins() -> None:
-    rig = random_rigs(1, seed=4, seconds=6.0)[0]
+    rig = random_rigs(1, seed=4, seconds=3.0)[0]
     filtering = Filtering(20.0, 10)
     motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
     pieces = [Moved(1, motion, None)]

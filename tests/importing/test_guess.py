@@ -30,15 +30,23 @@ def made(folder: Path, wild: Wild) -> Path:
     return folder / wild.name
 
 
+@pytest.fixture(scope="module")
+def guesses(tmp_path_factory):
+    """Of each file by its number, made when it is first asked for; and their folder."""
+    folder = tmp_path_factory.mktemp("wild")
+    return cache(lambda number: guess([made(folder, wild_files()[number])])), folder
+
+
 def test_there_are_forty_of_them():
     assert len(FILES) == len({wild.name for wild in wild_files()}) == len(wild_files())
 
 
 @pytest.mark.slow
-def test_nine_of_ten_roles_are_right(tmp_path):
+def test_nine_of_ten_roles_are_right(guesses):
+    guessed, _ = guesses
     right, wrong = 0, []
-    for wild in wild_files():
-        for table in guess([made(tmp_path, wild)]):
+    for number, wild in enumerate(wild_files()):
+        for table in guessed(number):
             for column in table.columns:
                 is_role, _ = wild.columns[column.name]
                 if column.role in is_role.split("|"):
@@ -49,11 +57,11 @@ def test_nine_of_ten_roles_are_right(tmp_path):
 
 
 @pytest.mark.parametrize("number", FILES)
-def test_no_unit_that_stands_plainly_is_wrong(tmp_path, number):
+def test_no_unit_that_stands_plainly_is_wrong(guesses, number):
     """Judged by the text, as its reader has it."""
-    wild = wild_files()[number]
-    found = guess([made(tmp_path, wild)])
-    told = tomllib.loads(mapping_text(found, tmp_path))
+    guessed, folder = guesses
+    wild, found = wild_files()[number], guessed(number)
+    told = tomllib.loads(mapping_text(found, folder))
     assert {each["columns"] for test in told["test"] for each in test["recording"]} >= set(
         told.get("columns", {})
     )

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import pickle
+import shutil
 import signal
 from pathlib import Path
 
@@ -35,6 +36,24 @@ def report(run: Path, output: Path, *formats: str, **options: object) -> Path:
     page, code = report_run(str(run), run.parent, output, templates, **more)
     assert code == ExitCode.DONE
     return page.parent
+
+
+@pytest.fixture(scope="module")
+def made(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report with Markdown; to be copied, not changed."""
+    return report(run, tmp_path_factory.mktemp("made") / "out", "markdown")
+
+
+@pytest.fixture(scope="module")
+def made_alone(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report without another format; to be copied, not changed."""
+    return report(run, tmp_path_factory.mktemp("alone") / "out")
+
+
+@pytest.fixture
+def earlier(made: Path, tmp_path: Path) -> Path:
+    """An earlier report with Markdown, in `out`."""
+    return Path(shutil.copytree(made, tmp_path / "out"))
 
 
 def names(folder: Path) -> set[str]:
@@ -83,24 +102,25 @@ def test_pages_of_another_run_do_not_stay(run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["[]", "{", '{"run": 3}', '{"run": NAME, "formats": [1]}'])
-def test_notes_that_make_no_sense_are_none(run: Path, tmp_path: Path, text: str) -> None:
-    folder = report(run, tmp_path / "out")
+def test_notes_that_make_no_sense_are_none(
+    run: Path, made_alone: Path, tmp_path: Path, text: str
+) -> None:
+    folder = Path(shutil.copytree(made_alone, tmp_path / "out"))
     (folder / MADE).write_text(text.replace("NAME", f'"{run.stem}"'), encoding="utf-8")
     assert "report.md" not in names(report(run, tmp_path / "out"))
 
 
 def test_a_format_of_before_that_cannot_be_made_costs_itself(
     run: Path,
-    tmp_path: Path,
+    earlier: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     def lacking(names: list[str]) -> None:
         raise UsageError("it needs what is not here")
 
-    report(run, tmp_path / "out", "markdown")
     monkeypatch.setattr("campaign.report.made_before.chosen_formats", lacking)
-    folder = report(run, tmp_path / "out")
+    folder = report(run, earlier)
     assert "report.md" not in names(folder)  # it would be of the older report
     told = "markdown, which the earlier report had, is left out: it needs what is not here"
     assert capsys.readouterr().err.count(told) == 1
@@ -179,18 +199,16 @@ def test_a_report_that_fails_leaves_older_results(run: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("note", [b"\xff\xfe", b'{"run": 1}', b"[" * 100_000])
-def test_a_note_that_is_none_counts_as_nothing(run: Path, tmp_path: Path, note: bytes) -> None:
-    folder = report(run, tmp_path / "out", "markdown")
-    (folder / MADE).write_bytes(note)
-    assert "report.html" in names(report(run, tmp_path / "out"))
+def test_a_note_that_is_none_counts_as_nothing(run: Path, earlier: Path, note: bytes) -> None:
+    (earlier / MADE).write_bytes(note)
+    assert "report.html" in names(report(run, earlier))
 
 
-def test_a_name_that_no_file_can_have_is_not_there(run: Path, tmp_path: Path) -> None:
-    folder = report(run, tmp_path / "out", "markdown")
-    tree = json.loads((folder / MADE).read_bytes())
+def test_a_name_that_no_file_can_have_is_not_there(run: Path, earlier: Path) -> None:
+    tree = json.loads((earlier / MADE).read_bytes())
     tree["formats"]["markdown"] = ["x" * 5000, "\0"]
-    (folder / MADE).write_text(json.dumps(tree))
-    assert "report.html" in names(report(run, tmp_path / "out"))
+    (earlier / MADE).write_text(json.dumps(tree))
+    assert "report.html" in names(report(run, earlier))
 
 
 def test_a_process_seldom_looks_for_garbage() -> None:

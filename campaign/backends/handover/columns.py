@@ -10,7 +10,8 @@ from campaign.channels import COMMAND, VOCABULARY, AxisKind, KnownBy, info
 from campaign.errors import Problem, ProtocolError
 from campaign.importing.mapping import Layout, layouts
 from campaign.protocol.files import Source, UnreadableError, read_source
-from campaign.protocol.problems import allowed, nearest, shown
+from campaign.protocol.problems import allowed, shown
+from campaign.text import nearest
 from campaign.trial import Trial
 
 NAME = "rig"

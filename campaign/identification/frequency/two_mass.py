@@ -31,15 +31,15 @@ from campaign.identification.frequency.two_mass_model import (
     Side,
     mode_damping,
     model,
+    model_jacobian,
     sizes,
     starts,
 )
-from campaign.identification.frequency_response import Array, ComplexArray
+from campaign.identification.frequency_response import Array
 from campaign.identification.intervals import TORQUE_CONSTANT
 from campaign.identification.least_squares import Minimum, covariance, minimum
 from campaign.reason import Cause, Reason
 
-STEP = 1e-6
 ROUGH = 10
 """Steps after which most starts are given up ..."""
 KEPT = 3
@@ -119,27 +119,20 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     if sum(2 * len(each.frequency) for each in responses.values()) < count + 8:
         raise ValueError("too few frequencies for a two-mass drive")
 
-    def residuals(scaled: Array) -> ComplexArray:
-        point = scaled * size
-        parts = []
-        for k, (side, weight) in enumerate(zip(sides, weights, strict=True)):
-            measured = responses[side]
-            found = model(measured.frequency, point, side, float(point[7 + k]))
-            parts.append((found - measured.values) / weight.error / math.sqrt(weight.mean))
-        return np.concatenate(parts)
-
     def function(scaled: Array) -> tuple[Array, Array]:
-        left = residuals(scaled)
-        columns = []
-        for k in range(len(scaled)):
-            if k in fixed:
-                columns.append(np.zeros(2 * len(left)))
-                continue
-            apart = np.zeros(len(scaled))
-            apart[k] = STEP
-            change = (residuals(scaled + apart) - residuals(scaled - apart)) / (2.0 * STEP)
-            columns.append(np.concatenate([change.real, change.imag]))
-        return np.concatenate([left.real, left.imag]), np.column_stack(columns)
+        point, left, by = scaled * size, [], []
+        for k, (side, weight) in enumerate(zip(sides, weights, strict=True)):
+            measured, error = responses[side], weight.error * math.sqrt(weight.mean)
+            found = model(measured.frequency, point, side, float(point[7 + k]))
+            left.append((found - measured.values) / error)
+            change = model_jacobian(measured.frequency, point, sides, side)
+            by.append(change * size / error[:, None])
+        all_left, all_by = np.concatenate(left), np.concatenate(by)
+        all_by[:, fixed] = 0.0
+        return (
+            np.concatenate([all_left.real, all_left.imag]),
+            np.concatenate([all_by.real, all_by.imag]),
+        )
 
     low, high = np.full(len(size), -np.inf), np.full(len(size), np.inf)
     low[1], high[1] = -WIDEST_RATIO, WIDEST_RATIO

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Literal
 
@@ -24,7 +23,8 @@ DAMPINGS = (0.01, 0.05, 0.2)
 def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexArray:
     """Rate over torque at `frequency` (Hz), shape (n,).
 
-    `point` begins with log J1, log (J2 / J1), log k, d, b1, b2, kg (SI).
+    `point` begins with log J1, log (J2 / J1), log k, d, b1, b2, kg (SI); of m points, shape
+    (7, m, 1), the responses are (m, n).
     """
     s = 2j * np.pi * frequency
     first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
@@ -99,31 +99,28 @@ def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) 
     """The best of a grid of resonances, antiresonances and dampings, by the logarithm of gain."""
     frequency = np.concatenate([responses[side].frequency for side in sides])
     candidates = np.geomspace(frequency.min() * 1.05, frequency.max() * 1.2, 48)
-    rows: list[tuple[float, Array]] = []
+    ratio, damping = np.meshgrid(RATIOS, DAMPINGS, indexing="ij")
+    second = 1.0 / ratio.ravel() ** 2 - 1.0  # J2 over J1 = 1
+    points, costs = [], []
     for resonance in candidates:
-        for ratio in RATIOS:
-            for damping in DAMPINGS:
-                second = 1.0 / ratio**2 - 1.0  # J2 over J1 = 1
-                zero = 2.0 * np.pi * resonance * ratio
-                spring = second * zero**2
-                point = np.zeros(7 + len(sides))
-                point[1], point[2] = math.log(second), math.log(spring)
-                point[3] = 2.0 * damping * math.sqrt(spring * second)
-                off = np.concatenate(
-                    [
-                        np.log(
-                            np.abs(model(responses[side].frequency, point, side, 0.0))
-                            / np.maximum(np.abs(responses[side].values), 1e-300)
-                        )
-                        for side in sides
-                    ]
-                )
-                scale = float(np.median(off))  # the model's gain falls with the inertia
-                point[[0, 2]] += scale
-                point[3] *= math.exp(scale)
-                rows.append((float(np.mean(np.minimum(np.abs(off - scale), 1.0))), point))
-    rows.sort(key=lambda row: row[0])
-    kept = [point for _, point in rows[:STARTS]]
+        zero = 2.0 * np.pi * resonance * ratio.ravel()
+        spring = second * zero**2
+        some = np.zeros((7 + len(sides), len(second)))
+        some[1], some[2] = np.log(second), np.log(spring)
+        some[3] = 2.0 * damping.ravel() * np.sqrt(spring * second)
+        over = [
+            np.abs(model(responses[side].frequency, some[:, :, None], side, 0.0))
+            / np.maximum(np.abs(responses[side].values), 1e-300)
+            for side in sides
+        ]
+        off = np.log(np.concatenate(over, axis=1))
+        scale = np.median(off, axis=1)  # the model's gain falls with the inertia
+        some[[0, 2]] += scale
+        some[3] *= np.exp(scale)
+        points.append(some.T)
+        costs.append(np.mean(np.minimum(np.abs(off - scale[:, None]), 1.0), axis=1))
+    best = np.argsort(np.concatenate(costs), kind="stable")[:STARTS]
+    kept = list(np.concatenate(points)[best])
     delays = [float(np.median(delays_to_try(responses[side]))) for side in sides]
     delayed = []
     for point in kept[: STARTS // 2]:

@@ -6,19 +6,18 @@ the rate that the axis had, with its own state, and the force that drove it is w
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from campaign.identification.inverse.motion import Array
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete
-from campaign.physics.lanes import Lane
-from campaign.physics.rows import OUT_FRICTION
-from campaign.physics.simulate import simulate_together
+from campaign.physics.friction import FrictionField
+from campaign.physics.simulate import FrictionAlong
 from campaign.signals import Polyline
 from campaign.trial import Task
 
@@ -48,8 +47,7 @@ class Along:
         """rates: rad/s (or m/s), shape (n,), at `sample_rate` (Hz). start: position (rad, or m)."""
         count = len(rates)
         times = np.arange(count) / sample_rate
-        self._step = 1.0 / sample_rate
-        self._task = Task(
+        task = Task(
             mode="prescribed",
             command=Polyline(times=tuple(times.tolist()), values=tuple(rates.tolist())),
             duration=count / sample_rate,
@@ -58,16 +56,19 @@ class Along:
             start_angle=start,
         )
         self._count = count
+        self._met = FrictionAlong(_nobody(), task, 1.0 / sample_rate)
 
     def friction(self, options: Mapping[str, Any]) -> Array:
         """Friction force (N m, or N), shape (n,), of an interface with these options (SI)."""
-        lane = Lane.of(_bench(json.dumps(options, sort_keys=True)), self._task, 1, self._step)
-        parts = [found[OUT_FRICTION] for _, (found,) in simulate_together([lane])]
-        return np.concatenate(parts)[: self._count]
+        load = _friction().validate_python(options, context={"si": True})
+        return self._met.of({"load": load})[: self._count]
 
 
-@lru_cache(maxsize=4)
-def _bench(options: str) -> CompleteBench:
-    """Of options as JSON: the pieces of a motion meet one friction, one after the other."""
-    tree = {**_NOBODYS, "friction": {"load": json.loads(options)}}
-    return complete(Bench.model_validate(tree, context={"si": True}))
+@cache
+def _nobody() -> CompleteBench:
+    return complete(Bench.model_validate(_NOBODYS, context={"si": True}))
+
+
+@cache
+def _friction() -> TypeAdapter[Any]:
+    return TypeAdapter(FrictionField)

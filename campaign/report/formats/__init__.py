@@ -7,8 +7,9 @@ from functools import cache
 
 from campaign.errors import UsageError
 from campaign.plugins import Kinds
-from campaign.protocol.problems import allowed, nearest
+from campaign.protocol.problems import allowed
 from campaign.report.formats.interface import Format
+from campaign.text import nearest
 
 
 @cache

@@ -13,7 +13,7 @@ from pathlib import Path
 from jinja2 import Environment, TemplateNotFound, TemplateSyntaxError, nodes
 
 from campaign.errors import UsageError
-from campaign.protocol.problems import nearest
+from campaign.text import nearest
 
 SUFFIXES = (".html", ".htm", ".css", ".jinja", ".jinja2", ".j2")
 """What a template's name ends with; other files of the folder are the laboratory's business."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,19 +113,26 @@ def loop_of(drive: Drive, proportional: float, integral: float) -> tuple[Array, 
 
 
 def with_coulomb(
-    drive: Drive, friction: float, torque: Callable[[float], Array], count: int, rate: float
+    drives: Sequence[Drive],
+    friction: float,
+    torque: Callable[[float], Array],
+    count: int,
+    rate: float,
 ) -> Array:
-    """Motor rate, shape (m, count), of a drive whose motor has Coulomb friction (N m), from rest.
+    """Motor rates, shape (m, count), of drives whose motor has Coulomb friction (N m), from rest.
 
-    Runge and Kutta's method of fourth order at `rate` (Hz); the sign is smooth within 1e-3 of the
-    rate that the friction's torque would reach in 0.1 s.
+    Of one drive, or of one for each of the m torques. Runge and Kutta's method of fourth order at
+    `rate` (Hz); the sign is smooth within 1e-3 of the rate that the friction's torque would reach
+    in 0.1 s.
     """
     h = 1.0 / rate
-    width = 1e-3 * friction / (drive.motor + drive.load) * 0.1 * 100
+    motor = np.array([each.motor for each in drives])
+    width = 1e-3 * friction / (motor + [each.load for each in drives]) * 0.1 * 100
+    a = np.stack([each.a for each in drives], axis=-1)
 
     def change(state: Array, time: float) -> Array:
-        slope = drive.a @ state + drive.b * torque(time)
-        slope[0] -= friction * np.tanh(state[0] / width) / drive.motor
+        slope = (a * state).sum(axis=1)
+        slope[0] += (torque(time) - friction * np.tanh(state[0] / width)) / motor
         return slope
 
     state = np.zeros((3, len(torque(0.0))))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -24,22 +25,32 @@ SAMPLES = int(RATE * PERIOD)
 
 
 def measured(
-    drive: Drive, seed: int, realisations: int = 1, periods: int = 2, friction: float = 0.0
-) -> BestLinear:
-    """Motor rate with 1 % of noise, a period after rest; friction as a share of the rms torque."""
-    grid = odd_grid(1.0, 120.0, PERIOD, seed)
-    commands = [random_phases(grid, 1.0, 1000 * seed + k) for k in range(realisations)]
+    drives: Sequence[Drive], realisations: int = 1, periods: int = 2, friction: float = 0.0
+) -> list[BestLinear]:
+    """Motor rates with 1 % of noise, a period after rest; friction as a share of the rms torque."""
     count = (periods + 1) * SAMPLES
-    half = np.array([each.sample(np.arange(2 * count + 2) / (2 * RATE)) for each in commands])
+    half_time = np.arange(2 * count + 2) / (2 * RATE)
+    grids = [odd_grid(1.0, 120.0, PERIOD, seed) for seed in range(len(drives))]
+    halves = [
+        [random_phases(grid, 1.0, 1000 * seed + k).sample(half_time) for k in range(realisations)]
+        for seed, grid in enumerate(grids)
+    ]
+    half = np.array(halves)  # of each drive and each realisation
     if friction:
-        rate = with_coulomb(drive, friction, lambda at: half[:, round(at * 2 * RATE)], count, RATE)
+        each = [drive for drive in drives for _ in range(realisations)]
+        torques = half.reshape(len(each), -1).T.copy()
+        made = with_coulomb(each, friction, lambda at: torques[round(at * 2 * RATE)], count, RATE)
+        rates = made.reshape(len(drives), realisations, -1)
     else:
-        rate = drive.rates(half, 2 * RATE)[0, :, : 2 * count : 2]
-    rate = rate[:, SAMPLES:]
-    random = np.random.default_rng(seed)
-    noisy = rate + 0.01 * np.std(rate) * random.standard_normal(rate.shape)
-    torque = half[:, 2 * SAMPLES : 2 * count : 2]
-    return best_linear(torque, noisy, RATE, periods, grid.excited)
+        made = [d.rates(h, 2 * RATE)[0] for d, h in zip(drives, half, strict=True)]
+        rates = np.array(made)[..., : 2 * count : 2]
+    found = []
+    for seed, (grid, rate) in enumerate(zip(grids, rates[..., SAMPLES:], strict=True)):
+        random = np.random.default_rng(seed)
+        noisy = rate + 0.01 * np.std(rate) * random.standard_normal(rate.shape)
+        torque = half[seed, :, 2 * SAMPLES : 2 * count : 2]
+        found.append(best_linear(torque, noisy, RATE, periods, grid.excited))
+    return found
 
 
 def modes(best: BestLinear) -> tuple[Mode, Mode]:
@@ -52,7 +63,7 @@ def modes(best: BestLinear) -> tuple[Mode, Mode]:
     [
         (40, 1, 0.0),
         (40, 3, 0.0),
-        pytest.param(40, 1, 0.03, marks=pytest.mark.slow),
+        (40, 1, 0.03),
     ],
 )
 def test_intervals_hold_the_modes_of_two_mass_drives(
@@ -61,9 +72,8 @@ def test_intervals_hold_the_modes_of_two_mass_drives(
     """Those of the axis, also with friction of 3 % of the torque."""
     held: dict[str, list[bool]] = defaultdict(list)
     random = np.random.default_rng(31)
-    for seed in range(benches):
-        drive = random_drive(random)
-        best = measured(drive, seed, realisations, friction=friction)
+    drives = [random_drive(random) for _ in range(benches)]
+    for drive, best in zip(drives, measured(drives, realisations, friction=friction), strict=True):
         for mode in modes(best):
             if not mode.frequency.has_interval:
                 continue
@@ -79,18 +89,18 @@ def test_intervals_hold_the_modes_of_two_mass_drives(
 
 @pytest.mark.parametrize(
     ("realisations", "friction"),
-    [(1, 0.0), (3, 0.0), pytest.param(1, 0.3, marks=pytest.mark.slow)],
+    [(1, 0.0), (3, 0.0), (1, 0.3)],
 )
 def test_a_free_inertia_has_no_extremum(realisations: int, friction: float) -> None:
     """Nor where friction makes its lines scatter."""
     drive = Drive(1.0, 1e-6, 0.01, 1e-5, 1.0)
-    for seed in range(20):
-        for mode in modes(measured(drive, seed, realisations, friction=friction)):
+    for best in measured([drive] * 20, realisations, friction=friction):
+        for mode in modes(best):
             assert mode.frequency.reason in NO_EXTREMUM
 
 
 def test_one_period_of_one_realisation_does_not_show_its_scatter() -> None:
     drive = random_drive(np.random.default_rng(1))
-    for mode in modes(measured(drive, 1, periods=1)):
+    for mode in modes(measured([drive], periods=1)[0]):
         assert mode.frequency.reason in NO_SCATTER
         assert not mode.frequency.has_interval

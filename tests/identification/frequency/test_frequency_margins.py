@@ -72,11 +72,11 @@ def test_beyond_the_last_frequency_there_is_a_bound() -> None:
     )
 
 
-@pytest.mark.slow
-def test_margins_hold_the_truth_as_often_as_they_say() -> None:
+@pytest.mark.parametrize("count", [12, pytest.param(60, marks=pytest.mark.statistics)])
+def test_margins_hold_the_truth_as_often_as_they_say(count: int) -> None:
     held: dict[str, list[bool]] = defaultdict(list)
     wide: dict[str, list[float]] = defaultdict(list)
-    for seed in range(30):
+    for seed in range(count):
         random = np.random.default_rng(seed)
         truth = random_loop(random)
         frequency = np.geomspace(truth.scale / 10, truth.scale * 12, 60)
@@ -98,11 +98,11 @@ def test_margins_hold_the_truth_as_often_as_they_say() -> None:
     assert np.nanmedian(wide["phase_margin"]) < 0.7
 
 
-@pytest.mark.slow
-def test_margins_near_the_last_frequency_hold_the_truth() -> None:
-    """60 loops with one crossing just before or behind it: intervals, open ends and bounds."""
+@pytest.mark.parametrize("count", [24, pytest.param(120, marks=pytest.mark.statistics)])
+def test_margins_near_the_last_frequency_hold_the_truth(count: int) -> None:
+    """Loops with one crossing just before or behind it: intervals, open ends and bounds."""
     held: dict[str, list[bool]] = defaultdict(list)
-    for seed in range(60):
+    for seed in range(count):
         random = np.random.default_rng(5000 + seed)
         truth = random_loop(random)
         name = ("gain_margin", "bandwidth", "phase_margin")[seed % 3]
@@ -127,8 +127,8 @@ def test_margins_near_the_last_frequency_hold_the_truth() -> None:
     assert not rejected(held, "less")
 
 
-@pytest.mark.slow
-def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that() -> None:
+@pytest.mark.parametrize("count", [25, pytest.param(200, marks=pytest.mark.statistics)])
+def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that(count: int) -> None:
     """Of a loop with -3 dB at 7.914 Hz, measured to hardly more: bounds count as intervals do."""
     width, held = 7.9141274721853, defaultdict(list)
     assert abs(loop(np.array([width])) / (1 + loop(np.array([width]))))[0] == pytest.approx(
@@ -136,7 +136,7 @@ def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that() -> 
     )
     for over in (1.002, 1.01, 1.03):
         bounds = 0
-        for seed in range(60):
+        for seed in range(count):
             frequency = np.geomspace(0.5, over * width, 40)
             truth, random = loop(frequency), np.random.default_rng(seed)
             measured = noisy(frequency, truth, 0.05 * np.abs(truth), random, of=20)
@@ -146,7 +146,7 @@ def test_a_bandwidth_just_before_the_last_frequency_is_not_bounded_by_that() -> 
                 held[str(over)].append(told.value <= width)
             else:
                 held[str(over)].append(holds(told, width))
-        assert bounds > 5  # else nothing was tried
+        assert bounds > count / 12  # else nothing was tried
     assert not rejected(held, "less")
 
 
@@ -172,8 +172,8 @@ def test_an_end_that_may_lie_beyond_the_band_is_open() -> None:
     assert np.mean(kinds) > 0.8
 
 
-@pytest.mark.slow
-def test_errors_are_the_scatter_of_repeated_measurements() -> None:
+@pytest.mark.parametrize("count", [50, pytest.param(600, marks=pytest.mark.statistics)])
+def test_errors_are_the_scatter_of_repeated_measurements(count: int) -> None:
     frequency = np.geomspace(0.5, 60.0, 40)
     truth = loop(frequency)
     level = 0.02 * np.abs(truth)
@@ -181,18 +181,17 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
         fitted_margins(
             rational_fit(noisy(frequency, truth, level, np.random.default_rng(k), of=30), (0, 1))
         )
-        for k in range(150)
+        for k in range(count)
     ]
     for name in ("bandwidth", "phase_margin", "gain_margin"):
         ratio = scatter_as_told([getattr(each, name) for each in found])
-        assert ratio == pytest.approx(1, abs=0.16), name  # 150 tell it within 6 %
+        assert ratio == pytest.approx(1, abs=2.6 / (2 * count) ** 0.5), name
 
 
-@pytest.mark.slow
 def test_what_other_orders_say_is_a_systematic_part() -> None:
     """With a lag that scatter nearly hides, the order is open, and the interval says so."""
     shifts = []
-    for seed in range(12):
+    for seed in range(6):
         frequency = np.geomspace(0.5, 60.0, 60)
         truth = loop(frequency) / (1 + 2j * np.pi * frequency / 2500.0)
         measured = noisy(frequency, truth, 0.01 * np.abs(truth), np.random.default_rng(seed), of=20)

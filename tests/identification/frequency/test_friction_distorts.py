@@ -24,7 +24,7 @@ def measured(rms: float) -> BestLinear:
     half = np.arange(2 * count + 2) / (2 * RATE)
     torque = np.array([random_phases(GRID, rms, m).sample(half) for m in range(7)])
     rate = with_coulomb(
-        DRIVE, FRICTION, lambda time: torque[:, round(time * 2 * RATE)], count, RATE
+        [DRIVE], FRICTION, lambda time: torque[:, round(time * 2 * RATE)], count, RATE
     )[:, ::2]
     rate += 1e-4 * np.random.default_rng(1).standard_normal(rate.shape)
     return best_linear(torque[:, : 2 * count : 4], rate, RATE / 2, 2, GRID.excited)

@@ -20,7 +20,7 @@ from tests.identification.coverage import holds, rejected
 from tests.identification.frequency.drives import Drive, random_drive
 from tests.identification.frequency.measured import noisy, scatter_as_told
 
-FINE, RATE, PERIOD = 8192, 256, 4.0
+FINE, RATE, PERIOD = 4096, 256, 4.0
 FREQUENCY = np.arange(0.5, 70.0, 0.5)
 DRIVE = Drive(2.0, 1.0, 4000.0, 3.0, 9.0)
 
@@ -40,7 +40,6 @@ def truths(drive: Drive) -> dict[str, float]:
     }
 
 
-@pytest.mark.slow
 def test_from_simulated_multisines_blind() -> None:
     """From rest, with noise on torque and rate; resonance within 1 %."""
     held: dict[str, list[bool]] = defaultdict(list)
@@ -78,7 +77,6 @@ def measured(drive: Drive, side: Side, seed: int, level: float = 0.01):  # type:
     return noisy(FREQUENCY, truth, level * np.median(np.abs(truth)), random)
 
 
-@pytest.mark.slow
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:
     """Each number's own: a wrong gradient shows here, where coverage of thirty hardly does."""
     truth = DRIVE.response(FREQUENCY, "motor")
@@ -104,7 +102,6 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
         assert ratio == pytest.approx(1, abs=0.2), name
 
 
-@pytest.mark.slow
 def test_correlations_are_those_of_repeated_measurements() -> None:
     truth = DRIVE.response(FREQUENCY, "motor")
     level = 0.02 * np.median(np.abs(truth))
@@ -127,7 +124,6 @@ def test_correlations_are_those_of_repeated_measurements() -> None:
     assert 1.0 < found[0].condition < 1000.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("side", ["motor", "load"])
 def test_one_inertia_is_told_as_one(side: Side) -> None:
     """A rigid axis has no second inertia, and no interval of a sum of two that are not there."""
