@@ -41,6 +41,7 @@ import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, s
 SERVER = """
 import atexit, gc, json, os, signal, sys, threading
 gc.freeze()  # a collection in a fork would copy every page
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # not ignored, also where the tests are under nohup
 begun = set()
 for line in sys.stdin:
     ended, arguments, folder, streams, environment, limit = json.loads(line)

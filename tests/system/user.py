@@ -99,7 +99,10 @@ def campaign(folder: Path, *arguments: str, code: int = 0, start: bool = False) 
     return Done(process.returncode, process.stdout, process.stderr)
 
 
-def begun(folder: Path, *arguments: str, stdin: int = -1) -> Begun | subprocess.Popen[str]:
+Process = Begun | subprocess.Popen[str]
+
+
+def begun(folder: Path, *arguments: str, stdin: int = -1) -> Process:
     """`campaign` in `folder`, which goes on while the test does something to it.
 
     `stdin`: a descriptor; nothing to read without one.
@@ -128,7 +131,7 @@ def children(pid: int) -> list[int]:
     return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def program_of(process: Begun | subprocess.Popen[str]) -> int:
+def program_of(process: Process) -> int:
     """The program that moves a bench: what was begun is its guardian."""
     (program,) = children(process.pid)
     return program
