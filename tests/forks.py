@@ -182,14 +182,14 @@ class Begun:
             os.close(self._end)
         return self.returncode
 
-    def wait(self, timeout: float) -> None:
+    def wait(self, timeout: float = TIMEOUT) -> None:
         """Until it has ended; kills one that does not."""
         if self.returncode is None and not select.select([self._end], [], [], timeout)[0]:
             self.kill()
             raise TimeoutError(f"no end in {timeout:g} s")
         self.poll()
 
-    def communicate(self, timeout: float) -> tuple[str, str]:
+    def communicate(self, timeout: float = TIMEOUT) -> tuple[str, str]:
         """All that it and what it began have yet to say, when it has ended."""
         with ThreadPoolExecutor(2) as pool, self.stdout, self.stderr:
             texts = [pool.submit(stream.read) for stream in (self.stdout, self.stderr)]
@@ -212,7 +212,7 @@ class Begun:
     def __exit__(self, *exception: object) -> None:
         self.stdout.close()
         self.stderr.close()
-        self.wait(TIMEOUT)
+        self.wait()
 
 
 @cache
