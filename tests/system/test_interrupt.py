@@ -13,7 +13,7 @@ import pytest
 
 from tests.system.user import SEA, begun, campaign, command, environment, write
 
-LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 300\n", 1)
+LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 1000\n", 1)
 
 
 STOPPING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP"}
