@@ -1,6 +1,6 @@
 """Commands in forks of a process that has imported the program: each is a process, none starts one.
 
-A start of Python with all that the program imports takes 1 to 2 s of a core, a fork 0.1 s. What a
+A start of Python with all that the program imports takes 1 to 2 s of a core, a fork 0.05 s. What a
 command does, prints and leaves is that of `python -m campaign`, its exit included.
 """
 
@@ -9,12 +9,16 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import select
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
+from typing import Self
 
 TIMEOUT = 600
 """s after which the system ends a command: the first one may compile the engine."""
@@ -26,31 +30,42 @@ import campaign
 for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
     if not found.name.endswith("__main__"):
         importlib.import_module(found.name)
+from campaign.device.warm_up import warm_up
+from campaign.protocol.bench_file import simulable
+warm_up(simulable("simulink"))  # the engine is loaded, or compiled
 """
 LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
 """
 """What imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
-import gc, json, os, signal, sys
+import atexit, gc, json, os, signal, sys, threading
 gc.freeze()  # a collection in a fork would copy every page
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # not ignored, also where the tests are under nohup
+begun = set()
 for line in sys.stdin:
-    arguments, folder, out, err, environment = json.loads(line)
+    ended, arguments, folder, streams, environment, limit = json.loads(line)
+    if ended:  # it is, or is waited for
+        begun.remove(ended)
+        print(os.waitstatus_to_exitcode(os.waitpid(ended, 0)[1]), flush=True)
+        continue
+    flags = (os.O_RDONLY, *2 * [os.O_WRONLY | os.O_CREAT])
+    opened = [os.open(name, flag | os.O_NOCTTY, 0o600) for name, flag in zip(streams, flags)]
     child = os.fork()
     if not child:
         break
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+    for each in opened:
+        os.close(each)
+    begun.add(child)
+    print(child, flush=True)
 else:
+    for child in begun:  # nobody is left who could end them
+        os.kill(child, signal.SIGKILL)
     sys.exit()
-signal.alarm({timeout})
-for number, name, flags in (
-    (0, os.devnull, os.O_RDONLY),
-    (1, out, os.O_WRONLY | os.O_CREAT),
-    (2, err, os.O_WRONLY | os.O_CREAT),
-):
-    opened = os.open(name, flags, 0o600)
-    os.dup2(opened, number)
-    os.close(opened)
+signal.alarm(limit)
+for number, each in enumerate(opened):
+    os.dup2(each, number)
+    os.close(each)
 os.chdir(folder)
 if environment is not None:
     os.environ.clear()
@@ -60,7 +75,20 @@ if environment is not None:
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 from campaign.__main__ import main
-main()
+code = 0
+try:
+    main()
+except SystemExit as leaving:
+    code = leaving.code
+    if isinstance(code, str):
+        print(code, file=sys.stderr)
+        code = 1
+# All of an end but that a million objects are taken apart one by one, each on a page of its own.
+threading._shutdown()
+atexit._run_exitfuncs()
+sys.stdout.flush()
+sys.stderr.flush()
+os._exit(code or 0)
 """
 
 
@@ -75,7 +103,7 @@ class Forks:
     def __init__(self, environment: Mapping[str, str], imports: str = PROGRAM) -> None:
         self._folder = tempfile.TemporaryDirectory()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", imports + SERVER.format(timeout=TIMEOUT)],
+            [sys.executable, "-c", imports + SERVER],
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -90,16 +118,35 @@ class Forks:
         `environment`: variables of this command alone, which count for what it has yet to import.
         """
         paths = [Path(self._folder.name, name) for name in ("out", "err")]
-        assert self._process.stdin
-        assert self._process.stdout
-        words = [*map(str, arguments)]
-        request = [words, str(folder.absolute()), *map(str, paths), environment]
-        print(json.dumps(request), file=self._process.stdin, flush=True)
-        code = int(self._process.stdout.readline())
+        streams = [os.devnull, *map(str, paths)]
+        pid = self.fork(folder, arguments, streams, environment, TIMEOUT)
+        code = self.ended(pid)
         out, err = (path.read_bytes().decode("utf-8") for path in paths)
         for path in paths:
             path.unlink()  # what a command has begun may still write into its own
         return subprocess.CompletedProcess([*arguments], code, out, err)
+
+    def fork(
+        self,
+        folder: Path,
+        arguments: Sequence[str],
+        streams: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+        limit: int = 0,
+    ) -> int:
+        """Begin a command; its pid. `streams`: the paths of all three; `limit`: s, 0 for none."""
+        words = [*map(str, arguments)]
+        return self._answer(0, words, str(folder.absolute()), streams, environment, limit)
+
+    def ended(self, pid: int) -> int:
+        """The exit code of a command that was begun, once it has ended."""
+        return self._answer(pid, [], "", [], None, 0)
+
+    def _answer(self, *request: object) -> int:
+        assert self._process.stdin
+        assert self._process.stdout
+        print(json.dumps(request), file=self._process.stdin, flush=True)
+        return int(self._process.stdout.readline())
 
     def close(self) -> None:
         """End the process that forks."""
@@ -108,6 +155,64 @@ class Forks:
             stream.close()
         self._process.wait()
         self._folder.cleanup()
+
+
+class Begun:
+    """A command in a fork that goes on beside the test; used as a `subprocess.Popen` is.
+
+    It is no child of this process: its end is seen on a descriptor, its exit code is asked for.
+    """
+
+    def __init__(self, forks: Forks, folder: Path, *arguments: str, stdin: int = -1) -> None:
+        """`stdin`: a descriptor; nothing to read without one."""
+        pipes = [os.pipe() for _ in range(2)]
+        ends = [os.devnull if stdin < 0 else f"/proc/{os.getpid()}/fd/{stdin}"]
+        ends += [f"/proc/{os.getpid()}/fd/{theirs}" for _, theirs in pipes]
+        self.pid = forks.fork(folder, arguments, ends)
+        for _, theirs in pipes:
+            os.close(theirs)
+        self.stdout, self.stderr = (os.fdopen(ours, encoding="utf-8") for ours, _ in pipes)
+        self.returncode: int | None = None
+        self._forks, self._end = forks, os.pidfd_open(self.pid)
+
+    def poll(self) -> int | None:
+        """The exit code, once it has ended."""
+        if self.returncode is None and select.select([self._end], [], [], 0)[0]:
+            self.returncode = self._forks.ended(self.pid)
+            os.close(self._end)
+        return self.returncode
+
+    def wait(self, timeout: float = TIMEOUT) -> None:
+        """Until it has ended; kills one that does not."""
+        if self.returncode is None and not select.select([self._end], [], [], timeout)[0]:
+            self.kill()
+            raise TimeoutError(f"no end in {timeout:g} s")
+        self.poll()
+
+    def communicate(self, timeout: float = TIMEOUT) -> tuple[str, str]:
+        """All that it and what it began have yet to say, when it has ended."""
+        with ThreadPoolExecutor(2) as pool, self.stdout, self.stderr:
+            texts = [pool.submit(stream.read) for stream in (self.stdout, self.stderr)]
+            self.wait(timeout)
+            out, err = (text.result() for text in texts)
+        return out, err
+
+    def send_signal(self, number: int) -> None:
+        """To it alone, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """At once."""
+        self.send_signal(signal.SIGKILL)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stdout.close()
+        self.stderr.close()
+        self.wait()
 
 
 @cache

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,33 +12,31 @@ import pytest
 from campaign.experiments import experiments
 from campaign.protocol import load_protocol, make_plan, memory
 from campaign.protocol.matrix import LARGEST_PLAN
+from tests.forks import Forks
 from tests.system.user import ROOT, environment, write
 
 resource = pytest.importorskip("resource")  # POSIX
 
 ROOM = 3 * 10**9
 """bytes of address space, of which numba and its libraries take up to two."""
-START = f"""\
-import resource, sys
+NARROW = f"""
+import resource
 resource.setrlimit(resource.RLIMIT_AS, ({ROOM}, {ROOM}))
-sys.argv = ["campaign", *sys.argv[1:]]
-from campaign.__main__ import main
-main()
+import campaign.cli.main, campaign.cli.plan
 """
 
 
-def plan(folder: Path, *arguments: str) -> tuple[int, str]:
-    """Exit code and standard error of `campaign plan` in a narrow place."""
-    done = subprocess.run(
-        [sys.executable, "-c", START, "plan", "protocol.toml", *arguments],
-        cwd=folder,
-        env={**environment(), "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=120,
-        stdin=subprocess.DEVNULL,
-    )
+@pytest.fixture(scope="module")
+def narrow() -> Iterator[Forks]:
+    """Commands in a narrow place."""
+    made = Forks({**environment(), "OPENBLAS_NUM_THREADS": "1"}, NARROW)
+    yield made
+    made.close()
+
+
+def plan(narrow: Forks, folder: Path) -> tuple[int, str]:
+    """Exit code and standard error of `campaign plan`."""
+    done = narrow.run(folder, "plan", "protocol.toml", "--allow-large")
     return done.returncode, done.stderr
 
 
@@ -106,23 +103,23 @@ ABSURD = {
 
 
 @pytest.mark.parametrize("name", ABSURD)
-def test_an_absurd_protocol_is_bad_usage(tmp_path: Path, name: str):
+def test_an_absurd_protocol_is_bad_usage(narrow: Forks, tmp_path: Path, name: str):
     text, message = ABSURD[name]
     write(tmp_path, text)
-    code, said = plan(tmp_path, "--allow-large")
+    code, said = plan(narrow, tmp_path)
     assert code == 2, said[:2000]
     assert said.startswith("protocol.toml")
     assert len(said) < 1000
     assert re.search(message, said), said
 
 
-def test_includes_count_together(tmp_path: Path):
+def test_includes_count_together(narrow: Forks, tmp_path: Path):
     """Each file may be read; all of them would take what one of them may not."""
     for part in range(12):
         write(tmp_path, f"notes = 'x'\nx = [{'1, ' * 20_000}]\n", f"part-{part}.toml")
     names = ", ".join(f'"part-{part}.toml"' for part in range(12))
     write(tmp_path, f"include = [{names}]\n" + test("stabilization", ""))
-    code, said = plan(tmp_path, "--allow-large")
+    code, said = plan(narrow, tmp_path)
     assert code == 2
     assert "part-9.toml: with what was included before: more than 200000 values" in said
 

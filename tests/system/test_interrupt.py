@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.user import SEA, campaign, command, environment, write
+from tests.system.user import SEA, begun, campaign, command, environment, write
 
-LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 3000\n", 1)
+LONG = SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 1000\n", 1)
 
 
 STOPPING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP"}
@@ -27,15 +27,7 @@ def test_a_stopped_run_is_sealed_as_interrupted(tmp_path: Path, number: signal.S
     write(tmp_path, LONG)
     # Started under nohup, a program keeps ignoring SIGHUP, as it should; this one is not.
     request.addfinalizer(partial(signal.signal, number, signal.signal(number, signal.SIG_DFL)))
-    with subprocess.Popen(
-        command("run", "protocol.toml", "--report"),
-        cwd=tmp_path,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-    ) as process:
+    with begun(tmp_path, "run", "protocol.toml", "--report") as process:
         first = process.stderr.readline()
         assert first.startswith("sea: "), first + process.stderr.read()
         process.send_signal(number)
@@ -90,15 +82,7 @@ def test_a_run_whose_terminal_closes_is_sealed_as_interrupted(tmp_path: Path):
 @pytest.mark.slow
 def test_a_killed_run_is_readable_and_says_that_it_has_no_end(tmp_path: Path):
     write(tmp_path, LONG)
-    with subprocess.Popen(
-        command("run", "protocol.toml", "--workers", "1"),
-        cwd=tmp_path,
-        env=environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-    ) as process:
+    with begun(tmp_path, "run", "protocol.toml", "--workers", "1") as process:
         process.stderr.readline()
         journal = next((tmp_path / "results").glob("*.partial")) / "journal.jsonl"
         while "trial-00002" not in journal.read_text(encoding="utf-8"):
@@ -108,5 +92,5 @@ def test_a_killed_run_is_readable_and_says_that_it_has_no_end(tmp_path: Path):
     heading, line = campaign(tmp_path, "list").out.splitlines()
     run = dict(zip(heading.split("\t"), line.split("\t"), strict=True))
     assert run["status"] == "incomplete"
-    assert run["trials"].endswith(" of 6000")
+    assert run["trials"].endswith(" of 600")
     assert "safe state:  not confirmed" in campaign(tmp_path, "show", run["run"]).out

@@ -10,7 +10,6 @@ import json
 import os
 import random
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -29,7 +28,7 @@ from campaign.errors import ExitCode
 from campaign.wire.codes import Kind
 from tests.link.controllers import controller
 from tests.link.proxy import proxy
-from tests.system.user import campaign, children, command, environment, program_of, write
+from tests.system.user import Process, begun, campaign, children, program_of, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -80,16 +79,8 @@ class Bench:
     def stop(self) -> None:
         assert stop_bench(self.port, 2_000_000, PATIENCE) is ExitCode.DONE
 
-    def run(self, port: str = "", *more: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            command("run", "protocol.toml", *ON, "--port", port or self.port, *more),
-            cwd=self.folder,
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            stdin=subprocess.DEVNULL,
-            text=True,
-        )
+    def run(self, port: str = "", *more: str) -> Process:
+        return begun(self.folder, "run", "protocol.toml", *ON, "--port", port or self.port, *more)
 
     def never_on_after_a_stop(self) -> None:
         latched = False
@@ -98,7 +89,7 @@ class Bench:
             assert not (latched and line["event"] == "drive on"), self.log
         assert latched, "it was not stopped"
 
-    def judged(self, process: subprocess.Popen[str], *, began: bool | None = None) -> None:
+    def judged(self, process: Process, *, began: bool | None = None) -> None:
         """The run has ended by the stop, and screen, archive, journal and report say so."""
         out, err = process.communicate(timeout=PATIENCE)
         self.never_on_after_a_stop()
@@ -137,7 +128,7 @@ def bench(folder: Path, *options: str, speed: str = "max", text: str = PROTOCOL)
         yield Bench(folder, port)
 
 
-def wait_for(condition: Callable[[], object], process: subprocess.Popen[str]) -> None:
+def wait_for(condition: Callable[[], object], process: Process) -> None:
     deadline = time.monotonic() + PATIENCE
     while not condition():
         assert process.poll() is None, process.stderr.read()
@@ -169,7 +160,7 @@ def test_just_before_a_message(tmp_path: Path, kind: Kind, number: int, began: b
         rig.judged(process, began=began)
 
 
-def acted(event: threading.Event, process: subprocess.Popen[str]) -> bool:
+def acted(event: threading.Event, process: Process) -> bool:
     while process.poll() is None:
         if event.wait(0.02):
             return True
@@ -205,15 +196,8 @@ def test_at_a_prompt(tmp_path: Path) -> None:
     step = '\n[[test.operator]]\ntext = "Look at the gear"\n'
     with bench(tmp_path, text=PROTOCOL + step) as rig:
         terminal, theirs = pty.openpty()
-        process = subprocess.Popen(
-            [*command("run", "protocol.toml", *ON[:-1], "--port", rig.port)],
-            cwd=tmp_path,
-            env=environment(),
-            stdin=theirs,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        words = ("run", "protocol.toml", *ON[:-1], "--port", rig.port)
+        process = begun(tmp_path, *words, stdin=theirs)
         os.write(terminal, b"yes\n")
         lines = iter(process.stderr.readline, "")
         assert any(line == "  Look at the gear\n" for line in lines)
@@ -341,11 +325,8 @@ def test_at_a_terminal_it_is_asked_with_when_and_by_whom(
     with bench(tmp_path) as rig:
         rig.stop()
         terminal, theirs = pty.openpty()
-        process = subprocess.Popen(
-            command("run", "protocol.toml", *ON, "--port", rig.port),
-            cwd=tmp_path, env=environment(), stdin=theirs, stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+        words = ("run", "protocol.toml", *ON, "--port", rig.port)
+        process = begun(tmp_path, *words, stdin=theirs)
         os.write(terminal, f"{answer}\n".encode())
         _, err = process.communicate(timeout=PATIENCE)
         os.close(terminal)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from campaign.cli.run import Remarks, run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.test_resuming import content, documented_differences
-from tests.system.user import SEA, campaign, command, environment, write
+from tests.system.user import SEA, begun, campaign, write
 
 BENCH = (Path(__file__).parents[2] / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
 OWN_BENCH = SEA.replace('bench = "simulink"', 'bench = "bench.toml"\nseed = 5\nrepeat = 2')
@@ -220,15 +219,7 @@ def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: 
 def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
     """The real thing, from the command line: Ctrl-C once, and the command that is then shown."""
     write(tmp_path, SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 30\n", 1))
-    with subprocess.Popen(
-        command("run", "protocol.toml", "--workers", "1"),
-        cwd=tmp_path,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-    ) as process:
+    with begun(tmp_path, "run", "protocol.toml", "--workers", "1") as process:
         process.stderr.readline()
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -21,7 +20,7 @@ from campaign.link.safe import SafeWatch, is_safe, query_frame
 from campaign.recording import Outcome
 from campaign.wire.messages import State, Status
 from tests.link.controllers import controller
-from tests.system.user import campaign, command, environment, program_of, write
+from tests.system.user import Process, begun, campaign, program_of, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -60,23 +59,16 @@ def status_of(port: str) -> Status:
 
 
 @contextmanager
-def running(folder: Path, port: str) -> Iterator[subprocess.Popen[str]]:
+def running(folder: Path, port: str) -> Iterator[Process]:
     """`campaign run` while the axis moves."""
     write(folder, LONG)
-    with subprocess.Popen(
-        command("run", "protocol.toml", *ON, *SOON, "--port", port, "--yes"),
-        cwd=folder,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-    ) as process:
+    with begun(folder, "run", "protocol.toml", *ON, *SOON, "--port", port, "--yes") as process:
         try:
             deadline = time.monotonic() + 60
             while status_of(port).state is not State.RUNNING:
                 assert process.poll() is None, process.stderr.read()
                 assert time.monotonic() < deadline
+                time.sleep(0.02)
             yield process
         finally:
             process.kill()

@@ -17,7 +17,7 @@ from campaign.recording import Fault, Outcome, SafeState
 from campaign.wire.messages import State
 from tests.link.controllers import controller
 from tests.system.test_safety import status_of
-from tests.system.user import command, environment, program_of, write
+from tests.system.user import begun, command, environment, program_of, write
 
 WILD = """
 import threading, time
@@ -132,14 +132,11 @@ def test_a_host_that_sleeps_does_not_take_that_for_the_silence_of_the_bench(tmp_
     write(tmp_path, MOVE)
     # Shorter than the sleep, and longer than a busy machine lets the relay wait for its turn.
     patient = ("--heartbeat-timeout", "4")
-    with controller(*patient, bench="simulink") as port, subprocess.Popen(
-        command(
-            "run", "protocol.toml", "--backend", "serial", "--port", port, "--yes",
-            "--set", "home.angle=60 deg",
-        ),
-        cwd=tmp_path, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL, text=True,
-    ) as process:  # fmt: skip
+    options = ("--backend", "serial", "--yes", "--set", "home.angle=60 deg")
+    with (
+        controller(*patient, bench="simulink") as port,
+        begun(tmp_path, "run", "protocol.toml", *options, "--port", port) as process,
+    ):
         try:
             deadline = time.monotonic() + 60
             while status_of(port).state is not State.RUNNING:

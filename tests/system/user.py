@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from tests.forks import TIMEOUT, Forks
+from tests.forks import TIMEOUT, Begun, Forks
 
 ROOT = Path(__file__).parents[2]
 
@@ -99,6 +99,27 @@ def campaign(folder: Path, *arguments: str, code: int = 0, start: bool = False) 
     return Done(process.returncode, process.stdout, process.stderr)
 
 
+Process = Begun | subprocess.Popen[str]
+
+
+def begun(folder: Path, *arguments: str, stdin: int = -1) -> Process:
+    """`campaign` in `folder`, which goes on while the test does something to it.
+
+    `stdin`: a descriptor; nothing to read without one.
+    """
+    if sys.platform == "linux" and environment() == USUAL:
+        return Begun(forks(), folder, *arguments, stdin=stdin)
+    return subprocess.Popen(
+        command(*arguments),
+        cwd=folder,
+        env=environment(),
+        stdin=subprocess.DEVNULL if stdin < 0 else stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
 def write(folder: Path, text: str, name: str = "protocol.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
@@ -110,7 +131,7 @@ def children(pid: int) -> list[int]:
     return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def program_of(process: subprocess.Popen[str]) -> int:
+def program_of(process: Process) -> int:
     """The program that moves a bench: what was begun is its guardian."""
     (program,) = children(process.pid)
     return program
