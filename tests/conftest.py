@@ -44,12 +44,6 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
 
 
-@pytest.hookimpl(optionalhook=True)  # `make mutants` runs without xdist
-def pytest_xdist_auto_num_workers() -> int:
-    """Two a core: tests of processes, archives and pages wait half of their time."""
-    return 2 * (os.cpu_count() or 1)
-
-
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Files with the most slow tests come first; a sample that is cut off is one of a draw."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))

@@ -101,6 +101,7 @@ def test_amplitudes_at_which_an_interface_slips_are_warned_of() -> None:
 # What is found -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_stiffness_damping_and_inertia_are_found_as_the_sums_that_they_are() -> None:
     result = found("0.3 N m", "0.6 N m")
     values = joint(result)

@@ -171,6 +171,7 @@ def hits(seed: int, doubt: bool) -> list[bool]:
     ]
 
 
+@pytest.mark.slow
 def test_a_sample_of_intervals_holds_with_what_is_left_to_doubt_of_the_torque() -> None:
     told = [each for seed in range(6) for each in hits(seed, doubt=True)]
     assert not rejected({"all": told}, "less")

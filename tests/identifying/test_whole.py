@@ -93,6 +93,7 @@ def test_viscous_friction_may_be_much_more_than_a_plain_line_says() -> None:
     assert viscous.upper >= 2.0 / 0.5
 
 
+@pytest.mark.slow
 def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
