@@ -102,6 +102,7 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
         assert ratio == pytest.approx(1, abs=0.2), name
 
 
+@pytest.mark.slow
 def test_correlations_are_those_of_repeated_measurements() -> None:
     truth = DRIVE.response(FREQUENCY, "motor")
     level = 0.02 * np.median(np.abs(truth))
@@ -124,6 +125,7 @@ def test_correlations_are_those_of_repeated_measurements() -> None:
     assert 1.0 < found[0].condition < 1000.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["motor", "load"])
 def test_one_inertia_is_told_as_one(side: Side) -> None:
     """A rigid axis has no second inertia, and no interval of a sum of two that are not there."""
