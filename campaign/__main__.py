@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 
-from campaign import garbage, interrupts
+from campaign import interrupts
+from campaign.gc_threshold import raise_gc_threshold
 
 
 def main() -> None:
     """Run the command line."""
     interrupts.listen()
-    garbage.seldom()
+    raise_gc_threshold()
     # pydantic looks into every installed package for plug-ins of its own, and a broken one ends it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:

@@ -1,4 +1,4 @@
-"""Processes that work for this one: how they are begun, and how they end with it."""
+"""Worker processes: how they start, and how they end with their parent."""
 
 from __future__ import annotations
 
@@ -10,29 +10,28 @@ import threading
 from collections.abc import Iterable
 from multiprocessing.context import BaseContext
 
-from campaign import garbage
+from campaign.gc_threshold import raise_gc_threshold
 
-METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-"""How processes are begun here. Not by fork: this process has threads, and whatever they hold would
-stay locked."""
-
-
-def context(preloaded: Iterable[str]) -> BaseContext:
-    """What begins processes. `preloaded`: modules that are imported once for all of them."""
-    found = multiprocessing.get_context(METHOD)
-    found.set_forkserver_preload(list(preloaded))
-    return found
+START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+"""Not fork: this process has threads, and a fork would keep their locks locked."""
 
 
-def begin_early(preloaded: Iterable[str]) -> None:
-    """Have what processes need imported meanwhile; where nothing can be done early, do nothing."""
-    context(preloaded)
-    if METHOD != "forkserver":
+def process_context(preload: Iterable[str]) -> BaseContext:
+    """The context that starts workers. `preload`: modules imported once for all of them."""
+    context = multiprocessing.get_context(START_METHOD)
+    context.set_forkserver_preload(list(preload))
+    return context
+
+
+def start_preloading(preload: Iterable[str]) -> None:
+    """Import `preload` in the background for later workers. Does nothing without a fork server."""
+    process_context(preload)
+    if START_METHOD != "forkserver":
         return
-    from multiprocessing import forkserver, resource_tracker  # which are not everywhere
+    from multiprocessing import forkserver, resource_tracker  # not on Windows
 
     before = os.environ.get("PYTHONWARNINGS")
-    # Who leaves at once leaves semaphores, which the tracker removes: nobody need be told.
+    # A program that exits at once leaves semaphores. The tracker removes them; no user need know.
     os.environ["PYTHONWARNINGS"] = "ignore:resource_tracker"
     try:
         resource_tracker.ensure_running()
@@ -43,16 +42,16 @@ def begin_early(preloaded: Iterable[str]) -> None:
     forkserver.ensure_running()
 
 
-def begin_here() -> None:
-    """To be called first in a process: Ctrl-C is for the one that began it, with which it ends."""
+def initialize_worker() -> None:
+    """First call in a worker: it ignores Ctrl-C and exits with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    garbage.seldom()
-    sys.stdout = sys.stderr  # what a plug-in prints
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    raise_gc_threshold()
+    sys.stdout = sys.stderr  # prints of a plug-in
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    """A process of a pool would wait for its next task for ever."""
+def _exit_with_parent() -> None:
+    """A pool's worker would otherwise wait for its next task for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -54,8 +54,8 @@ class Timing(Protocol):
     def add(self, work: Work, processor: float) -> None:
         """Processor time (s) that was spent on `work` beside all spans."""
 
-    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
-        """Another process of this run has spent that besides."""
+    def add_worker(self, spent: Mapping[Work, Spent]) -> None:
+        """Add what a worker process of this run has spent."""
 
 
 class Stopwatch:
@@ -66,7 +66,7 @@ class Stopwatch:
         self._thread = threading.local()
         self._lock = threading.Lock()
         self._spent: dict[Work, Spent] = {}
-        self._elsewhere = 0.0
+        self._of_workers = 0.0
 
     @contextmanager
     def span(self, work: Work) -> Iterator[None]:
@@ -94,17 +94,17 @@ class Stopwatch:
         with self._lock:
             self._spent.setdefault(work, Spent()).processor += processor
 
-    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
+    def add_worker(self, spent: Mapping[Work, Spent]) -> None:
         """See `Timing`."""
         with self._lock:
             for work, each in spent.items():
                 own = self._spent.setdefault(work, Spent())
                 own.others += each.main + each.others
                 own.processor += each.processor
-                self._elsewhere += each.processor
+                self._of_workers += each.processor
 
-    def taken(self) -> dict[Work, Spent]:
-        """What was measured since this was last asked, in this thread and all that have ended."""
+    def take(self) -> dict[Work, Spent]:
+        """What was measured since the last call, in this thread and all that have ended."""
         self._begin(getattr(self._thread, "work", None))
         with self._lock:
             found, self._spent = self._spent, {}
@@ -112,7 +112,7 @@ class Stopwatch:
 
     def elapsed(self) -> tuple[float, float]:
         """Seconds since it was made: on the clock, and of this run's processors."""
-        used = time.process_time() - self._began[1] + self._elsewhere
+        used = time.process_time() - self._began[1] + self._of_workers
         return time.perf_counter() - self._began[0], used
 
     def spent(self) -> dict[Work, Spent]:
@@ -150,7 +150,7 @@ class Untimed:
     def add(self, work: Work, processor: float) -> None:
         """See `Timing`."""
 
-    def spent_elsewhere(self, spent: Mapping[Work, Spent]) -> None:
+    def add_worker(self, spent: Mapping[Work, Spent]) -> None:
         """See `Timing`."""
 
 

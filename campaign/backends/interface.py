@@ -196,8 +196,7 @@ class BackendKind:
         several: whether several trials may be executed at a time (`--workers`).
         needs: what it needs of a bench, as dotted paths (`motor.resistance`); a protocol with a
             bench that lacks some is refused, with all of them named.
-        apart: whether its backend may be handed to processes of their own (it can be pickled), and
-            several trials be executed in each.
+        picklable: whether worker processes can have copies of its backend.
         simulates: whether it runs the engine of `campaign.physics`, which is compiled at its first
             start.
     """
@@ -211,6 +210,6 @@ class BackendKind:
     by_hand: bool = False
     stopped_outside: bool = False
     several: bool = False
-    apart: bool = False
+    picklable: bool = False
     simulates: bool = False
     needs: tuple[str, ...] = ()

@@ -255,7 +255,7 @@ BACKEND = BackendKind(
     open=_open,
     source=Source.SIMULATION,
     several=True,
-    apart=True,
+    picklable=True,
     simulates=True,
     needs=tuple(PURPOSES),
 )

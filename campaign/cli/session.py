@@ -28,8 +28,8 @@ from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
-from campaign.execution.crew import PRELOADED, WORTHWHILE
 from campaign.execution.display import clock, progress_display
+from campaign.execution.executors import FEWEST_FOR_PROCESSES, PRELOADED
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
@@ -48,7 +48,7 @@ from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
-from campaign.processes import begin_early
+from campaign.processes import start_preloading
 from campaign.protocol import PlannedStage
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
@@ -246,13 +246,13 @@ def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
         return 1
     workers = min(wanted or os.cpu_count() or 1, max(1, trials))
     if in_processes(kind, workers, trials):
-        begin_early(PRELOADED)
+        start_preloading(PRELOADED)
     return workers
 
 
 def in_processes(kind: BackendKind, workers: int, trials: int) -> bool:
     """Whether the workers are processes: where they take less time than they cost to begin."""
-    return kind.apart and workers > 1 and trials >= WORTHWHILE
+    return kind.picklable and workers > 1 and trials >= FEWEST_FOR_PROCESSES
 
 
 def say_outcome(outcome: RunOutcome, elapsed: float) -> None:

@@ -18,7 +18,7 @@ from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
 from campaign.execution.attendance import UNATTENDED, Attendance
-from campaign.execution.crew import apart, threads
+from campaign.execution.executors import process_executor, thread_executor
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
@@ -65,8 +65,8 @@ def run_plan(
         measure: what a recording says by itself, to be archived with it; absent: nothing is.
         finished: trials of the plan that are not to be executed again, by number.
         stages: what may follow from the trials.
-        in_processes: whether the workers are processes: of a backend that can be handed to them,
-            with the experiments of this installation.
+        in_processes: whether workers are processes; for a picklable backend and the experiments of
+            this installation.
 
     Raises:
         NotSafeError: in place of any of the others, when the bench was not seen safe either.
@@ -93,12 +93,16 @@ def run_plan(
         live=supervision.live,
     )
     conditions = Conditions(backend, writer, sequence.halted, supervision, measure)
-    crew = apart(workers, conditions, writer) if in_processes else threads(workers, conditions)
+    executor = (
+        process_executor(workers, conditions, writer)
+        if in_processes
+        else thread_executor(workers, conditions)
+    )
     with unsafe_first(ended):
         with (
             supervision.timing.span(Work.WAITING),
             safe_afterwards(backend, ended),
-            crew as at_work,
+            executor as at_work,
         ):
             sequence.execute(at_work)
         sequence.outside.look()  # it may have come after the last trial

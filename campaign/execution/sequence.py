@@ -1,7 +1,7 @@
 """The order of things during a run: trials, retries, rests, steps of the operator, stops.
 
 Decisions are made in one thread, between trials; only the trials themselves are executed elsewhere
-(`crew.py`). Each decision is in the journal before it is acted upon.
+(`executors.py`). Each decision is in the journal before it is acted upon.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from campaign.backends.interface import Backend
 from campaign.execution.attempt import Executed
 from campaign.execution.attendance import Attendance, SetUp
 from campaign.execution.batches import Batches
-from campaign.execution.crew import Crew, LostProcessError
 from campaign.execution.decisions import Responses, Rests
+from campaign.execution.executors import BatchExecutor, WorkerLostError
 from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
@@ -28,12 +28,12 @@ from campaign.recording import Ending, Outcome, PanicStop, SafeState
 from campaign.trial import Trial
 
 LOOK = 0.25
-"""s after which a display is told how far the running trials are, and a crew that the run ends."""
+"""s between two updates of the display, and before the executor learns that the run is to end."""
 ENDING = 10.0
 """s that the other trials may take to end when the run cannot go on."""
 MOST_LOST = 3
-"""times that a process may die: what it does to others may be its trials' own doing."""
-_Told = tuple[Trial, Executed, Sequence[Entry]]
+"""Worker processes that may die before the run ends: the trials themselves may be the cause."""
+_Ended = tuple[Trial, Executed, Sequence[Entry]]
 
 
 class TrialSequence:
@@ -62,7 +62,7 @@ class TrialSequence:
         self._batches = Batches(trials, backend, workers, live=live)
         self._running: dict[Future[None], Sequence[Trial]] = {}
         self._under_way: dict[int, Trial] = {}
-        self._news: SimpleQueue[_Told | Future[None]] = SimpleQueue()  # trials that ended, batches
+        self._news: SimpleQueue[_Ended | Future[None]] = SimpleQueue()  # trials that ended, batches
         self._backend = backend
         self._writer = writer
         self._ledger = ledger
@@ -75,22 +75,22 @@ class TrialSequence:
         self._set_up = SetUp(attendance.operator, writer)
         self._said: set[tuple[str, str]] = set()
 
-    def execute(self, crew: Crew) -> None:
-        """Keep the crew busy. Raises what the archive raises, and KeyboardInterrupt."""
+    def execute(self, executor: BatchExecutor) -> None:
+        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt."""
         try:
             while True:
-                while len(self._running) < crew.at_once and (batch := self._next()):
+                while len(self._running) < executor.most_pending and (batch := self._next()):
                     for trial in batch:
                         self._ledger.begin(trial)
                         self._under_way[trial.number] = trial
-                    future = crew.begin(batch, lambda *told: self._news.put(told))
+                    future = executor.submit(batch, lambda *ended: self._news.put(ended))
                     self._running[future] = batch
                     future.add_done_callback(self._news.put)
                 if not self._running:
                     break
                 self._hear()
                 if self.halted():
-                    crew.halt()
+                    executor.stop()
         except BaseException as error:
             self._fail("the run cannot go on")  # lets the other trials end
             if not isinstance(error, KeyboardInterrupt):
@@ -106,29 +106,29 @@ class TrialSequence:
             return
         while not self._news.empty():
             news.append(self._news.get())
-        told = [each for each in news if isinstance(each, tuple)]
-        told.sort(key=lambda each: each[0].number)
-        if entries := [entry for each in told for entry in each[2]]:
-            self._writer.note(*entries)  # before anybody is told
-        for trial, executed, _ in told:
+        ended = [each for each in news if isinstance(each, tuple)]
+        ended.sort(key=lambda each: each[0].number)
+        if entries := [entry for each in ended for entry in each[2]]:
+            self._writer.note(*entries)  # before any report
+        for trial, executed, _ in ended:
             self._settle(trial, executed)
         for each in news:
             if isinstance(each, Future):
                 batch = self._running.pop(each)
-                if isinstance(error := each.exception(), LostProcessError):
-                    self._begin_again(batch, error)
+                if isinstance(error := each.exception(), WorkerLostError):
+                    self._repeat(batch, error)
                 else:
                     each.result()  # raises what it raised
 
-    def _begin_again(self, batch: Sequence[Trial], error: LostProcessError) -> None:
-        """Its trials come next, those that had ended apart."""
-        again = [t for t in batch if self._under_way.pop(t.number, None) is not None]
-        names = f"{again[0].name} and {len(again) - 1} more" if again else "no trial"
-        self._writer.decision("process lost", f"{error}; again come {names}")
-        self._ledger.remark(f"{error}; again come {names}")
+    def _repeat(self, batch: Sequence[Trial], error: WorkerLostError) -> None:
+        """Put the trials of a lost batch first, except those that have ended."""
+        lost = [t for t in batch if self._under_way.pop(t.number, None) is not None]
+        text = f"{error}; trials to repeat: {', '.join(trial.name for trial in lost) or 'none'}"
+        self._writer.decision("worker lost", text)
+        self._ledger.remark(text)
         if error.times > MOST_LOST:
-            self._fail(f"{error}: out of memory? `--workers 1` needs less")
-        self._batches.insert(again)
+            self._fail(f"{error}; the memory may be too small: try `--workers 1`")
+        self._batches.insert(lost)
 
     def halted(self) -> bool:
         """Whether the run is to end."""

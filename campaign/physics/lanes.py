@@ -166,7 +166,7 @@ class Lanes:
     memory: Memory
     random: tuple[np.random.Generator, ...]
 
-    def anew(self, friction: Mapping[str, Any]) -> Lanes:
+    def with_friction_at_rest(self, friction: Mapping[str, Any]) -> Lanes:
         """A single prescribed motion before its first step, with other friction."""
         (trial,) = self.trials
         bench = as_it_is(trial.bench.with_friction(friction), trial.seed)

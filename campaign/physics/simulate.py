@@ -80,7 +80,7 @@ class FrictionAlong:
 
     def of(self, friction: Mapping[str, Any]) -> Array:
         """Friction torque (N m, or N), shape (samples,), as `simulate` of the bench with it."""
-        lanes = self._lanes.anew(friction)
+        lanes = self._lanes.with_friction_at_rest(friction)
         parts = []
         for count, rates in self._stretches:
             out = zeros(len(OUTPUTS), count, 1)

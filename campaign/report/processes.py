@@ -52,7 +52,7 @@ def begin_early(path: Path) -> None:
     """
     large = path.is_file() and path.stat().st_size >= LARGE
     if large and (os.cpu_count() or 1) > 1:
-        processes.begin_early(PRELOADED)
+        processes.start_preloading(PRELOADED)
 
 
 @dataclass
@@ -144,7 +144,7 @@ def _pool(run: RunReader, count: int) -> Iterator[ProcessPoolExecutor]:
     others = set(multiprocessing.active_children())
     # What was read and checked here is handed over: reading it again takes ten times as long.
     handed = pickle.dumps((run, known_heaps()), pickle.HIGHEST_PROTOCOL)
-    pool = ProcessPoolExecutor(count, processes.context(PRELOADED), _begin, (handed,))
+    pool = ProcessPoolExecutor(count, processes.process_context(PRELOADED), _begin, (handed,))
     try:
         yield pool
     except BaseException:  # Ctrl-C: nobody waits for an analysis that nobody wants
@@ -161,7 +161,7 @@ _run: RunReader | None = None
 
 def _begin(handed: bytes) -> None:
     global _run
-    processes.begin_here()
+    processes.initialize_worker()
     _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
     told_of_heaps(heaps)
     gc.freeze()

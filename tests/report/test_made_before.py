@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from campaign import garbage
 from campaign.archive.layout.results import results_path
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
+from campaign.gc_threshold import GC_THRESHOLD
 from campaign.report import processes
 from campaign.report.made_before import MADE
 from tests.archives import simulated_run
@@ -216,7 +216,7 @@ def test_a_process_seldom_looks_for_garbage() -> None:
     signals = signal.getsignal(signal.SIGINT)
     try:
         processes._begin(pickle.dumps((None, {})))
-        assert gc.get_threshold() == garbage.SELDOM
+        assert gc.get_threshold() == GC_THRESHOLD
     finally:
         gc.set_threshold(*before)
         gc.unfreeze()

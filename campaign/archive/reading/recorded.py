@@ -98,7 +98,7 @@ class RecordedSamples:
 
 
 @dataclass(frozen=True)
-class HeldSamples(RecordedSamples):
+class MemorySamples(RecordedSamples):
     """The same of a trial that has just ended, which need not be read from its file.
 
     Attributes:

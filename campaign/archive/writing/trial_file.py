@@ -29,7 +29,7 @@ from campaign.archive.layout.record import (
     trees_text,
 )
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.recorded import HeldSamples, trial_of_record
+from campaign.archive.reading.recorded import MemorySamples, trial_of_record
 from campaign.archive.writing import hdf5
 from campaign.archive.writing.default_plot import Aim, beside
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
@@ -153,7 +153,7 @@ class TrialFile:
         place = self._final, entry_name(self._trial.number), record, self._not_kept
         archived = trial_of_record(self._trial, *place)
         if self._whole is not None and not self._not_kept:
-            archived = replace(archived, samples=HeldSamples(*place, rows=self._whole))
+            archived = replace(archived, samples=MemorySamples(*place, rows=self._whole))
         return FinishedFile(archived, digest, size, record.sha256)
 
     def discard(self) -> None:

@@ -45,8 +45,8 @@ class FolderWriter:
         note, attempt = self._entries.append, self._attempts[trial.number]
         return TrialWriter.open(self._folder, trial, attempt, note, self._timing)
 
-    def taken(self) -> tuple[Entry, ...]:
-        """What the journal is to say, since this was last asked."""
+    def take_entries(self) -> tuple[Entry, ...]:
+        """The journal entries since the last call."""
         taken = tuple(self._entries)
         self._entries.clear()
         return taken

@@ -1,4 +1,4 @@
-"""Trials in processes: the archive that threads make, whoever stops them, dies or hangs."""
+"""Worker processes archive what threads archive, also after a stop, a kill or a lost worker."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from campaign.archive.layout.journal import JOURNAL, Decision
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import ArchiveError
 from campaign.execution.attempt import Conditions
-from campaign.execution.crew import Processes, apart
+from campaign.execution.executors import ProcessExecutor, process_executor
 from campaign.execution.measuring import Measuring
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
@@ -29,26 +29,13 @@ from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.protocol import Plan
 from campaign.recording import Outcome
+from tests import archives
 from tests.archives import plan_of
 from tests.system.user import environment
 
-PROTOCOL = """
-title = "Drawn"
-
-[[test]]
-name = "sea"
-kind = "stabilization"
-bench = "simulink"
-seed = 5
-frequency = "2 Hz"
-acceleration = "18 deg/s^2"
-settle_cycles = 1
-cycles = 1
-repeat = 12
-
-[test.matrix]
-compensation = ["none", "lugre", "static"]
-"""
+PROTOCOL = archives.PROTOCOL.replace("cycles = 3", "cycles = 1\nrepeat = 12").replace(
+    '["none", "static"]', '["none", "lugre", "static"]'
+)
 TRIALS = 36
 
 
@@ -120,8 +107,8 @@ def test_processes_archive_what_threads_archive(
 def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
     plan: Plan, by_threads: RunReader, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    halt, halts = Processes.halt, []
-    monkeypatch.setattr(Processes, "halt", lambda crew: halts.append(halt(crew)))
+    stop_it, stops = ProcessExecutor.stop, []
+    monkeypatch.setattr(ProcessExecutor, "stop", lambda executor: stops.append(stop_it(executor)))
     stop = StopSwitch()
 
     def display(progress: Progress) -> None:
@@ -130,7 +117,7 @@ def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
 
     outcome = run(plan, tmp_path, display=display, stop=stop)
     assert outcome.status is RunStatus.INTERRUPTED
-    assert halts
+    assert stops
     assert len(open_run(outcome.archive).trials) < TRIALS
     writer = RunWriter.resume(
         outcome.archive, at="2026-11-21T10:00:00Z", host={}, versions={}, command=()
@@ -139,16 +126,16 @@ def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
     assert_same(outcome.archive, by_threads)
 
 
-def test_what_is_under_way_in_processes_ends_when_the_crew_is_halted(
+def test_what_is_under_way_in_processes_ends_when_the_executor_is_stopped(
     plan: Plan, tmp_path: Path
 ) -> None:
     header = RunHeader(name="run", created="2026-11-21T09:36:58Z", trials=len(plan.trials))
     told: list[Outcome] = []
     with closing(RunWriter.create(tmp_path, header, plan.trials)) as writer:
         conditions = Conditions(SimBackend(SimOptions()), writer, lambda: False, Supervision())
-        with apart(1, conditions, writer) as crew:
-            crew.halt()
-            crew.begin(
+        with process_executor(1, conditions, writer) as executor:
+            executor.stop()
+            executor.submit(
                 plan.trials[:1], lambda trial, done, _: told.append(done.ending.outcome)
             ).result()
     assert told == [Outcome.INTERRUPTED]
@@ -174,7 +161,7 @@ def test_a_process_that_is_killed_costs_time(
     assert outcome.status is RunStatus.COMPLETE
     assert_same(outcome.archive, by_threads)
     decisions = open_run(outcome.archive).story.all(Decision)
-    assert [each.decision for each in decisions] == ["process lost"] * len(decisions)
+    assert [each.decision for each in decisions] == ["worker lost"] * len(decisions)
     assert decisions
 
 
@@ -186,7 +173,7 @@ def test_processes_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> No
 
     outcome = run(plan, tmp_path, display=display)
     assert outcome.status is RunStatus.FAULT
-    assert "out of memory?" in outcome.reason
+    assert "the memory may be too small" in outcome.reason
 
 
 def test_a_folder_that_is_taken_away_ends_the_run(plan: Plan, tmp_path: Path) -> None:
@@ -202,8 +189,9 @@ def test_a_folder_that_is_taken_away_ends_the_run(plan: Plan, tmp_path: Path) ->
 ALONE = """
 import sys
 from pathlib import Path
+from tests import archives
 from tests.archives import plan_of
-from tests.execution.test_crew import PROTOCOL, run
+from tests.execution.test_executors import PROTOCOL, run
 
 def display(progress):
     if progress.done:

@@ -1,0 +1,318 @@
+"""Batch executors: worker threads of this process, or worker processes for large simulated runs.
+
+A worker thread writes journal entries itself. A worker process writes trial files and measures
+them; it returns the journal entries with each trial's end, and the parent writes them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import pickle
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Protocol
+
+from campaign import processes
+from campaign.archive.layout.journal import Entry
+from campaign.archive.reading.measured import Measure
+from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.backends.interface import Backend, Timed
+from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
+from campaign.execution.measuring import Measuring
+from campaign.execution.safety import describe
+from campaign.execution.supervision import Supervision
+from campaign.execution.writer import PlanWriter
+from campaign.experiments import experiments
+from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
+from campaign.trial import Trial
+
+FEWEST_FOR_PROCESSES = 300
+"""Trials from which on processes save more time than they take to start."""
+PRELOADED = (
+    "campaign.archive.writing.trial_file",
+    "campaign.backends.sim",
+    "campaign.execution.executors",
+    "campaign.experiments",
+    "campaign.physics.simulate",
+)
+"""Modules that the fork server imports once for all worker processes."""
+OnEnd = Callable[[Trial, Executed, Sequence[Entry]], None]
+"""Receives how a trial ended and its journal entries still to be written; from any thread."""
+
+
+class BatchExecutor(Protocol):
+    """Executes batches in parallel; a batch is trials that go through the backend together.
+
+    Attributes:
+        most_pending: batches to submit before any of them has ended.
+    """
+
+    most_pending: int
+
+    def submit(self, batch: Sequence[Trial], on_end: OnEnd) -> Future[None]:
+        """Execute a batch. The future raises what the archive raised, or WorkerLostError."""
+
+    def stop(self) -> None:
+        """End the trials that are being executed, as soon as possible."""
+
+
+class WorkerLostError(Exception):
+    """A worker process died; trials of the batch that have not been reported must be repeated.
+
+    Attributes:
+        times: how often this has happened in this run.
+    """
+
+    def __init__(self, times: int) -> None:
+        super().__init__(f"a worker process ended unexpectedly ({times} in this run)")
+        self.times = times
+
+
+@dataclass
+class ThreadExecutor:
+    """Daemon threads: none of them keeps the program from exiting."""
+
+    most_pending: int
+    conditions: Conditions
+    _tasks: SimpleQueue[Callable[[], None] | None]
+
+    def submit(self, batch: Sequence[Trial], on_end: OnEnd) -> Future[None]:
+        """See `BatchExecutor`."""
+        future: Future[None] = Future()
+
+        def task() -> None:
+            try:
+                execute(batch, self.conditions, lambda trial, executed: on_end(trial, executed, ()))
+            except BaseException as error:  # noqa: BLE001 - the archive's, raised by the future
+                future.set_exception(error)
+            else:
+                future.set_result(None)
+
+        self._tasks.put(task)
+        return future
+
+    def stop(self) -> None:
+        """Nothing to do: threads ask whether the run is to end."""
+
+
+@contextmanager
+def thread_executor(count: int, conditions: Conditions) -> Iterator[ThreadExecutor]:
+    """An executor with `count` threads."""
+    tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+
+    def serve() -> None:
+        while (task := tasks.get()) is not None:
+            task()
+
+    threads = [threading.Thread(target=serve, name="trial", daemon=True) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield ThreadExecutor(count, conditions, tasks)
+    finally:
+        for _ in threads:
+            tasks.put(None)
+    for thread in threads:
+        thread.join()  # nothing hangs: all trials have ended
+
+
+def execute(
+    batch: Sequence[Trial], conditions: Conditions, on_end: Callable[[Trial, Executed], None]
+) -> None:
+    """Execute a batch; report each trial once it is archived. Raises what the archive raises."""
+    if len(batch) == 1:
+        on_end(batch[0], execute_once(batch[0], conditions))
+    else:
+        execute_together(batch, conditions, on_end)
+
+
+@dataclass(frozen=True)
+class _WorkerSetup:
+    """What a worker process receives when it starts."""
+
+    backend: Backend
+    folder: Path
+    supervision: Supervision
+    is_measured: bool
+    is_timed: bool
+
+
+@dataclass(frozen=True)
+class _BatchResult:
+    """What a worker process returns of a batch.
+
+    Attributes:
+        ended: of each archived trial: number, how it ended, journal entries.
+        error: what the archive raised; later trials of the batch are missing then.
+        spent: time by kind of work; empty when not measured.
+    """
+
+    ended: tuple[tuple[int, Executed, tuple[Entry, ...]], ...]
+    error: BaseException | None
+    spent: Mapping[Work, Spent]
+
+
+class ProcessExecutor:
+    """A pool of processes on this machine. When one dies, a new pool takes the next batches."""
+
+    def __init__(self, count: int, conditions: Conditions, writer: PlanWriter) -> None:
+        self.most_pending = count + 1  # no worker waits while the parent writes the journal
+        self._count = count
+        self._writer = writer
+        self._timing = conditions.supervision.timing
+        setup = _WorkerSetup(
+            conditions.backend,
+            writer.folder.absolute(),
+            replace(conditions.supervision, subscribers=(), timing=UNTIMED),
+            is_measured=conditions.measure is not None,
+            is_timed=self._timing is not UNTIMED,
+        )
+        self._setup = pickle.dumps(setup, pickle.HIGHEST_PROTOCOL)
+        self._context = processes.process_context(PRELOADED)
+        # No Event: a worker that dies while it asks would keep the lock of one for ever.
+        self._stopped = self._context.RawValue(ctypes.c_bool, False)
+        self._pool: ProcessPoolExecutor | None = None
+        self._lock = threading.Lock()
+        self._lost = 0  # pools
+        self._others = set(multiprocessing.active_children())
+
+    def submit(self, batch: Sequence[Trial], on_end: OnEnd) -> Future[None]:
+        """See `BatchExecutor`."""
+        future: Future[None] = Future()
+        attempts = {trial.number: self._writer.attempt(trial) for trial in batch}
+        pool = self._pool = self._pool or self._new_pool()
+        try:
+            result = pool.submit(_execute_batch, batch, attempts)
+        except BrokenProcessPool:
+            self._on_loss(pool, future)
+        else:
+            result.add_done_callback(partial(self._on_result, pool, batch, on_end, future))
+        return future
+
+    def stop(self) -> None:
+        """See `BatchExecutor`."""
+        self._stopped.value = True
+
+    def close(self, *, at_once: bool) -> None:
+        """Wait for the batches that are being executed, or kill their processes."""
+        if self._pool is None:
+            return
+        if at_once:
+            for process in set(multiprocessing.active_children()) - self._others:
+                process.kill()
+        self._pool.shutdown(cancel_futures=at_once)
+
+    def _new_pool(self) -> ProcessPoolExecutor:
+        arguments = self._setup, self._stopped
+        return ProcessPoolExecutor(self._count, self._context, _initialize, arguments)
+
+    def _on_result(
+        self,
+        pool: ProcessPoolExecutor,
+        batch: Sequence[Trial],
+        on_end: OnEnd,
+        future: Future[None],
+        result: Future[_BatchResult],
+    ) -> None:
+        """Called in a thread of the pool."""
+        try:
+            found = result.result()
+        except BrokenProcessPool:
+            self._on_loss(pool, future)
+            return
+        except BaseException as error:  # noqa: BLE001 - a bug, raised by the future
+            future.set_exception(error)
+            return
+        trials = {trial.number: trial for trial in batch}
+        for number, executed, entries in found.ended:
+            on_end(trials[number], executed, entries)
+        self._timing.add_worker(found.spent)
+        if found.error is None:
+            future.set_result(None)
+        else:
+            future.set_exception(found.error)
+
+    def _on_loss(self, pool: ProcessPoolExecutor, future: Future[None]) -> None:
+        """The death of one process ends its pool and every batch submitted to it."""
+        with self._lock:
+            if self._pool is pool:
+                self._pool = None
+                self._lost += 1
+            error = WorkerLostError(self._lost)
+        future.set_exception(error)
+
+
+@contextmanager
+def process_executor(
+    count: int, conditions: Conditions, writer: PlanWriter
+) -> Iterator[ProcessExecutor]:
+    """An executor with `count` processes, which start with the first batch."""
+    executor = ProcessExecutor(count, conditions, writer)
+    try:
+        yield executor
+    except BaseException:
+        executor.close(at_once=True)
+        raise
+    executor.close(at_once=False)
+
+
+# State of a worker process
+
+_setup: _WorkerSetup | None = None
+_stopped: ctypes.c_bool | None = None
+_measure: Measure | None = None
+_stopwatch: Stopwatch | None = None
+
+
+def _initialize(pickled: bytes, stopped: ctypes.c_bool) -> None:
+    global _setup, _stopped, _measure, _stopwatch
+    processes.initialize_worker()
+    setup: _WorkerSetup = pickle.loads(pickled)  # noqa: S301 - from the parent process
+    _setup, _stopped = setup, stopped
+    _stopwatch = Stopwatch() if setup.is_timed else None
+    timing = _stopwatch or UNTIMED
+    _measure = Measuring(experiments(), timing) if setup.is_measured else None
+    if isinstance(setup.backend, Timed):
+        setup.backend.timing = timing
+
+
+def _execute_batch(batch: Sequence[Trial], attempts: Mapping[int, int]) -> _BatchResult:
+    """Execute a batch in a worker process."""
+    if _setup is None or _stopped is None:
+        raise RuntimeError("the worker process was not initialized")
+    stopped, timing = _stopped, _stopwatch or UNTIMED
+    writer = FolderWriter(_setup.folder, attempts, timing)
+    supervision = replace(_setup.supervision, timing=timing)
+    conditions = Conditions(
+        _setup.backend, writer, lambda: bool(stopped.value), supervision, _measure
+    )
+    ended: list[tuple[int, Executed, tuple[Entry, ...]]] = []
+
+    def on_end(trial: Trial, executed: Executed) -> None:
+        if executed.bug is not None:
+            executed = replace(executed, bug=_picklable(executed.bug))
+        ended.append((trial.number, executed, writer.take_entries()))
+
+    error: BaseException | None = None
+    try:
+        execute(batch, conditions, on_end)
+    except BaseException as raised:  # noqa: BLE001 - trials that ended before are reported
+        error = _picklable(raised)
+    return _BatchResult(tuple(ended), error, _stopwatch.take() if _stopwatch else {})
+
+
+def _picklable(error: BaseException) -> BaseException:
+    """The exception, or a RuntimeError with its description."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - made in this line
+    except Exception:  # noqa: BLE001 - an exception of a plug-in
+        return RuntimeError(describe(error))
+    return error
