@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from campaign.archive import RunWriter
 from campaign.archive.layout.storage import CHUNK, pack
+from campaign.archive.reading.measured import Measured
 from campaign.archive.writing.hdf5 import SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.errors import BackendError
-from campaign.recording import ChannelInfo
+from campaign.recording import ChannelInfo, Ending, Outcome
 
 
 def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
@@ -26,6 +27,29 @@ def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
             assert columns.length - (len(file["x"]) if "x" in file else 0) <= CHUNK
         columns.finish()
         assert len(file["x"]) == columns.length == 200_000
+
+
+@pytest.mark.parametrize("count", [1, CHUNK - 1, CHUNK, CHUNK + 50, 2 * CHUNK])
+def test_metrics_see_every_sample_of_a_recording(kit, tmp_path, count):
+    trial, (time, block) = kit.trial(1), kit.samples(count)
+    writer = RunWriter.create(tmp_path, kit.header(), [trial])
+    recorder = writer.begin(trial)
+    recorder.start(kit.CHANNELS)
+    recorder.append(time, block)
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    seen = []
+
+    def measure(data):
+        seen.append(data.recording())
+        return Measured()
+
+    recorder.measure(measure)
+    for recording in (*seen, writer.archived(1).recording()):
+        assert recording.time.tobytes() == time.tobytes()
+        channels = zip(kit.CHANNELS, block, strict=True)
+        assert all(recording[each.name].tobytes() == row.tobytes() for each, row in channels)
+    assert len(seen) == 1
+    writer.close()
 
 
 def test_the_preview_keeps_within_its_points_however_long_the_recording():

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -29,6 +29,7 @@ from campaign.execution.supervision import Supervision
 from campaign.experiments import experiments
 from campaign.protocol import Plan
 from campaign.recording import Outcome
+from campaign.stopwatch import UNTIMED, Stopwatch, Timing, Work
 from tests import archives
 from tests.archives import plan_of
 from tests.system.user import environment
@@ -52,6 +53,7 @@ def run(
     display: Callable[[Progress], object] = lambda progress: None,
     stop: StopSwitch | None = None,
     writer: RunWriter | None = None,
+    timing: Timing = UNTIMED,
 ) -> RunOutcome:
     header = RunHeader(name="run", created="2026-11-21T09:36:58Z", trials=len(plan.trials))
     writer = writer or RunWriter.create(folder, header, plan.trials)
@@ -65,6 +67,7 @@ def run(
             stop=stop or StopSwitch(),
             measure=Measuring(experiments()),
             finished={n: o for n, o in writer.finished.items() if o is Outcome.COMPLETED},
+            supervision=Supervision(timing=timing),
             in_processes=in_processes,
         )
 
@@ -98,10 +101,15 @@ def test_processes_archive_what_threads_archive(
             lines = journal.read_text(encoding="utf-8").splitlines()
             assert progress.done <= sum('"trial finished"' in line for line in lines)
 
-    outcome = run(plan, tmp_path, display=display)
+    stopwatch = Stopwatch()
+    outcome = run(plan, tmp_path, display=display, timing=stopwatch)
     assert outcome.status is RunStatus.COMPLETE
     assert_same(outcome.archive, by_threads)
     assert not multiprocessing.active_children()
+    spent = stopwatch.spent()
+    for work in (Work.ENGINE, Work.TRIAL_FILES, Work.MEASURING):
+        assert spent[work].others > 0.0
+        assert spent[work].processor > 0.01
 
 
 def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
@@ -141,37 +149,36 @@ def test_what_is_under_way_in_processes_ends_when_the_executor_is_stopped(
     assert told == [Outcome.INTERRUPTED]
 
 
-def kill_one() -> None:
-    """The first process that works for this one."""
-    children = [c for c in multiprocessing.active_children() if c.pid]
-    os.kill(children[0].pid or 0, signal.SIGKILL)
+def kill_workers() -> bool:
+    """Whether there were any."""
+    children = multiprocessing.active_children()
+    for child in children:
+        with suppress(ProcessLookupError):  # it has ended since
+            os.kill(child.pid or 0, signal.SIGKILL)
+    return bool(children)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_a_process_that_is_killed_costs_time(
+def test_trials_of_workers_that_are_killed_are_repeated(
     plan: Plan, by_threads: RunReader, tmp_path: Path
 ) -> None:
-    left = [kill_one]
+    killed: list[bool] = []
 
     def display(progress: Progress) -> None:
-        if progress.done and left:
-            left.pop()()
+        if progress.done and not any(killed):
+            killed.append(kill_workers())
 
     outcome = run(plan, tmp_path, display=display)
     assert outcome.status is RunStatus.COMPLETE
     assert_same(outcome.archive, by_threads)
     decisions = open_run(outcome.archive).story.all(Decision)
-    assert [each.decision for each in decisions] == ["worker lost"] * len(decisions)
-    assert decisions
+    assert {each.decision for each in decisions} == {"worker lost"}
+    assert all("(1 in this run)" in each.reason for each in decisions)  # of one pool
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_processes_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> None:
-    def display(progress: Progress) -> None:
-        if multiprocessing.active_children():
-            kill_one()
-
-    outcome = run(plan, tmp_path, display=display)
+def test_workers_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> None:
+    outcome = run(plan, tmp_path, display=lambda progress: kill_workers())
     assert outcome.status is RunStatus.FAULT
     assert "the memory may be too small" in outcome.reason
 
