@@ -55,6 +55,8 @@ def test_many_loops_are_read_as_one_is() -> None:
     waves = np.cos(np.pi * np.arange(1, 9)[:, None] * place)
     gain = 2.5 - 5.0 * place + random.normal(size=(100, 8)) * 0.5 @ waves
     phase = -0.5 - 5.0 * place + random.normal(size=(100, 8)) * 0.4 @ waves
+    gain[:5] += 8.0  # no crossover within the frequencies
+    gain[5:10] -= 8.0
     logs = gain + 1j * phase
     found = np.array(_read(frequency, logs), dtype=float).T
     expected = np.array([slowly(frequency, log) for log in logs], dtype=float)
