@@ -25,6 +25,7 @@ from campaign.archive.layout.journal import Entry
 from campaign.archive.reading.measured import Measure
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.backends.interface import Backend, Timed
+from campaign.errors import ArchiveError
 from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
 from campaign.execution.measuring import Measuring
 from campaign.execution.safety import describe
@@ -306,6 +307,10 @@ def _execute_batch(batch: Sequence[Trial], attempts: Mapping[int, int]) -> _Batc
         execute(batch, conditions, on_end)
     except BaseException as raised:  # noqa: BLE001 - trials that ended before are reported
         error = _picklable(raised)
+    try:
+        writer.publish()
+    except ArchiveError as raised:
+        ended, error = [], error or raised
     return _BatchResult(tuple(ended), error, _stopwatch.take() if _stopwatch else {})
 
 

@@ -82,7 +82,7 @@ def main(folder: Path, count: int, seed: int) -> None:
     rng = random.Random(seed)
     sealed, killed = folder / "run.nxs", folder / "killed.partial"
     whole = {run: read(run)[0] for run in (sealed, killed)}
-    texts = ("journal.jsonl", "run.json", "plan.jsonl", "trial-00001.nxs")
+    texts = ("journal.jsonl", "run.json", "plan.jsonl", "trial-00001.trial")
     tally: Counter[str] = Counter()
     for number in range(count):
         run = killed if number % 4 == 0 else sealed

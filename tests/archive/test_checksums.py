@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 
 from campaign.archive import open_run
 from campaign.archive.layout.checksums import BLOCK, SeriesDigest, series_digest, text_digest
-from campaign.archive.writing.hdf5 import SampleColumns
+from campaign.archive.layout.packed_trial import PackedTrial
+from campaign.archive.reading.series import file_series
+from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 
 EDGES = [0, 1, 7, 32_767, 32_768, 32_769, 65_536, 100_003]
 
@@ -79,16 +81,21 @@ def test_every_sample_and_its_place_count():
 
 @pytest.mark.parametrize("chunk", [16, 1000, BLOCK])
 @pytest.mark.parametrize("count", [0, 40, 33_000])
-def test_columns_tell_the_digest_of_what_was_appended_kept_or_not(chunk, count):
+def test_columns_tell_the_digest_of_what_was_appended_kept_or_not(tmp_path, chunk, count):
     samples = noise(count)
     found = []
-    with h5py.File("x.h5", "w", driver="core", backing_store=False) as file:
-        for group in (file, None):
-            columns = SampleColumns(group, {"x": {}}, chunk)
-            for start in range(0, count, 999):
-                columns.append([samples[start : start + 999]])
-            found.append(columns.finish()[1])
-        assert file["x"][:].tobytes() == samples.tobytes()
+    kept = PackedFile(tmp_path / "x.trial")
+    for file in (kept, None):
+        columns = SampleColumns(["x"], file, chunk)
+        for start in range(0, count, 999):
+            columns.append([samples[start : start + 999]])
+        found.append(columns.finish()[1])
+        if file is kept:
+            (series,) = columns.series
+    kept.finish(PackedTrial(record="", trees=""))
+    with (tmp_path / "x.trial").open("rb") as stored:
+        samples_there = file_series(stored, "x", count, series).read(described(samples))
+    assert samples_there.tobytes() == samples.tobytes()
     assert found == [[described(samples)]] * 2
 
 

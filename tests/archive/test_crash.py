@@ -154,11 +154,11 @@ def test_a_journal_line_that_cannot_be_written_leaves_no_trace(tmp_path, kit, mo
 def test_a_trial_file_that_changed_is_not_sealed(tmp_path, kit):
     writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
     kit.record(writer, kit.trial(1), None)  # a failed one: it is copied when the run ends
-    path = writer.folder / "trial-00001.nxs"
+    path = writer.folder / "trial-00001.trial"
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
-    with pytest.raises(ArchiveError, match=r"trial-00001\.nxs: is not what the journal says"):
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial: is not what the journal says"):
         writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     assert writer.folder.is_dir()
     assert not list(tmp_path.glob("*.nxs*"))

@@ -401,7 +401,7 @@ def test_a_journal_cannot_name_a_file_outside_its_folder(tmp_path, kit):
     kit.record(writer, kit.trial(1), 5)
     journal = writer.folder / "journal.jsonl"
     lines = journal.read_text().splitlines()
-    entry = json.loads(lines[1]) | {"file": "../../trial-00001.nxs"}
+    entry = json.loads(lines[1]) | {"file": "../../trial-00001.trial"}
     journal.write_text("\n".join([lines[0], json.dumps(entry), lines[1]]) + "\n")
     run = listed(writer.folder, "^journal.jsonl:2: is not a line of a journal")
     assert [trial.path.parent for trial in run.trials] == [writer.folder]
@@ -413,8 +413,8 @@ def test_a_trial_file_that_is_gone_or_damaged_costs_only_itself(tmp_path, kit):
     for trial in trials:
         kit.record(writer, trial, 5)
     writer.close()
-    (writer.folder / "trial-00001.nxs").unlink()
-    (writer.folder / "trial-00002.nxs").write_bytes(b"\x89HDF\r\n\x1a\n" * 9)
-    run = listed(writer.folder, "^trial-00001.nxs: there is no such file")
+    (writer.folder / "trial-00001.trial").unlink()
+    (writer.folder / "trial-00002.trial").write_bytes(b"\x89HDF\r\n\x1a\n" * 9)
+    run = listed(writer.folder, "^trial-00001.trial: there is no such file")
     assert [damage.trial for damage in run.damaged] == ["trial-00001", "trial-00002"]
     assert [trial.trial.number for trial in run.trials] == [3]

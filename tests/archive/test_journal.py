@@ -142,7 +142,7 @@ def test_what_a_line_may_say() -> None:
     """Numbers count from 1, files are a run's own, and what is not known is left out."""
     for wrong in (
         {"trial": 0}, {"attempt": 0}, {"bytes": -1}, {"sha256": "0" * 63}, {"sha256": "G" * 64},
-        {"file": "../trial-00001.nxs"}, {"file": "trial-1.nxs"}, {"file": "trial-00001.nxs\n"},
+        {"file": "../trial-00001.trial"}, {"file": "trial-1.nxs"}, {"file": "trial-00001.trial\n"},
     ):  # fmt: skip
         with pytest.raises(ValidationError):
             TrialFinished.model_validate({**finished(1).model_dump(), **wrong})

@@ -63,7 +63,7 @@ def test_a_trial_is_on_the_disk_before_the_journal_says_so(
     folder, journal = writer.folder, writer.folder / JOURNAL
     calls = finish_one(writer, trials[0])
     writer.close()
-    final = folder / "trial-00001.nxs"
+    final = folder / "trial-00001.trial"
     part = final.with_name(final.name + PART)
     calls.in_order(
         ("fsync", part), ("rename", final), ("fsync", folder), ("write", journal),
@@ -97,7 +97,7 @@ def test_a_trial_is_reported_before_it_is_measured(
         recorder.measure(measure)
     writer.close()
     (start,) = before
-    calls.in_order(("rename", writer.folder / "trial-00001.nxs"), ("fsync", journal))
+    calls.in_order(("rename", writer.folder / "trial-00001.trial"), ("fsync", journal))
     assert calls.synced_before(start, journal)
     told = [json.loads(call.data)["event"] for call in calls.listed[:start] if call.data]
     assert told == ["trial finished"]

@@ -216,8 +216,8 @@ def test_a_torn_last_line_is_cut_before_more_is_written(tmp_path, kit):
     writer.close()
     with (writer.folder / JOURNAL).open("ab") as journal:
         journal.write(b'{"at":"2026-11-21T09:3')
-    (writer.folder / "trial-00003.nxs.part").write_bytes(b"half of it")
-    (writer.folder / "trial-00003.nxs").write_bytes(b"whole, and never reported")
+    (writer.folder / "trial-00003.trial.part").write_bytes(b"half of it")
+    (writer.folder / "trial-00003.trial").write_bytes(b"whole, and never reported")
     writer = RunWriter.resume(writer.folder, **RESUMED)
     assert {path.name for path in writer.folder.glob("*.part")} <= {"sealed.nxs.part"}
     assert b'09:3{"' not in (writer.folder / JOURNAL).read_bytes()
@@ -229,13 +229,13 @@ def test_a_torn_last_line_is_cut_before_more_is_written(tmp_path, kit):
 def test_a_changed_trial_file_is_named_and_nothing_is_touched(tmp_path, kit):
     writer, _ = begin(tmp_path, kit)
     writer.close()
-    path = writer.folder / "trial-00002.nxs"
+    path = writer.folder / "trial-00002.trial"
     path.write_bytes(path.read_bytes()[:-1] + b"!")
     before = (writer.folder / JOURNAL).read_bytes()
-    with pytest.raises(ArchiveError, match=r"trial-00002\.nxs: is not what the journal says"):
+    with pytest.raises(ArchiveError, match=r"trial-00002\.trial: is not what the journal says"):
         RunWriter.resume(writer.folder, **RESUMED)
     path.unlink()
-    with pytest.raises(ArchiveError, match=r"trial-00002\.nxs"):
+    with pytest.raises(ArchiveError, match=r"trial-00002\.trial"):
         RunWriter.resume(writer.folder, **RESUMED)
     assert (writer.folder / JOURNAL).read_bytes() == before
 

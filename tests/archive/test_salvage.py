@@ -199,14 +199,16 @@ def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path
     for trial in trials:
         kit.record(writer, trial, 20)
     writer.close()
-    first, second = (writer.folder / f"trial-0000{n}.nxs" for n in (1, 2))
-    with h5py.File(second, "r+") as file:
-        file.move("trial_00002", "trial_00001")
+    first, second = (writer.folder / f"trial-0000{n}.trial" for n in (1, 2))
     first.unlink()
     second.rename(first)
     run = open_run(writer.folder)
     assert run.trials == ()
-    told(run, f"trial-00001.nxs/trial_00001/record/json{MISMATCH}", "trial-00002.nxs: there is no")
+    told(
+        run,
+        f"trial-00001.trial/trial_00001/record/json{MISMATCH}",
+        "trial-00002.trial: there is no",
+    )
 
 
 def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit):

@@ -262,11 +262,11 @@ def test_a_copy_is_told_of_with_where_its_samples_lie(one):
     assert file.placed.keys() == {"trial_00001_attempt_1"}
     placed = file.placed["trial_00001_attempt_1"]
     units = {"time": "s", "command": "rad/s", "gyro_rate": "rad/s", "friction_torque": "N m"}
-    assert {each.name: each.unit for each in placed} == units
-    assert len({each.layout for each in placed}) == 4
-    for each in placed:
-        ((offset, size),) = each.layout
-        assert each.group == "data"
+    assert {key: unit for key, (unit, _) in placed.items()} == {
+        ("data", name): unit for name, unit in units.items()
+    }
+    assert len({layout for _, layout in placed.values()}) == 4
+    for _, ((offset, size),) in placed.values():
         assert offset > 0
         assert size > 0
     file.discard()
@@ -297,7 +297,7 @@ def test_whoever_discards_it_leaves_no_file_and_may_do_it_again(one, tmp_path):
 def test_a_file_that_is_not_what_the_journal_says_is_not_copied(one):
     folder, file, (first, _) = one
     other = first.model_copy(update={"sha256": "0" * 64})
-    with pytest.raises(ArchiveError, match=r"trial-00001\.nxs: is not what the journal says"):
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial: is not what the journal says"):
         file.copy(folder, other, "trial_00001")
     assert file.copied == {}
     file.discard()
@@ -306,7 +306,9 @@ def test_a_file_that_is_not_what_the_journal_says_is_not_copied(one):
 def test_a_record_that_is_not_the_one_of_the_journal_is_not_copied(one):
     folder, file, (first, _) = one
     other = first.model_copy(update={"record": "0" * 64})
-    with pytest.raises(ArchiveError, match=r"trial-00001\.nxs: /trial_00001/record/json: does not"):
+    with pytest.raises(
+        ArchiveError, match=r"trial-00001\.trial: /trial_00001/record/json: does not"
+    ):
         file.copy(folder, other, "trial_00001")
     assert (file.copied, list(file._file)) == ({}, [])
     file.discard()

@@ -19,10 +19,10 @@ from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
 from campaign.archive.layout.run_folder import SEALING
 from campaign.archive.reading.series import Series
 from campaign.archive.verifying.verification import verify_run
-from campaign.archive.writing import hdf5 as hdf5_module
-from campaign.archive.writing import sealed_file, sealing
+from campaign.archive.writing import packed_file, sealed_entry, sealed_file, sealing
+from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
-from campaign.recording import Ending, Outcome
+from campaign.recording import ChannelInfo, Ending, Outcome
 from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of
 
 WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well
@@ -53,14 +53,15 @@ def refused(writer: RunWriter, match: str) -> None:
 
 def corrupt_copy(monkeypatch, change) -> None:
     """From now on `change` is done to the copy of the second trial."""
-    real = hdf5_module.copy_entry
+    real = EntryWriter.write
 
-    def copy(source, name, target, new_name):
-        real(source, name, target, new_name)
-        if new_name == "trial_00002":
-            change(target[new_name])
+    def write(entries, name, *arguments):
+        written = real(entries, name, *arguments)
+        if name == "trial_00002":
+            change(entries._file[name])
+        return written
 
-    monkeypatch.setattr(sealed_file.hdf5, "copy_entry", copy)
+    monkeypatch.setattr(EntryWriter, "write", write)
 
 
 def flip_chunk(entry: h5py.Group) -> None:
@@ -131,9 +132,27 @@ def test_without_reading_back_a_wrong_chunk_would_be_sealed(tmp_path, kit, monke
     assert "trial_00002/data/friction_torque" in "".join(open_run(path).problems())
 
 
+def test_trials_of_many_forms_are_sealed_each_with_its_own(tmp_path, kit, monkeypatch):
+    """Of more lengths and units than groups are kept for copying, and back again."""
+    monkeypatch.setattr(sealed_entry, "_MOST_FORMS", 2)
+    writer, trials = begin(tmp_path, kit, 8)
+    for trial in trials:
+        number = trial.number % 4
+        unit = ("rad/s", "rad", "N m", "A")[number]
+        recorder = writer.begin(trial)
+        recorder.start((ChannelInfo("x", unit, "X", unit), ChannelInfo("y", "s", "Y", "s")))
+        recorder.append(np.arange(10.0 + number), np.full((2, 10 + number), float(number)))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    path = seal(writer)
+    assert verify_run(path).sound
+    with h5py.File(path) as file:
+        units = [file[f"trial_0000{n}/data/x"].attrs["units"] for n in range(1, 9)]
+    assert units == ["rad", "N m", "A", "rad/s"] * 2
+
+
 def test_a_chunk_that_was_stored_wrong_in_the_first_place_is_not_sealed(tmp_path, kit, monkeypatch):
     """The digest is of what was appended, not of what was stored."""
-    real = hdf5_module.pack
+    real = packed_file.pack
 
     def pack(samples, shuffled):
         wrong = np.array(samples)
@@ -142,7 +161,7 @@ def test_a_chunk_that_was_stored_wrong_in_the_first_place_is_not_sealed(tmp_path
         return real(wrong, shuffled)
 
     writer, trials = begin(tmp_path, kit)
-    monkeypatch.setattr(hdf5_module, "pack", pack)
+    monkeypatch.setattr(packed_file, "pack", pack)
     for trial, count in zip(trials, (50, 77, 50), strict=True):
         kit.record(writer, trial, count)
     with pytest.raises(ArchiveError, match=r"trial_00002/data/.* does not match its checksum"):
@@ -365,17 +384,17 @@ def test_a_copy_that_fails_costs_nothing_but_time(tmp_path, kit, monkeypatch, fa
 
 def test_who_interrupts_a_copy_is_heard_and_the_run_can_be_sealed(tmp_path, kit, monkeypatch):
     """The trial is in the journal by then."""
-    real = sealed_file.SealedFile._read_back
+    real = Series.check
     writer, trials = begin(tmp_path, kit)
     with monkeypatch.context() as interrupted:
 
         def interrupt(*arguments):
             raise KeyboardInterrupt
 
-        interrupted.setattr(sealed_file.SealedFile, "_read_back", interrupt)
+        interrupted.setattr(Series, "check", interrupt)
         with pytest.raises(KeyboardInterrupt):
             kit.record(writer, trials[0], 50)
-    assert sealed_file.SealedFile._read_back is real
+    assert Series.check is real
     kit.record(writer, trials[1], 50)
     path = seal(writer)
     assert len(open_run(path).trials) == 2
@@ -453,7 +472,11 @@ def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
     kit.record(writer, trials[0], 50)
     notes = {"notes.txt": b"the fan was on"}
     if how == "folder":
-        notes = {"photos/1.jpg": b"\xff\xd8", "photos/trial-00001.nxs": b"of mine", "a.part": b"?"}
+        notes = {
+            "photos/1.jpg": b"\xff\xd8",
+            "photos/trial-00001.trial": b"mine",
+            "a.part": b"?",
+        }
     for name, content in notes.items():
         path = writer.folder / name
         path.parent.mkdir(exist_ok=True)

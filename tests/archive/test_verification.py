@@ -107,13 +107,13 @@ def changed_is_named(good: Path, kinds: dict[str, str]) -> None:
 def test_a_killed_run_is_sound_and_what_is_not_its_is_named(folder):
     found = verify_run(folder)
     assert (found.problems, found.trials) == ((), 4)
-    assert [remark.place for remark in found.remarks] == ["trial-00004.nxs.part"]
+    assert [remark.place for remark in found.remarks] == ["trial-00004.trial.part"]
     for name in ("sealed.nxs.part", "notes.txt"):
         (folder / name).write_bytes(b"whatever it holds")
     found = verify_run(folder)
     assert found.problems == ()
     assert {remark.place: remark.reason for remark in found.remarks} == {
-        "trial-00004.nxs.part": "was never finished",
+        "trial-00004.trial.part": "was never finished",
         "notes.txt": "is not part of the run",
     }
 
@@ -275,12 +275,12 @@ def test_what_is_no_run_is_a_problem_and_no_error(tmp_path, name):
 
 
 def test_a_trial_file_that_changed_is_named(folder):
-    path = folder / "trial-00001.nxs"
+    path = folder / "trial-00001.trial"
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
     assert {damage.trial for damage in verify_run(folder).problems} == {"trial-00001"}
-    (folder / "trial-00002-2.nxs").unlink()
+    (folder / "trial-00002-2.trial").unlink()
     assert "trial-00002 (attempt 2)" in {damage.trial for damage in verify_run(folder).problems}
 
 
@@ -290,7 +290,7 @@ def test_a_trial_file_of_another_hash_is_named(folder):
     lines[1]["sha256"] = "0" * 64
     journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
     (problem,) = verify_run(folder).problems
-    assert (problem.place, problem.reason) == ("trial-00001.nxs", UNFINISHED)
+    assert (problem.place, problem.reason) == ("trial-00001.trial", UNFINISHED)
 
 
 @pytest.mark.parametrize("line", [0, 1, 2])

@@ -9,24 +9,26 @@ from hypothesis import strategies as st
 from campaign.archive import RunWriter
 from campaign.archive.layout.storage import CHUNK, pack
 from campaign.archive.reading.measured import Measured
-from campaign.archive.writing.hdf5 import SampleColumns
+from campaign.archive.reading.packed import read_packed
+from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.errors import BackendError
 from campaign.recording import ChannelInfo, Ending, Outcome
 
 
 def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        columns = SampleColumns(file, {"time": {}, "x": {}, "y": {}})
+    path = tmp_path / "x.trial"
+    file = PackedFile(path)
+    columns = SampleColumns(["time", "x", "y"], file)
+    assert columns.buffered_bytes == 3 * CHUNK * 8
+    rows = [np.zeros(5000)] * 3
+    for _ in range(40):
+        columns.append(rows)
         assert columns.buffered_bytes == 3 * CHUNK * 8
-        rows = [np.zeros(5000)] * 3
-        for _ in range(40):
-            columns.append(rows)
-            assert columns.buffered_bytes == 3 * CHUNK * 8
-            # All but the chunk that fills is in the file already.
-            assert columns.length - (len(file["x"]) if "x" in file else 0) <= CHUNK
-        columns.finish()
-        assert len(file["x"]) == columns.length == 200_000
+    columns.finish()
+    assert [len(series.chunks) for series in columns.series] == [7] * 3  # all but the last is there
+    assert columns.length == 200_000
+    file.close()
 
 
 @pytest.mark.parametrize("count", [1, CHUNK - 1, CHUNK, CHUNK + 50, 2 * CHUNK])
@@ -112,8 +114,10 @@ def test_sealing_copies_chunks_as_they_are(tmp_path, kit):
     writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
     kit.record(writer, kit.trial(1), CHUNK + 10)
     name = "trial_00001/data/gyro_rate"
-    with h5py.File(writer.folder / "trial-00001.nxs") as file:
-        before = [file[name].id.read_direct_chunk((start,)) for start in (0, CHUNK)]
+    content = (writer.folder / "trial-00001.trial").read_bytes()
+    packed = read_packed(writer.folder / "trial-00001.trial", "trial_00001")
+    (series,) = (each for each in packed.groups["data"] if each.name == "gyro_rate")
+    before = [(0, content[offset : offset + size]) for offset, size in series.chunks]
     with h5py.File(writer.seal("complete", ended=kit.ENDED)) as file:
         after = [file[name].id.read_direct_chunk((start,)) for start in (0, CHUNK)]
     assert before == after

@@ -353,7 +353,7 @@ def test_metrics_attempts_and_decisions_are_told(made_up: ModuleType, tmp_path: 
             at=AT,
             trial=1,
             attempt=attempt,
-            file="trial-00001.nxs",
+            file="trial-00001.trial",
             sha256="0" * 64,
             record="1" * 64,
             bytes=1,

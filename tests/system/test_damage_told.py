@@ -277,11 +277,11 @@ def test_a_run_that_was_killed_is_told_of_alike(archive: Path, tmp_path: Path):
         for trial in trials:
             recorder = writer.begin(trial)
             recorder.finish(Ending(Outcome.COMPLETED), "2026-11-21T09:37:00Z", header.created)
-    (tmp_path / "killed.partial" / "trial-00002.nxs").unlink()
+    (tmp_path / "killed.partial" / "trial-00002.trial").unlink()
     for command in (("show",), ("export", "--to", "csv")):
         done = told.run_campaign(command[0], "killed", *command[1:], "--results", tmp_path)
         assert done.exit_code == 4
-        assert "trial-00002: trial-00002.nxs: there is no such file" in done.stderr
+        assert "trial-00002: trial-00002.trial: there is no such file" in done.stderr
 
 
 def test_a_report_says_so_above_everything_else(archive: Path, tmp_path: Path):

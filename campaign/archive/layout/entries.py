@@ -10,8 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialFinished
+
+TRIAL = ".trial"
+"""Ending of the file of one trial, while its run is in progress."""
 
 ENTRY = re.compile(r"trial_([0-9]{5,10})(?:_attempt_([0-9]{1,6}))?")
 
@@ -27,8 +29,8 @@ def earlier_entry_name(trial_number: int, attempt: int) -> str:
 
 
 def file_name(trial_number: int, attempt: int) -> str:
-    """Name of a trial's file: `trial-00017.nxs`, and `trial-00017-2.nxs` for a second attempt."""
-    return f"trial-{trial_number:05d}{f'-{attempt}' if attempt > 1 else ''}{SEALED}"
+    """Name of a trial's file: `trial-00017.trial`; of a second attempt `trial-00017-2.trial`."""
+    return f"trial-{trial_number:05d}{f'-{attempt}' if attempt > 1 else ''}{TRIAL}"
 
 
 def entry_names(attempts: Iterable[TrialFinished]) -> dict[str, TrialFinished]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -55,9 +55,17 @@ def sync_folder(folder: Path) -> None:
 
 def publish(part: Path, final: Path) -> None:
     """Give a finished, closed `part` its real name, so that it is there whole or not at all."""
-    sync_file(part)
-    part.replace(final)
-    sync_folder(final.parent)
+    publish_all([(part, final)])
+
+
+def publish_all(files: Sequence[tuple[Path, Path]]) -> None:
+    """The same of several files of one folder, whose names are put on the disk together."""
+    for part, _ in files:
+        sync_file(part)
+    for part, final in files:
+        part.replace(final)
+    if files:
+        sync_folder(files[0][1].parent)
 
 
 def write_atomically(path: Path, content: str) -> None:

@@ -135,7 +135,7 @@ class TrialFinished(_Line):
     at: str
     trial: int = Field(ge=1)
     attempt: int = Field(default=1, ge=1)
-    file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs$")
+    file: str = Field(pattern=r"^trial-[0-9]{5,10}(-[0-9]{1,6})?\.(?:trial|nxs)$")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     record: str = Field(pattern=r"^[0-9a-f]{64}$")
     bytes: int = Field(ge=0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from typing import Any, Self
@@ -245,6 +245,17 @@ def make_record(
         windows=tuple(windows),
         estimates=tuple(_ESTIMATE.validate_python(plain(asdict(e))) for e in estimates),
     )
+
+
+def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
+    """Every series that an entry holds: its group, its name, its length, its digest."""
+    if record.samples is not None:
+        yield "data", "time", record.samples, record.time
+        for channel in record.channels:
+            yield "data", channel.name, record.samples, channel.sha256
+    if (preview := record.preview) is not None:
+        yield "preview", "time", preview.samples, preview.time
+        yield "preview", preview.channel, preview.samples, preview.values
 
 
 def plain(value: Any) -> Any:

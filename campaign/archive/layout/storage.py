@@ -21,7 +21,14 @@ Samples have theirs in their trial's record."""
 
 SAMPLE = np.dtype("<f8")
 
+LARGEST_CHUNK = 1 << 22
+"""Samples of a chunk that a reader accepts."""
+
 LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
+
+
+_TRIED = 4096  # samples on which both ways of storing a series are tried ...
+_DIFFER = 1024  # ... unless so many of them all differ, as those of no converter do
 
 
 def storable(text: str) -> str:
@@ -35,6 +42,19 @@ def pack(samples: Array, shuffled: bool) -> bytes:
     raw = raw.reshape(-1, samples.itemsize).T if shuffled else raw
     packed: bytes = isal_zlib.compress(raw.tobytes(), LEVEL)
     return packed
+
+
+def shuffling_helps(samples: Array) -> bool:
+    """Whether samples are better stored with all first bytes first, then all second ones ...
+
+    They are, but for those of a converter: few values, each of which comes again and again whole.
+    Looks at the beginning of `samples`, shape (n,).
+    """
+    told = samples[:_DIFFER]
+    if len(np.unique(told)) == len(told):
+        return True
+    tried = samples[:_TRIED]
+    return len(pack(tried, shuffled=True)) <= len(pack(tried, shuffled=False))
 
 
 def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:

@@ -14,7 +14,7 @@ from campaign.errors import ArchiveError
 _Read = TypeVar("_Read")
 
 _ENTRY = re.compile(r"trial_(\d{5,10})(?:_attempt_(\d{1,6}))?(?:/(?:data|preview)/(\w+))?")
-_FILE = re.compile(r"trial-(\d{5,10})(?:-(\d{1,6}))?\.nxs")
+_FILE = re.compile(r"trial-(\d{5,10})(?:-(\d{1,6}))?\.(?:trial|nxs)")
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Damage:
 
     Attributes:
         place: in the archive, e.g. `/trial_00002/data/gyro_rate`, `journal.jsonl:3` or
-            `trial-00002.nxs`; empty for the file as a whole.
+            `trial-00002.trial`; empty for the file as a whole.
         reason: what is wrong there, in a line.
         trial: the trial's name, e.g. `trial-00002`; an earlier attempt at it is
             `trial-00002 (attempt 1)`. Empty when it is not one trial's.

@@ -71,16 +71,13 @@ def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") ->
 
     `sealed_as` is the group that it becomes when the run is sealed.
     """
-    from campaign.archive.reading import guarded
-    from campaign.archive.reading.recorded import archived_trial
-    from campaign.archive.reading.sealed import read_entry
+    from campaign.archive.reading.packed import packed_record, read_packed
+    from campaign.archive.reading.recorded import PackedSamples, archived_trial
 
-    name = entry_name(finished.trial)
-    with guarded.open_file(path) as file, guarded.guarded(path, f"/{name}"):
-        record, trees = read_entry(path, file, name, finished.record)
-        kept = guarded.inner_group(guarded.inner_group(file, name), "record")
-        not_kept = guarded.text_at(kept, "not_kept") if "not_kept" in kept else ""
-        return archived_trial(path, name, record, trees, not_kept, sealed_as)
+    entry = entry_name(finished.trial)
+    packed = read_packed(path, entry)
+    record, trees = packed_record(path, entry, packed, finished.record)
+    return archived_trial(PackedSamples(path, entry, record, packed.not_kept, sealed_as), trees)
 
 
 def _plan_texts(folder: Path) -> tuple[str, str]:

@@ -23,7 +23,7 @@ from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.layout.files import why
-from campaign.archive.layout.storage import CHECKSUM, SAMPLE
+from campaign.archive.layout.storage import CHECKSUM, LARGEST_CHUNK, SAMPLE
 from campaign.archive.reading.heaps import heaps_are_sound
 from campaign.errors import ArchiveError
 
@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 _MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
-_LARGEST_CHUNK = 1 << 22  # samples
 _CHECKED_AT_ONCE = 1 << 18  # samples
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 _TEXT = h5py.string_dtype()
@@ -202,7 +201,7 @@ def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
     if len(shape) != 1 or identifier.dtype != SAMPLE or chunks is None:
         raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
     length, chunk = shape[0], chunks[0]
-    if not 0 < chunk <= _LARGEST_CHUNK:
+    if not 0 < chunk <= LARGEST_CHUNK:
         raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
     stored = identifier.get_storage_size()
     if length * SAMPLE.itemsize > stored * _MOST_EXPANSION:
@@ -246,6 +245,12 @@ def check_samples(dataset: h5py.Dataset) -> None:
 def attribute(item: h5py.HLObject, name: str) -> str:
     """A text attribute; ArchiveError when there is none."""
     return _text_attribute(item.id, name)
+
+
+def check_attribute(item: h5d.DatasetID, name: str, recorded: str) -> None:
+    """ArchiveError unless a text attribute says what was recorded."""
+    if (found := _text_attribute(item, name)) != recorded:
+        raise ArchiveError(f"{_named(item)}@{name}: is {found!r}, and {recorded!r} was recorded")
 
 
 def _text_attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> str:

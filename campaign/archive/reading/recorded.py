@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, ValuesView
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
-import h5py
 import numpy as np
 
 from campaign.archive.layout.header import SEALED
-from campaign.archive.layout.record import SeriesRecord, Trees, TrialRecord
+from campaign.archive.layout.record import SeriesRecord, Trees, TrialRecord, series_of
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import guarded
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.series import series_at
+from campaign.archive.reading.packed import read_packed
+from campaign.archive.reading.series import Series, file_series, series_at
 from campaign.errors import ArchiveError
 from campaign.recording import Array, Channel, ChannelInfo, Ending, Event, Recording
 from campaign.trial import Trial
@@ -26,20 +27,22 @@ PLOTTED = ("data", "preview")
 """The groups of an entry that hold samples."""
 
 
+_Open = Callable[[str, str, int, str], Series]
+"""Finds a series of an open trial: group, name, length and unit, which must be what is there."""
+
+
 @dataclass(frozen=True)
 class RecordedSamples:
-    """What a trial recorded: the group `entry` of a file, and the record that vouches for it.
+    """What a trial recorded: a group of a sealed run, and the record that vouches for it.
 
     Attributes:
         not_kept: why the samples are not there, and were not lost; empty when they are.
-        sealed_as: of a trial's own file, the group that it becomes when its run is sealed.
     """
 
     path: Path
     entry: str
     record: TrialRecord = field(repr=False)
     not_kept: str = ""
-    sealed_as: str = ""
 
     def recording(self, ending: Ending) -> Recording:
         """Events and times, and each channel when it is asked for."""
@@ -59,46 +62,78 @@ class RecordedSamples:
 
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
         """Channels, read now, one after another. Raises ArchiveError."""
-        with self._data() as data:
+        length = self.record.samples or 0
+        with self.opened() as series:
             for told in channels:
-                series = series_at(data, told.name, self.record.samples or 0)
-                samples = series.read(told.sha256)
-                check_unit(series.hdf5, told.unit)
+                samples = series("data", told.name, length, told.unit).read(told.sha256)
                 yield told.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
         if self.record.samples is None or self.not_kept:
             return
-        path, entry = self._place()
+        units = {info.name: info.unit for info in (TIME, *self.record.series)}
         try:
-            with guarded.open_file(path) as file:
-                yield from _problems(path, file, entry, self.record)
+            with self.opened() as series:
+                for group, name, length, digest in series_of(self.record):
+                    try:
+                        series(group, name, length, units[name]).check(digest)
+                    except ArchiveError as error:
+                        yield str(error)
         except ArchiveError as error:
             yield str(error)
 
     def _time(self) -> Array:
-        with self._data() as data:
-            series = series_at(data, TIME.name, self.record.samples or 0)
-            check_unit(series.hdf5, TIME.unit)
-            return series.read(self.record.time)
+        with self.opened() as series:
+            length = self.record.samples or 0
+            return series("data", TIME.name, length, TIME.unit).read(self.record.time)
 
     @contextmanager
-    def _data(self) -> Iterator[h5py.Group]:
-        path, entry = self._place()
-        with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry}"):
-            yield guarded.inner_group(guarded.inner_group(file, entry), "data")
+    def opened(self) -> Iterator[_Open]:
+        """The trial's series, while its file is open."""
+        with guarded.open_file(self.path) as file, guarded.guarded(self.path, f"/{self.entry}"):
+            entry = guarded.inner_group(file, self.entry)
+            inner = cache(partial(guarded.inner_group, entry))
 
-    def _place(self) -> tuple[Path, str]:
-        """Where the trial lies now: its run may have been sealed since it was opened."""
-        if self.sealed_as and not self.path.exists():
-            sealed = self.path.parent.with_suffix(SEALED)
-            if sealed.is_file():
-                return sealed, self.sealed_as
-        return self.path, self.entry
+            def series(group: str, name: str, length: int, unit: str) -> Series:
+                with guarded.guarded(self.path, f"/{self.entry}/{group}/{name}"):
+                    return series_at(inner(group), name, length, units=unit)
+
+            yield series
 
 
 @dataclass(frozen=True)
-class MemorySamples(RecordedSamples):
+class PackedSamples(RecordedSamples):
+    """The same of a trial's own file, in the folder of a run in progress.
+
+    Attributes:
+        sealed_as: the group that the trial becomes when its run is sealed.
+    """
+
+    sealed_as: str = ""
+
+    @contextmanager
+    def opened(self) -> Iterator[_Open]:
+        """See `RecordedSamples`."""
+        sealed = self.path.parent.with_suffix(SEALED)
+        if self.sealed_as and not self.path.exists() and sealed.is_file():  # since it was opened
+            with RecordedSamples(sealed, self.sealed_as, self.record).opened() as there:
+                yield there
+            return
+        packed = read_packed(self.path, self.entry)
+        with guarded.guarded(self.path), self.path.open("rb") as file:
+
+            def series(group: str, name: str, length: int, _: str) -> Series:
+                place = f"{self.path}: /{self.entry}/{group}/{name}"
+                for told in packed.groups.get(group, ()):
+                    if told.name == name:
+                        return file_series(file, place, length, told)
+                raise ArchiveError(f"{place}: is missing")
+
+            yield series
+
+
+@dataclass(frozen=True)
+class MemorySamples(PackedSamples):
     """The same of a trial that has just ended, which need not be read from its file.
 
     Attributes:
@@ -170,82 +205,30 @@ class LazyChannels(Mapping[str, Channel], Generic[_Told]):
         return len(self._told)
 
 
-def archived_trial(
-    path: Path,
-    entry: str,
-    record: TrialRecord,
-    trees: Trees,
-    not_kept: str = "",
-    sealed_as: str = "",
-) -> ArchivedTrial:
-    """The trial of a record; see `RecordedSamples`. Raises ArchiveError when it is not whole."""
+def archived_trial(samples: RecordedSamples, trees: Trees) -> ArchivedTrial:
+    """The trial of a record. Raises ArchiveError when it is not whole."""
+    place = f"{samples.path}: /{samples.entry}"
     try:
-        trial = record.restored(trees)
+        trial = samples.record.restored(trees)
     except LookupError:
-        raise ArchiveError(f"{path}: /{entry}: its bench or its options cannot be read") from None
+        raise ArchiveError(f"{place}: its bench or its options cannot be read") from None
     except ValueError as error:
-        raise ArchiveError(f"{path}: /{entry}: {first_line(error)}") from None
-    return trial_of_record(trial, path, entry, record, not_kept, sealed_as)
+        raise ArchiveError(f"{place}: {first_line(error)}") from None
+    return trial_of_record(trial, samples)
 
 
-def trial_of_record(
-    trial: Trial,
-    path: Path,
-    entry: str,
-    record: TrialRecord,
-    not_kept: str = "",
-    sealed_as: str = "",
-) -> ArchivedTrial:
+def trial_of_record(trial: Trial, samples: RecordedSamples) -> ArchivedTrial:
     """A trial that is at hand, with what its record says and vouches for."""
+    record = samples.record
     return ArchivedTrial(
         trial=trial,
         ending=record.ending,
         started=record.started,
         ended=record.ended,
-        path=path,
-        entry=entry,
-        samples=RecordedSamples(path, entry, record, not_kept, sealed_as),
+        path=samples.path,
+        entry=samples.entry,
+        samples=samples,
         windows=record.windows,
         estimates=record.estimates,
         measured_by=record.measured_by,
     )
-
-
-def parse_record(path: Path, place: str, text: str) -> TrialRecord:
-    """A record from its text. Raises ArchiveError."""
-    try:
-        return TrialRecord.model_validate_json(text)
-    except ValueError as error:
-        raise ArchiveError(f"{path}: {place}: {first_line(error)}") from None
-
-
-def check_unit(series: h5py.Dataset, told: str) -> None:
-    """ArchiveError unless a series has the unit in which it was recorded."""
-    unit = guarded.attribute(series, "units")
-    if unit != told:
-        place = f"{series.file.filename}: {series.name}@units"
-        raise ArchiveError(f"{place}: is {unit!r}, and {told!r} was recorded")
-
-
-def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
-    """Every series that an entry holds: its group, its name, its length, its digest."""
-    if record.samples is not None:
-        yield "data", "time", record.samples, record.time
-        for channel in record.channels:
-            yield "data", channel.name, record.samples, channel.sha256
-    if (preview := record.preview) is not None:
-        yield "preview", "time", preview.samples, preview.time
-        yield "preview", preview.channel, preview.samples, preview.values
-
-
-def _problems(path: Path, file: h5py.File, entry_name: str, record: TrialRecord) -> Iterator[str]:
-    units = {info.name: info.unit for info in (TIME, *record.series)}
-    for group, name, length, digest in series_of(record):
-        try:
-            with guarded.guarded(path, f"/{entry_name}/{group}/{name}"):
-                data = guarded.inner_group(guarded.inner_group(file, entry_name), group)
-                series = series_at(data, name, length)
-                series.check(digest)
-                check_unit(series.hdf5, units[name])
-        except ArchiveError as error:
-            yield str(error)

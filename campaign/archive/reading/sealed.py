@@ -24,8 +24,9 @@ from campaign.archive.reading import guarded
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.measured import measured_in, with_metrics
+from campaign.archive.reading.packed import parse_record
 from campaign.archive.reading.provenance import read_provenance
-from campaign.archive.reading.recorded import archived_trial, parse_record
+from campaign.archive.reading.recorded import RecordedSamples, archived_trial
 from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
 from campaign.archive.reading.seal import SEAL, SealedTexts
 from campaign.errors import ArchiveError
@@ -236,7 +237,7 @@ class _Trials:
             raise ArchiveError(
                 f"{self.path}: /{entry}: is missing, and the journal says that it finished"
             )
-        return archived_trial(self.path, entry, record, trees, not_kept)
+        return archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
 
 
 def _as_finished(record: TrialRecord) -> TrialFinished:

@@ -5,9 +5,9 @@ The chunks are unpacked here and not by HDF5, which takes half as long again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from typing import BinaryIO
 
 import h5py
 import numpy as np
@@ -15,11 +15,11 @@ from h5py import h5d, h5t
 
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import SeriesDigest, series_digest
-from campaign.archive.reading.guarded import own_id
+from campaign.archive.layout.packed_trial import PackedSeries, Place
+from campaign.archive.reading.guarded import check_attribute, own_id
 from campaign.errors import ArchiveError
 from campaign.recording import Array
 
-_LARGEST_CHUNK = 1 << 22  # samples
 _SHUFFLED = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE]
 _DEFLATED = [h5py.h5z.FILTER_DEFLATE]
 _NO_SERIES = "is not a chunked series of float64"
@@ -27,71 +27,63 @@ _NO_SERIES = "is not a chunked series of float64"
 
 @dataclass(frozen=True)
 class Series:
-    """A dataset of samples in a file, none of which was read yet.
+    """Samples in a file, none of which was read yet.
 
     Attributes:
-        dataset: of HDF5's low-level interface: a campaign has tens of thousands of them.
-        parent, name: where it is.
         length: samples that it states.
         chunk: samples of a chunk.
         shuffled: whether its chunks passed the shuffle filter.
+        packed: reads a chunk, by its number; None when it is not as the filters leave it.
+        place: file and path, for messages.
     """
 
-    dataset: h5d.DatasetID
-    parent: h5py.Group
-    name: str
     length: int
     chunk: int
     shuffled: bool
-
-    def blocks(self) -> Iterator[Array]:
-        """The samples, chunk by chunk. Raises ArchiveError."""
-        for start in range(0, self.length, self.chunk):
-            skipped, packed = self.dataset.read_direct_chunk((start,))
-            samples = None if skipped else storage.unpack(packed, self.chunk, self.shuffled)
-            if samples is None:
-                raise ArchiveError(f"{self.place}: cannot be read: a chunk is damaged")
-            yield samples[: self.length - start]
+    packed: Callable[[int], bytes | None]
+    place: Callable[[], str]
 
     def read(self, digest: str) -> Array:
         """All samples, shape (length,). Raises ArchiveError unless they have the digest."""
-        found = list(self.blocks())
+        found = [samples for samples, _ in self._blocks()]
         values = found[0] if len(found) == 1 else np.concatenate(found or [np.empty(0)])
         self._compare(series_digest(values), digest)
         return values
 
-    def check(self, digest: str) -> None:
-        """Read them in flat memory. Raises ArchiveError unless they have the digest."""
-        found = SeriesDigest()
-        for block in self.blocks():
-            found.update(block)
+    def check(self, digest: str) -> int:
+        """Read them in flat memory. Raises ArchiveError unless they have the digest.
+
+        Returns:
+            How many bytes were read.
+        """
+        found, size = SeriesDigest(), 0
+        for samples, packed in self._blocks():
+            found.update(samples)
+            size += packed
         self._compare(found.hexdigest(), digest)
+        return size
 
-    @cached_property
-    def hdf5(self) -> h5py.Dataset:
-        """As h5py's other interface knows it, for attributes."""
-        return h5py.Dataset(self.dataset)
-
-    @property
-    def place(self) -> str:
-        """File and path, for messages."""
-        return _place(self.parent, self.name)
-
-    @property
-    def stored(self) -> int:
-        """Bytes that it takes in the file."""
-        return int(self.dataset.get_storage_size())
+    def _blocks(self) -> Iterator[tuple[Array, int]]:
+        """The samples and the bytes of one chunk after another."""
+        for number, start in enumerate(range(0, self.length, self.chunk)):
+            packed = self.packed(number)
+            samples = None if packed is None else storage.unpack(packed, self.chunk, self.shuffled)
+            if packed is None or samples is None:
+                raise ArchiveError(f"{self.place()}: cannot be read: a chunk is damaged")
+            yield samples[: self.length - start], len(packed)
 
     def _compare(self, found: str, digest: str) -> None:
         if found != digest:
-            raise ArchiveError(f"{self.place}: {MISMATCH}")
+            raise ArchiveError(f"{self.place()}: {MISMATCH}")
 
 
 MISMATCH = "does not match its checksum; it was damaged or changed"
 
 
-def series_at(parent: h5py.Group, name: str, length: int) -> Series:
-    """A series of `length` samples that `parent` itself holds. Raises ArchiveError."""
+def series_at(parent: h5py.Group, name: str, length: int, **attributes: str) -> Series:
+    """A series of `length` samples that `parent` itself holds, with text attributes as they were
+    recorded. Raises ArchiveError.
+    """
     found = own_id(parent, name)
     plan = found.get_create_plist() if isinstance(found, h5d.DatasetID) else None
     shape: tuple[int, ...] = found.shape if plan is not None else ()
@@ -104,15 +96,45 @@ def series_at(parent: h5py.Group, name: str, length: int) -> Series:
     (stated,), (chunk,) = shape, plan.get_chunk()
     if not found.get_type().equal(h5t.IEEE_F64LE):
         raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
-    if not 0 < chunk <= _LARGEST_CHUNK:
+    if not 0 < chunk <= storage.LARGEST_CHUNK:
         raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
     if stated != length:
         what = f"has {stated} samples, and {length} were recorded"
         raise ArchiveError(f"{_place(parent, name)}: {what}")
-    return Series(found, parent, name, length, chunk, filters == _SHUFFLED)
+    for attribute, told in attributes.items():
+        check_attribute(found, attribute, told)
+    return dataset_series(found, parent, name, length, chunk, filters == _SHUFFLED)
 
 
-def layout_of(dataset: h5d.DatasetID) -> tuple[tuple[int, int], ...]:
+def dataset_series(
+    dataset: h5d.DatasetID, parent: h5py.Group, name: str, length: int, chunk: int, shuffled: bool
+) -> Series:
+    """The series of a dataset that is known to be one."""
+
+    def packed(number: int) -> bytes | None:
+        skipped, found = dataset.read_direct_chunk((number * chunk,))
+        return None if skipped else bytes(found)
+
+    return Series(length, chunk, shuffled, packed, lambda: _place(parent, name))
+
+
+def file_series(file: BinaryIO, place: str, length: int, told: PackedSeries) -> Series:
+    """A series of a trial's own file."""
+
+    def packed(number: int) -> bytes | None:
+        if number >= len(told.chunks):
+            return None
+        offset, size = told.chunks[number]
+        try:
+            file.seek(offset)
+            return file.read(size)
+        except (OSError, OverflowError, MemoryError):
+            return None
+
+    return Series(length, told.chunk, told.shuffled, packed, lambda: place)
+
+
+def layout_of(dataset: h5d.DatasetID) -> tuple[Place, ...]:
     """Where in the file the chunks of a series lie: offset and bytes of each."""
     chunks = map(dataset.get_chunk_info, range(dataset.get_num_chunks()))
     return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)

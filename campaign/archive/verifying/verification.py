@@ -20,14 +20,15 @@ from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import PART, sha256_of
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.journal import JOURNAL, TrialFinished
-from campaign.archive.layout.record import Trees, TrialRecord
+from campaign.archive.layout.record import Trees, TrialRecord, series_of
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading import guarded
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.opening import read_sealed
-from campaign.archive.reading.recorded import TIME, check_unit, series_of
+from campaign.archive.reading.packed import packed_record, read_packed
+from campaign.archive.reading.recorded import TIME, PackedSamples
 from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.seal import NUMBERS, OUTSIDE, SealedTexts
 from campaign.archive.reading.sealed import NOTES, read_entry, read_not_kept
@@ -134,7 +135,7 @@ class _Check:
                     self.remarks.add(f"/{entry}", what)
                     self._without_samples(run, entry, finished)
                 else:
-                    self._trial(file, entry, entry, finished)
+                    self._trial(file, entry, finished)
             for entry in sorted(not_kept.keys() - told.keys()):
                 self.problems.add("/run/not_kept", f"names {entry!r}, and no such trial finished")
             for entry in sorted(not_kept.keys() & told.keys()):
@@ -187,33 +188,33 @@ class _Check:
             self.problems.add("", STRUCTURE)
 
     def _trial_file(self, entry: str, finished: TrialFinished) -> None:
-        path = self.path / finished.file
-        inner = _Check(path, self.progress)
-        with inner.problems.noting(), guarded.open_file(path) as file:
-            inner._trial(file, entry_name(finished.trial), entry, finished)
-        self.trials |= inner.trials
-        self.datasets += inner.datasets
-        if entry not in self.trials:
-            self.unreadable.add(entry)
-        for damage in inner.problems.found:
-            self.problems.add(f"{path.name}{damage.place}", damage.reason)
-        for damage in inner.remarks.found:
-            self.remarks.add(f"{path.name}{damage.place}", damage.reason)
+        """A trial's own file: its record, its samples, and its bytes."""
+        path, name = self.path / finished.file, entry_name(finished.trial)
+        known = len(self.problems.found)
+        self.unreadable.add(entry)
+        with self.problems.noting():
+            packed = read_packed(path, name)
+            record, trees = packed_record(path, name, packed, finished.record)
+            self._record(f"{path.name}/{name}", entry, record, trees)
+            samples = PackedSamples(path, name, record, packed.not_kept)
+            for problem in samples.problems():
+                self.problems.note(ArchiveError(problem))
+            self.datasets += 1 + (0 if packed.not_kept else len(list(series_of(record))))
         same = path.is_file() and sha256_of(path, progress=self.progress) == finished.sha256
-        if not same and not inner.problems.found:
+        if not same and len(self.problems.found) == known:
             self.problems.add(finished.file, UNFINISHED)
 
-    def _trial(self, file: h5py.File, name: str, entry: str, finished: TrialFinished) -> None:
+    def _trial(self, file: h5py.File, entry: str, finished: TrialFinished) -> None:
         """What a trial says of itself, and that its samples are those that were recorded."""
         self.unreadable.add(entry)
-        with self.problems.noting(), guarded.guarded(self.path, f"/{name}"):
-            group = guarded.group_at(file, name, "NXentry")
-            record, trees = read_entry(self.path, file, name, finished.record)
+        with self.problems.noting(), guarded.guarded(self.path, f"/{entry}"):
+            group = guarded.group_at(file, entry, "NXentry")
+            record, trees = read_entry(self.path, file, entry, finished.record)
             self.datasets += 1
-            self._record(f"/{name}", entry, record, trees)
+            self._record(f"/{entry}", entry, record, trees)
             self._says(group, record)
-            self._members(group, f"/{name}", record, trees)
-            self._series(group, f"/{name}", record)
+            self._members(group, f"/{entry}", record, trees)
+            self._series(group, f"/{entry}", record)
 
     def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
         """A trial that has no group: what the index says of it was read when the run was opened."""
@@ -252,31 +253,23 @@ class _Check:
         """What else an entry holds; what is missing or unknown is told."""
         kept = guarded.names(guarded.inner_group(group, "record"))
         wanted = set(_MEMBERS)
-        if record.samples is not None and not self._left_out(group):
+        if record.samples is not None:
             wanted.add("data")
-            if not self._of_trial and nexus.follows_definition(record.series):
+            if nexus.follows_definition(record.series):
                 wanted |= set(nexus.MEMBERS)
         if record.preview is not None:
             wanted.add("preview")
         there = set(guarded.names(group))
         for name in sorted(wanted - there):
             self.problems.add(f"{place}/{name}", "is missing")
-        ours = {"json", "trees", "not_kept"} if self._of_trial else {"json", "trees"}
-        unknown = sorted(there - wanted) + sorted(f"record/{name}" for name in set(kept) - ours)
+        others = set(kept) - {"json", "trees"}
+        unknown = sorted(there - wanted) + sorted(f"record/{name}" for name in others)
         for name in unknown:
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
-        self._by_themselves(group, place, "record", ("trees", "not_kept"))
+        self._by_themselves(group, place, "record", ("trees",))
         if set(nexus.MEMBERS) <= there & wanted:
             described = nexus.Described.of(trees[str(record.trial["bench"])])
             self._instrument(group, place, described)
-
-    @property
-    def _of_trial(self) -> bool:
-        """Whether this is a trial's own file, which says itself that samples are not kept."""
-        return self.path.name.startswith("trial-")
-
-    def _left_out(self, group: h5py.Group) -> bool:
-        return self._of_trial and "not_kept" in guarded.inner_group(group, "record")
 
     def _instrument(self, group: h5py.Group, place: str, described: nexus.Described) -> None:
         """The definition and the instrument, which trials of one bench share: each once."""
@@ -306,8 +299,6 @@ class _Check:
 
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
         """The samples, each series against its digest, and that there are no others."""
-        if self._left_out(group):
-            return
         aim = Aim.of_tree(record.trial)
         for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
@@ -339,13 +330,10 @@ class _Check:
     ) -> None:
         with guarded.guarded(self.path, f"{place}/{name}"):
             series = series_at(data, name, length)
-            series.check(digest)
-            self.progress(series.stored)
+            self.progress(series.check(digest))
             self.datasets += 1
-            infos = {info.name: info for info in (TIME, *record.series)}
-            check_unit(series.hdf5, infos[name].unit)
-            if guarded.attribute(series.hdf5, "long_name") != infos[name].long_name:
-                self.problems.add(f"{place}/{name}@long_name", "is not what was recorded")
+            [info] = (info for info in (TIME, *record.series) if info.name == name)
+            series_at(data, name, length, units=info.unit, long_name=info.long_name)
 
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str

@@ -1,44 +1,49 @@
 """Writing HDF5 the way every NeXus reader understands, in flat memory.
 
 Sample datasets are one-dimensional, chunked, and pass HDF5's two standard filters, shuffle and
-deflate, or deflate alone where that is smaller. The chunks are compressed here, by ISA-L outside
-HDF5's global lock, and handed over ready: a file like the one HDF5's own filters would write,
-several times faster. Objects are made through h5py's low-level interface, which costs a fifth of
-the other: a campaign has tens of thousands of them. No object notes when it was made, so equal
-content makes equal bytes.
+deflate, or deflate alone where that is smaller. The chunks are compressed beforehand, by ISA-L
+outside HDF5's global lock, and handed over ready: a file like the one HDF5's own filters would
+write, several times faster. Objects are made through h5py's low-level interface, which costs a
+fifth of the other: a campaign has tens of thousands of them. No object notes when it was made, so
+equal content makes equal bytes.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5f, h5g, h5o, h5p, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5f, h5g, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from campaign.archive.layout.checksums import SeriesDigest
 from campaign.archive.layout.files import keep_umask
-from campaign.archive.layout.storage import CHECKSUM, CHUNK, LEVEL, SAMPLE, pack, storable
+from campaign.archive.layout.storage import (
+    CHECKSUM,
+    CHUNK,
+    LEVEL,
+    SAMPLE,
+    pack,
+    shuffling_helps,
+    storable,
+)
 
 Array = NDArray[np.float64]
 
 
-_TRIED = 4096  # samples on which both ways of storing a series are tried ...
-_DIFFER = 1024  # ... unless so many of them all differ, as those of no converter do
 _COMPACT = 32_000  # bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes
+_MEMORY_FILES = itertools.count(1)
 _STRING = h5py.string_dtype()
 _TEXT = h5t.py_create(_STRING, logical=True)
 _SAMPLE = h5t.IEEE_F64LE
 _SCALAR = h5s.create(h5s.SCALAR)
-_SCALES = (b"CLASS", b"NAME", b"REFERENCE_LIST", b"DIMENSION_LIST")  # what dimension scales leave
 
 
 def create_file(path: Path) -> h5py.File:
@@ -52,6 +57,15 @@ def create_file(path: Path) -> h5py.File:
     plan.set_obj_track_times(False)
     keep_umask()
     return h5py.File(h5f.create(os.fsencode(path), h5f.ACC_TRUNC, plan, access))
+
+
+def memory_file(label: str) -> h5py.File:
+    """A file in memory, for groups that are made once and copied: that costs a tenth of making."""
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(1 << 14, False)
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    name = f"{label}-{next(_MEMORY_FILES)}"  # HDF5 knows files in memory by their names
+    return h5py.File(h5f.create(name.encode(), h5f.ACC_TRUNC, fapl=access))
 
 
 @contextlib.contextmanager
@@ -112,12 +126,17 @@ def put_number(group: h5py.Group, name: str, value: float, **attributes: str) ->
         put_attribute(dataset, key, text)
 
 
-def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -> h5py.Dataset:
+def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -> None:
     """Numbers, shape (n,), as samples are stored."""
-    column = SampleColumns(group, {name: attributes})
-    column.append([values])
-    column.finish()
-    return group[name]
+    samples = np.ascontiguousarray(values, dtype=SAMPLE)
+    chunk, shuffled = max(1, min(len(samples), CHUNK)), shuffling_helps(samples)
+    dataset = create_series(group, name, len(samples), chunk, shuffled)
+    for key, value in attributes.items():
+        put_attribute(h5py.Dataset(dataset), key, value)
+    for start in range(0, len(samples), chunk):
+        part = samples[start : start + chunk]
+        whole = np.concatenate((part, np.zeros(chunk - len(part)))) if len(part) < chunk else part
+        dataset.write_direct_chunk((start,), pack(whole, shuffled))
 
 
 def put_texts(group: h5py.Group, name: str, texts: Sequence[str], **attributes: str) -> None:
@@ -169,147 +188,13 @@ def attach_time(group: h5py.Group, time: str = "time") -> None:
             h5ds.attach_scale(h5d.open(group.id, name), scale, 0)
 
 
-def copy_entry(source: h5py.File, name: str, target: h5py.File, new_name: str) -> None:
-    """Copy an entry to another file; chunks are not recompressed.
-
-    Dimension scales refer to objects by address, which changes, so they are attached here.
-    """
-    h5o.copy(source.id, name.encode(), target.id, new_name.encode())
-    for data in _plotted(target[new_name]):
-        attach_time(data)
-
-
-def copy_entry_back(
-    source: h5py.File, name: str, target: h5py.File, new_name: str, members: Iterable[str]
-) -> None:
-    """Copy some members of an entry out of a sealed file, without dimension scales."""
-    entry = make_group(target, new_name, "NXentry")
-    if "default" in source[name].attrs:
-        put_attribute(entry, "default", source[name].attrs["default"])
-    for member in members:
-        h5o.copy(source[name].id, member.encode(), entry.id, member.encode())
-    for data in _plotted(entry):
-        if "title" in data:  # a second name, of which copying made a second text
-            del data["title"]
-            link(entry, "title", data, "title")
-        for item in data.values():
-            for attribute in _SCALES:
-                if h5a.exists(item.id, attribute):
-                    h5a.delete(item.id, attribute)
-
-
-def _plotted(entry: h5py.Group) -> list[h5py.Group]:
-    return [entry[name] for name in ("data", "preview") if name in entry]
-
-
-class SampleColumns:
-    """Datasets of equal length, written as their samples come; one chunk of each is in memory.
-
-    Args:
-        group: where they go; None: nowhere, only their digests are wanted.
-        attributes: of each dataset, by name, in the order of the rows that `append` takes.
-    """
-
-    def __init__(
-        self,
-        group: h5py.Group | None,
-        attributes: Mapping[str, Mapping[str, str]],
-        chunk: int = CHUNK,
-    ) -> None:
-        self._group = group
-        self._attributes = attributes
-        self._buffer = np.zeros((len(attributes), chunk), dtype=SAMPLE)
-        self._filled = 0
-        self._written = 0
-        self._columns: list[_Column] = []
-        self._digests = [SeriesDigest() for _ in attributes]
-
-    @property
-    def length(self) -> int:
-        """Samples appended so far."""
-        return self._written + self._filled
-
-    @property
-    def buffered_bytes(self) -> int:
-        """Memory that waits for its chunk to fill; constant."""
-        return self._buffer.nbytes
-
-    def append(self, rows: Sequence[Array]) -> list[Array]:
-        """Add samples, one row per dataset; returns the whole chunks written, as new arrays."""
-        total = len(rows[0])
-        taken = 0
-        chunks = []
-        while taken < total:
-            count = min(total - taken, self._buffer.shape[1] - self._filled)
-            for row, samples in zip(self._buffer, rows, strict=True):
-                row[self._filled : self._filled + count] = samples[taken : taken + count]
-            self._filled += count
-            taken += count
-            if self._filled == self._buffer.shape[1]:
-                chunks.append(self._buffer.copy())
-                self._write_chunk()
-        return chunks
-
-    def finish(self) -> tuple[Array, list[str]]:
-        """Write what is left; returns that, shape (rows, m), and the digest of every series."""
-        rest = self._buffer[:, : self._filled].copy()
-        if self._filled or not self._columns:
-            self._write_chunk()
-        return rest, [digest.hexdigest() for digest in self._digests]
-
-    def _write_chunk(self) -> None:
-        for row, digest in zip(self._buffer, self._digests, strict=True):
-            digest.update(row[: self._filled])
-        if self._group is not None:
-            self._store_chunk(self._group)
-        self._written, self._filled = self._written + self._filled, 0
-
-    def _store_chunk(self, group: h5py.Group) -> None:
-        if not self._columns:
-            # A short recording is one chunk of its own length, and its size is known.
-            more = self._filled in (0, self._buffer.shape[1])
-            self._columns = [
-                _create_column(group, name, attributes, row[: self._filled], more)
-                for (name, attributes), row in zip(
-                    self._attributes.items(), self._buffer, strict=True
-                )
-            ]
-        length = self._written + self._filled
-        self._buffer[:, self._filled :] = 0.0
-        for column, row in zip(self._columns, self._buffer, strict=True):
-            if self._filled:
-                column.write(row, self._written, length)
-
-
-@dataclass(frozen=True)
-class _Column:
-    """One dataset of samples. `shuffled` says whether its chunks pass the shuffle filter."""
-
-    dataset: h5py.Dataset
-    chunk: int
-    shuffled: bool
-    grows: bool
-
-    def write(self, row: Array, start: int, length: int) -> None:
-        """Write the chunk that begins at `start`; the series then has `length` samples."""
-        packed = pack(row[: self.chunk], self.shuffled)
-        if self.grows:
-            self.dataset.id.set_extent((length,))
-        self.dataset.id.write_direct_chunk((start,), packed)
-
-
-def _create_column(
-    group: h5py.Group, name: str, attributes: Mapping[str, str], first: Array, grows: bool
-) -> _Column:
-    """A dataset for the samples of which `first` are the first chunk."""
-    chunk = max(1, len(first))
-    shuffled = _shuffling_helps(first[:_TRIED])
-    size, limit = ((0,), (h5s.UNLIMITED,)) if grows else (first.shape, first.shape)
-    space, plan = h5s.create_simple(size, limit), _series_plan(chunk, shuffled)
-    dataset = h5py.Dataset(h5d.create(group.id, name.encode(), _SAMPLE, space, plan))
-    for key, value in attributes.items():
-        put_attribute(dataset, key, value)
-    return _Column(dataset, chunk, shuffled, grows)
+def create_series(
+    group: h5py.Group, name: str, length: int, chunk: int, shuffled: bool
+) -> h5d.DatasetID:
+    """A dataset for samples, whose chunks are put there ready."""
+    size, limit = (length,), (max(length, chunk),)
+    space = h5s.create_simple(size, limit)
+    return h5d.create(group.id, name.encode(), _SAMPLE, space, _series_plan(chunk, shuffled))
 
 
 @lru_cache(maxsize=16)
@@ -321,14 +206,3 @@ def _series_plan(chunk: int, shuffled: bool) -> h5p.PropDCID:
         plan.set_shuffle()
     plan.set_deflate(LEVEL)
     return plan
-
-
-def _shuffling_helps(samples: Array) -> bool:
-    """Whether samples are better stored with all first bytes first, then all second ones ...
-
-    They are, but for those of a converter: few values, each of which comes again and again whole.
-    """
-    told = samples[:_DIFFER]
-    if len(np.unique(told)) == len(told):
-        return True
-    return len(pack(samples, shuffled=True)) <= len(pack(samples, shuffled=False))

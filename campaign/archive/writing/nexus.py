@@ -9,14 +9,13 @@ from a bench without one of the required channels, is archived all the same, wit
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import h5py
-from h5py import h5f, h5o, h5p
+from h5py import h5o
 
 from campaign.archive.writing import hdf5
 from campaign.axis_kind import BOTH_ROTARY, AxisKind, Sides, sides_in, speaking_of, unit_here
@@ -57,7 +56,6 @@ def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
 def write_definition(entry: h5py.Group, bench: Described) -> None:
     """Say that `entry` follows the definition, and describe its bench."""
     hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
-    # Copying costs a tenth of making, and the runs of a process share a few benches.
     h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
 
 
@@ -75,9 +73,6 @@ def differences(entry: h5py.Group, bench: Described) -> Iterator[tuple[str, str]
         same = isinstance(found, h5py.Dataset) and found[()] == expected[()]
         if not same or found.attrs.get("units") != expected.attrs.get("units"):
             yield f"instrument/{name}", "is not what the bench in the record says"
-
-
-_TEMPLATES = itertools.count(1)
 
 
 @dataclass(frozen=True)
@@ -105,11 +100,7 @@ class Described:
 @lru_cache(maxsize=32)
 def _template(bench: Described) -> h5py.File:
     """A file in memory that holds the instrument."""
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(1 << 14, False)
-    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    label = f"instrument-{next(_TEMPLATES)}".encode()  # HDF5 knows files in memory by their names
-    file = h5py.File(h5f.create(label, h5f.ACC_TRUNC, fapl=access))
+    file = hdf5.memory_file("instrument")
     instrument = hdf5.make_group(file, "instrument", "NXinstrument")
     hdf5.put_text(instrument, "name", bench.name)
     for name, channel in _SENSORS.items():

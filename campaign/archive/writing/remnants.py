@@ -18,7 +18,7 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 
 _OWN = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
-_TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.nxs")
+_TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.(?:trial|nxs)")
 
 
 def is_own(name: str) -> bool:

@@ -4,44 +4,38 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import groupby
-from operator import attrgetter
+from collections.abc import Mapping
+from functools import cache, partial
 from pathlib import Path
 
 import h5py
 from h5py import h5d
 
+from campaign import __version__
 from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
-from campaign.archive.layout.record import TrialRecord, parse_trees, trees_text
+from campaign.archive.layout.packed_trial import Place
+from campaign.archive.layout.record import TrialRecord, parse_trees, series_of, trees_text
 from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
 from campaign.archive.reading import guarded
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.recorded import PLOTTED, TIME, check_unit, parse_record, series_of
+from campaign.archive.reading.packed import packed_record, read_packed
+from campaign.archive.reading.recorded import TIME
 from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
-from campaign.archive.reading.series import layout_of, series_at
+from campaign.archive.reading.series import layout_of
 from campaign.archive.writing import hdf5, nexus
 from campaign.archive.writing.default_plot import telling_trial
-from campaign.archive.writing.trial_file import write_root
+from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 from campaign.trial import Tree, canonical_json
 
-
-@dataclass(frozen=True)
-class _Placed:
-    """Where a series was read back: the group and the name, its unit, where its chunks lie."""
-
-    group: str
-    name: str
-    unit: str
-    layout: tuple[tuple[int, int], ...]
+Placed = Mapping[tuple[str, str], tuple[str, tuple[Place, ...]]]
+"""The unit of each series of a trial, and where its chunks lie, by group and name."""
 
 
 class SealedFile:
@@ -55,7 +49,7 @@ class SealedFile:
 
     def __init__(self, part: Path) -> None:
         self.copied: dict[str, TrialFinished] = {}
-        self.placed: dict[str, list[_Placed]] = {}
+        self.placed: dict[str, Placed] = {}
         self.not_kept: dict[str, str] = {}
         self._part = part
         self._lines: dict[str, str] = {}
@@ -63,6 +57,7 @@ class SealedFile:
         self._instruments: dict[nexus.Described, str] = {}
         self._hash_place: tuple[int, int]  # once it is finished
         self._file = hdf5.create_file(part)
+        self._entries = EntryWriter(self._file)
 
     def is_part_of(self, wanted: Mapping[str, TrialFinished]) -> bool:
         """Whether all that was copied is among `wanted`, under the same names."""
@@ -76,19 +71,22 @@ class SealedFile:
         path, name = folder / finished.file, entry_name(finished.trial)
         if sha256_of(path) != finished.sha256:
             raise ArchiveError(f"{path}: is not what the journal says was written")
-        with guarded.open_file(path) as source:
-            own = guarded.inner_group(guarded.inner_group(source, name), "record")
-            line = guarded.text_at(own, "json", finished.record)
-            record = parse_record(path, f"/{name}/record", line)
-            trees = parse_trees(guarded.unchecked_text_at(own, "trees"))
-            if "not_kept" in own:
-                self.not_kept[entry] = guarded.text_at(own, "not_kept")
-            else:
-                hdf5.copy_entry(source, name, self._file, entry)
-                self._describe(entry, record, trees)
-                self._read_back(entry, record)
+        packed = read_packed(path, name)
+        record, trees = packed_record(path, name, packed, finished.record)
+        if packed.not_kept:
+            self.not_kept[entry] = packed.not_kept
+        else:
+            with path.open("rb") as source:
+                written = self._entries.write(entry, record, packed, source)
+            self._describe(entry, record, trees)
+            for group, series, _, digest in series_of(record):
+                written[group, series][1].check(digest)
+            units = {info.name: info.unit for info in (TIME, *record.series)}
+            self.placed[entry] = {
+                key: (units[key[1]], layout_of(made)) for key, (made, _) in written.items()
+            }
         self._trees |= trees
-        self._lines[entry] = line
+        self._lines[entry] = packed.record
         self.copied[entry] = finished
 
     def finish(self, folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> None:
@@ -107,7 +105,7 @@ class SealedFile:
                 for name, text in _note("application/json", "not-kept.json", not_kept).items():
                     _put(run, f"not_kept/{name}", text, header)
             _put(run, SEAL, seal_text(header.name, texts), header)
-            write_root(file, header.created, _shown(file, folder, story))
+            _write_root(file, header.created, _shown(file, folder, story))
             self._hash_place = hdf5.blank_digest(run["outcome"], "file_sha256")
 
     def put_hash(self) -> None:
@@ -141,15 +139,6 @@ class SealedFile:
         nexus.write_definition(group, described)
         self._instruments[described] = entry
 
-    def _read_back(self, entry: str, record: TrialRecord) -> None:
-        units = {info.name: info.unit for info in (TIME, *record.series)}
-        groups = {name: self._file[entry][name] for name in PLOTTED if name in self._file[entry]}
-        placed = self.placed[entry] = []
-        for group, name, length, digest in series_of(record):
-            series = series_at(groups[group], name, length)
-            series.check(digest)
-            placed.append(_Placed(group, name, units[name], layout_of(series.dataset)))
-
 
 def check_sealed(part: Path, file: SealedFile) -> None:
     """Open the new file again and hold it against what was written: every text against the seal,
@@ -169,19 +158,18 @@ def check_sealed(part: Path, file: SealedFile) -> None:
                     _check_entry(guarded.inner_group(opened, entry), finished, file.placed[entry])
 
 
-def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Sequence[_Placed]) -> None:
+def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Placed) -> None:
     """The record is the one of the journal, and samples lie where they were read back."""
     kept = guarded.inner_group(entry, "record")
     guarded.text_at(kept, "json", finished.record)
     guarded.text_at(kept, "trees")
-    for group_name, members in groupby(placed, key=attrgetter("group")):
-        group = guarded.inner_group(entry, group_name)
-        for each in members:
-            series = guarded.own_id(group, each.name)
-            if not isinstance(series, h5d.DatasetID) or layout_of(series) != each.layout:
-                place = f"{group.file.filename}: {group.name}/{each.name}"
-                raise ArchiveError(f"{place}: does not lie where it was written")
-            check_unit(h5py.Dataset(series), each.unit)
+    inner = cache(partial(guarded.inner_group, entry))
+    for (group, name), (unit, layout) in placed.items():
+        series = h5d.open(inner(group).id, name.encode())
+        if layout_of(series) != layout:
+            place = f"{entry.file.filename}: {entry.name}/{group}/{name}"
+            raise ArchiveError(f"{place}: does not lie where it was written")
+        guarded.check_attribute(series, "units", unit)
 
 
 def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, str | int]:
@@ -245,6 +233,16 @@ def _by_number(entry: str) -> tuple[int, float]:
     """The order of trials, an earlier attempt before the one that counts."""
     _, number, *attempt = entry.split("_")
     return int(number), int(attempt[1]) if attempt else math.inf
+
+
+def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
+    """The attributes of a file's root; `shown` is the entry that viewers open first."""
+    hdf5.put_attribute(file, "NX_class", "NXroot")
+    hdf5.put_attribute(file, "creator", "campaign")
+    hdf5.put_attribute(file, "creator_version", __version__)
+    hdf5.put_attribute(file, "file_time", created)
+    if shown is not None:
+        hdf5.put_attribute(file, "default", shown.name.lstrip("/"))
 
 
 def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:

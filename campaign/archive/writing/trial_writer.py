@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive.layout.files import why
+from campaign.archive.layout.files import publish, publish_all, why
 from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished, utc_now
 from campaign.archive.reading.measured import trial_measured
 from campaign.errors import ArchiveError
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 class FolderWriter:
     """Writes trials into the folder of a run whose journal another process has.
 
+    What is finished counts once `publish` has put it on the disk, together.
+
     Args:
         folder: of the run.
         attempts: how often each trial is executed with this one, by number.
@@ -39,11 +41,27 @@ class FolderWriter:
         self._attempts = attempts
         self._timing = timing
         self._entries: list[Entry] = []
+        self._files: list[tuple[Path, Path]] = []
 
     def begin(self, trial: Trial) -> TrialWriter:
         """As `RunWriter.begin`."""
         note, attempt = self._entries.append, self._attempts[trial.number]
-        return TrialWriter.open(self._folder, trial, attempt, note, self._timing)
+
+        def publish(part: Path, final: Path) -> None:
+            self._files.append((part, final))
+
+        return TrialWriter.open(self._folder, trial, attempt, note, self._timing, publish=publish)
+
+    def publish(self) -> None:
+        """Put the trials on the disk that were finished. Raises ArchiveError: none of them is."""
+        from campaign.archive.writing.trial_file import lost_trial
+
+        files, self._files = self._files, []
+        try:
+            with self._timing.span(Work.TRIAL_FILES):
+                publish_all(files)
+        except OSError as error:
+            raise lost_trial(files[0][0], error) from None
 
     def take_entries(self) -> tuple[Entry, ...]:
         """The journal entries since the last call."""
@@ -84,12 +102,13 @@ class TrialWriter:
         note: Callable[[Entry], None],
         timing: Timing,
         not_kept: str = "",
+        publish: Callable[[Path, Path], None] = publish,
     ) -> Self:
         """Begin the trial's file in the folder of its run; see `RunWriter.begin`."""
         from campaign.archive.writing.trial_file import TrialFile
 
         with timing.span(Work.TRIAL_FILES):
-            file = TrialFile(folder, trial, attempt, not_kept)
+            file = TrialFile(folder, trial, attempt, not_kept, publish)
         return cls(trial, attempt, file, note, timing)
 
     @property

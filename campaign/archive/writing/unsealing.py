@@ -8,13 +8,10 @@ one whole run is on the disk, and it is clear which one.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
 from pathlib import Path
 
-import h5py
-
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import entry_name, entry_names
+from campaign.archive.layout.entries import entry_names, file_name
 from campaign.archive.layout.files import (
     PART,
     keep_umask,
@@ -27,21 +24,19 @@ from campaign.archive.layout.files import (
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import PARTIAL
 from campaign.archive.layout.journal import JOURNAL, Entry, Story, TrialFinished, parse_journal
-from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
+from campaign.archive.layout.packed_trial import PackedTrial
+from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, trees_text
 from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
 from campaign.archive.reading import guarded
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.folder import read_trial_file
+from campaign.archive.reading.packed import packed_entry
 from campaign.archive.reading.seal import SealedTexts
 from campaign.archive.reading.sealed import read_not_kept, read_sealed
-from campaign.archive.writing import hdf5
+from campaign.archive.writing.packed_file import copy_packed
 from campaign.archive.writing.remnants import remove_folder, take_over
-from campaign.archive.writing.trial_file import write_record, write_root
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
-
-_MEMBERS = ("title", "start_time", "end_time", "record", "data", "preview")
-"""What a trial's own file has; the rest is made anew when the run is sealed."""
 
 
 def unseal(sealed: Path) -> Path:
@@ -99,52 +94,33 @@ def _fill(sealed: Path, folder: Path) -> None:
         not_kept = read_not_kept(texts)
         written = {}
         for entry, finished in entry_names(story.files).items():
-            with _trial_file(folder, finished) as target:
-                if entry in not_kept:
-                    _write_record(target, finished, lines[finished.record], trees, not_kept[entry])
-                else:
-                    _copy_back(file, entry, target, finished)
-            written[finished.file] = _publish(folder, finished)
+            if entry in not_kept:
+                packed = _without_samples(lines[finished.record], trees, not_kept[entry])
+            else:
+                packed = packed_entry(sealed, entry)
+            name = file_name(finished.trial, finished.attempt)  # once it had another ending
+            written[finished.file] = _write(folder, sealed, packed, finished, name)
     write_atomically(folder / JOURNAL, _journal(story, written))
 
 
-def _part(folder: Path, finished: TrialFinished) -> Path:
-    return folder / (finished.file + PART)
-
-
-@contextlib.contextmanager
-def _trial_file(folder: Path, finished: TrialFinished) -> Iterator[h5py.File]:
-    with hdf5.closing(hdf5.create_file(_part(folder, finished))) as file:
-        yield file
-        entry = file[entry_name(finished.trial)]
-        write_root(file, guarded.text_at(entry, "start_time"), entry)
-
-
-def _copy_back(source: h5py.File, entry: str, target: h5py.File, finished: TrialFinished) -> None:
-    there = guarded.group_at(source, entry, "NXentry")
-    members = [member for member in _MEMBERS if member in there]
-    hdf5.copy_entry_back(source, entry, target, entry_name(finished.trial), members)
-
-
-def _write_record(
-    target: h5py.File, finished: TrialFinished, line: str, trees: Trees, not_kept: str
-) -> None:
-    """The entry of a trial whose samples were not kept: it has no group in the sealed run."""
+def _without_samples(line: str, trees: Trees, not_kept: str) -> PackedTrial:
+    """A trial whose samples were not kept: it has no group in the sealed run."""
     record = TrialRecord.model_validate_json(line)
-    entry = hdf5.make_group(target, entry_name(finished.trial), "NXentry")
-    hdf5.put_text(entry, "title", record.label)
-    write_record(entry, record, line, {name: trees[name] for name in record.tree_names}, not_kept)
+    own = {name: trees[name] for name in record.tree_names}
+    return PackedTrial(record=line, trees=trees_text(own), not_kept=not_kept)
 
 
-def _publish(folder: Path, finished: TrialFinished) -> TrialFinished:
-    """Read a trial's new file back and name it; returns the journal's word of it, with its hash."""
-    part = _part(folder, finished)
-    digest, size = sha256_of(part), part.stat().st_size
+def _write(
+    folder: Path, sealed: Path, packed: PackedTrial, finished: TrialFinished, name: str
+) -> TrialFinished:
+    """Write a trial's file and read it back; returns the journal's line of it, as it is now."""
+    part = folder / (name + PART)
+    digest, size = copy_packed(sealed, packed, part)
     problems = list(read_trial_file(part, finished).problems())
     if problems:
         raise ArchiveError("; ".join(problems[:3]))
-    publish(part, folder / finished.file)
-    return finished.model_copy(update={"sha256": digest, "bytes": size})
+    publish(part, folder / name)
+    return finished.model_copy(update={"file": name, "sha256": digest, "bytes": size})
 
 
 def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
@@ -152,9 +128,7 @@ def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
 
     def line(entry: Entry, text: str) -> str:
         if isinstance(entry, TrialFinished):
-            new = written[entry.file]
-            told = entry.model_copy(update={"sha256": new.sha256, "bytes": new.bytes})
-            return canonical_json(told.model_dump(mode="json"))
+            return canonical_json(written[entry.file].model_dump(mode="json"))
         return text
 
     lines = story.text.splitlines()

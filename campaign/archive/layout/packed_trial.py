@@ -1,0 +1,52 @@
+"""The file of one trial while its run is in progress: packed samples, then what tells of them.
+
+A trial file is `MAGIC`, chunks of samples as HDF5's filters would leave them, a `PackedTrial` as
+JSON, and where that begins (8 bytes, little endian). Sealing puts the chunks into HDF5 unchanged.
+"""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
+
+from campaign.archive.layout.storage import LARGEST_CHUNK
+
+MAGIC = b"campaign trial 1\n"
+POINTER = 8
+"""Bytes at the end of the file, which say where its `PackedTrial` begins."""
+
+Place = tuple[NonNegativeInt, NonNegativeInt]
+"""Where a chunk lies in a file: offset and bytes."""
+
+
+class PackedSeries(BaseModel):
+    """Where the samples of a series lie.
+
+    Attributes:
+        chunk: samples of a chunk; zeros follow the last samples of the last one.
+        shuffled: whether chunks passed the shuffle filter before deflate.
+        chunks: in the order of time.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    chunk: int = Field(gt=0, le=LARGEST_CHUNK)
+    shuffled: bool
+    chunks: tuple[Place, ...]
+
+
+class PackedTrial(BaseModel):
+    """A trial as its file has it.
+
+    Attributes:
+        record, trees: texts, as in a sealed run.
+        not_kept: why only digests of its samples were kept; empty when the samples are there.
+        groups: `data`, and `preview` of a long recording.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    record: str
+    trees: str
+    not_kept: str = ""
+    groups: dict[str, tuple[PackedSeries, ...]] = {}

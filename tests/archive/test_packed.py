@@ -1,0 +1,160 @@
+"""The file of one trial: as `docs/archive-format.md` says, and refused where it is not."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import ArchivedTrial, RunWriter, open_run
+from campaign.archive.reading.folder import read_trial_file
+from campaign.archive.reading.packed import read_packed
+from campaign.archive.writing.packed_file import copy_packed
+from campaign.errors import ArchiveError
+
+COUNT = 70_000  # two chunks and a part of one, and a preview
+
+
+@pytest.fixture
+def writer(tmp_path, kit):
+    trial = kit.trial(1)
+    writer = RunWriter.create(tmp_path, kit.header(), [trial])
+    kit.record(writer, trial, COUNT)
+    yield writer
+    writer.close()
+
+
+@pytest.fixture
+def path(writer) -> Path:
+    return writer.folder / "trial-00001.trial"
+
+
+def parts(content: bytes) -> tuple[bytes, dict]:
+    """What stands before the description, and that; read as the document says."""
+    start = int.from_bytes(content[-8:], "little")
+    return content[:start], json.loads(content[start:-8])
+
+
+def put(path: Path, before: bytes, told: dict) -> None:
+    path.write_bytes(before + json.dumps(told).encode() + len(before).to_bytes(8, "little"))
+
+
+def read(path: Path, writer) -> ArchivedTrial:
+    return read_trial_file(path, writer._last[1])
+
+
+def test_a_program_that_knows_the_document_reads_every_sample(path, writer, kit):
+    content = path.read_bytes()
+    before, told = parts(content)
+    assert before.startswith(b"campaign trial 1\n")
+    record = json.loads(told["record"])
+    assert record["samples"] == COUNT
+    time, block = kit.samples(COUNT)
+    names = ["time", *(channel["name"] for channel in record["channels"])]
+    for name, expected in zip(names, (time, *block), strict=True):
+        (series,) = (each for each in told["groups"]["data"] if each["name"] == name)
+        found = []
+        for offset, size in series["chunks"]:
+            raw = np.frombuffer(zlib.decompress(content[offset : offset + size]), np.uint8)
+            planes = raw.reshape(8, -1).T if series["shuffled"] else raw
+            found.append(np.ascontiguousarray(planes).view("<f8").ravel())
+            assert len(found[-1]) == series["chunk"]
+        samples = np.concatenate(found)
+        assert samples[:COUNT].tobytes() == expected.tobytes()
+        assert not samples[COUNT:].any()
+
+
+def test_a_copy_has_the_same_trial(path, writer, tmp_path):
+    copy = tmp_path / "trial-00001.trial"
+    copy_packed(path, read_packed(path, "trial_00001"), copy)
+    sizes = [
+        [size for each in read_packed(one, "trial_00001").groups["data"] for _, size in each.chunks]
+        for one in (path, copy)
+    ]
+    assert sizes[0] == sizes[1]
+    assert list(read(copy, writer).problems()) == []
+
+
+@pytest.mark.parametrize("left", [0, 5, 17, 20, 1000, -1, -8, -9])
+def test_a_file_that_was_cut_off_is_refused(path, writer, left):
+    path.write_bytes(path.read_bytes()[:left])
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
+        read(path, writer)
+
+
+@pytest.mark.parametrize("start", [0, 16, 1 << 40, (1 << 64) - 1])
+def test_a_description_that_lies_elsewhere_is_refused(path, writer, start):
+    path.write_bytes(path.read_bytes()[:-8] + start.to_bytes(8, "little"))
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
+        read(path, writer)
+
+
+def lose_series(told: dict) -> None:
+    del told["groups"]["data"][1]
+
+
+def lose_chunk(told: dict) -> None:
+    del told["groups"]["data"][1]["chunks"][1]
+
+
+def exchange(told: dict) -> None:
+    first, second = told["groups"]["data"][1:3]
+    first["name"], second["name"] = second["name"], first["name"]
+
+
+def elsewhere(told: dict) -> None:
+    told["groups"]["data"][1]["chunks"][0] = [1 << 60, 1 << 60]
+
+
+def everything(told: dict) -> None:
+    told["groups"]["data"][1]["chunks"][0] = [17, 1 << 60]
+
+
+def smaller(told: dict) -> None:
+    told["groups"]["data"][1]["chunk"] = 1
+
+
+def plain(told: dict) -> None:
+    told["groups"]["data"][1]["shuffled"] = not told["groups"]["data"][1]["shuffled"]
+
+
+@pytest.mark.parametrize(
+    "change", [lose_series, lose_chunk, exchange, elsewhere, everything, smaller, plain]
+)
+def test_samples_that_are_not_the_recorded_ones_are_named_and_the_others_are_read(
+    path, writer, kit, change
+):
+    before, told = parts(path.read_bytes())
+    change(told)
+    put(path, before, told)
+    found = list(read(path, writer).problems())
+    names = {channel.name for channel in kit.CHANNELS[: 2 if change is exchange else 1]}
+    assert {each.split(": ")[1] for each in found} == {
+        f"/trial_00001/data/{name}" for name in names
+    }
+    (trial,) = open_run(writer.folder).trials
+    with pytest.raises(ArchiveError, match="/trial_00001/data/command: "):
+        trial.recording()["command"]
+    assert len(trial.recording()[kit.CHANNELS[2].name]) == COUNT
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda told: told.pop("record"),
+        lambda told: told.update(record="{}"),
+        lambda told: told.update(trees=told["trees"].replace("35.0", "36.0")),
+        lambda told: told["groups"]["data"][0].update(chunk=0),
+        lambda told: told["groups"]["data"][0].update(chunk=1 << 30),
+        lambda told: told["groups"]["data"][0].update(chunks=[[-1, 4]]),
+    ],
+)
+def test_a_description_that_is_none_is_refused(path, writer, change):
+    before, told = parts(path.read_bytes())
+    change(told)
+    put(path, before, told)
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
+        read(path, writer)
