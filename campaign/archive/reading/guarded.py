@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 _MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
-_CHECKED_AT_ONCE = 1 << 18  # samples
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 _TEXT = h5py.string_dtype()
 
@@ -128,14 +127,14 @@ def member(parent: h5py.Group, name: str) -> h5py.Group | None:
 
 
 def check_dataset(parent: h5py.Group, name: str) -> int:
-    """Read a dataset of any kind against its checksum; returns the bytes it has in the file."""
+    """Read a text or number against its checksum; returns the bytes it has in the file."""
     dataset = _dataset_at(parent, name)
     if dataset.shape == () and dataset.dtype.kind == "S":
         text_at(parent, name)
     elif dataset.shape == () and dataset.dtype in (np.dtype("<i8"), SAMPLE):
         _check(dataset.id, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
     else:
-        check_samples(samples_at(parent, name))
+        raise ArchiveError(f"{_place(parent, name)}: is neither a text nor a number")
     return int(dataset.id.get_storage_size())
 
 
@@ -193,53 +192,23 @@ def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
     return int(value)
 
 
-def samples_at(parent: h5py.Group, name: str) -> h5py.Dataset:
-    """A sample dataset whose stated size is backed by what is stored; not read yet."""
-    identifier, plan = _dataset_id(parent, name)
-    shape = identifier.shape
-    chunks = plan.get_chunk() if plan.get_layout() == h5d.CHUNKED else None
-    if len(shape) != 1 or identifier.dtype != SAMPLE or chunks is None:
-        raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
-    length, chunk = shape[0], chunks[0]
-    if not 0 < chunk <= LARGEST_CHUNK:
-        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
-    stored = identifier.get_storage_size()
-    if length * SAMPLE.itemsize > stored * _MOST_EXPANSION:
-        raise ArchiveError(
-            f"{_place(parent, name)}: states {length} samples but stores {stored} bytes"
-        )
-    return h5py.Dataset(identifier)
-
-
-def read_samples(dataset: h5py.Dataset) -> Array:
-    """All samples, checked; shape (n,), float64."""
-    values = np.empty(dataset.id.shape, dtype=SAMPLE)
-    if len(values):
-        dataset.id.read(h5s.ALL, h5s.ALL, values)
-    _check(dataset.id, values.data)
-    return values.astype(np.float64, copy=False)
-
-
 def read_whole(parent: h5py.Group, name: str) -> Array:
     """A series that has no checksum of its own: whoever asks has checked the file. Shape (n,)."""
-    dataset = samples_at(parent, name)
-    values = np.empty(dataset.id.shape, dtype=SAMPLE)
+    dataset, plan = _dataset_id(parent, name)
+    shape = dataset.shape
+    chunks = plan.get_chunk() if plan.get_layout() == h5d.CHUNKED else None
+    if len(shape) != 1 or dataset.dtype != SAMPLE or chunks is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
+    if not 0 < chunks[0] <= LARGEST_CHUNK:
+        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunks[0]} samples")
+    stored = dataset.get_storage_size()
+    if shape[0] * SAMPLE.itemsize > stored * _MOST_EXPANSION:
+        what = f"states {shape[0]} samples but stores {stored} bytes"
+        raise ArchiveError(f"{_place(parent, name)}: {what}")
+    values = np.empty(shape, dtype=SAMPLE)
     if len(values):
-        dataset.id.read(h5s.ALL, h5s.ALL, values)
+        dataset.read(h5s.ALL, h5s.ALL, values)
     return values.astype(np.float64, copy=False)
-
-
-def check_samples(dataset: h5py.Dataset) -> None:
-    """Read through a sample dataset in flat memory; ArchiveError when its checksum fails."""
-    length = dataset.id.shape[0]
-    if length <= _CHECKED_AT_ONCE:
-        read_samples(dataset)
-        return
-    digest = hashlib.sha256()
-    step = dataset.chunks[0] * max(1, _CHECKED_AT_ONCE // dataset.chunks[0])
-    for start in range(0, length, step):
-        digest.update(np.ascontiguousarray(dataset[start : start + step]).data)
-    _compare(dataset.id, digest.hexdigest())
 
 
 def attribute(item: h5py.HLObject, name: str) -> str:
