@@ -36,10 +36,11 @@ class Row:
 
 
 def rows(spent: dict[Work, Spent], elapsed: float, processor: float, workers: int) -> Iterator[Row]:
-    """What was done, in order, and the rest; the clocks add up to `elapsed`.
+    """What was done, in order, and the rest.
 
-    What `workers` threads do side by side counts on the clock with its share of one of them, and
-    what the main thread waits meanwhile is what no worker was at work.
+    What `workers` do side by side counts on the clock with its share of one of them, and what the
+    main thread waits meanwhile is what no worker was at work. With threads the clocks add up to
+    `elapsed`; beside worker processes this one goes on with journal and sealed file.
     """
     at_work = sum(each.others for each in spent.values()) / workers
     left, left_processor = elapsed, processor

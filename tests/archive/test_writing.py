@@ -12,6 +12,7 @@ from campaign.archive.reading.measured import Measured
 from campaign.archive.reading.packed import read_packed
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
+from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.errors import BackendError
 from campaign.recording import ChannelInfo, Ending, Outcome
 
@@ -52,6 +53,32 @@ def test_metrics_see_every_sample_of_a_recording(kit, tmp_path, count):
         assert all(recording[each.name].tobytes() == row.tobytes() for each, row in channels)
     assert len(seen) == 1
     writer.close()
+
+
+@pytest.mark.parametrize("count", [1, CHUNK, CHUNK + 50])
+def test_metrics_of_a_worker_process_see_every_sample_before_the_batch_is_published(
+    kit, tmp_path, count
+):
+    trial, (time, block) = kit.trial(1), kit.samples(count)
+    writer = FolderWriter(tmp_path, {1: 1})
+    recorder = writer.begin(trial)
+    recorder.start(kit.CHANNELS)
+    recorder.append(time, block)
+    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    seen = []
+
+    def measure(data):
+        recording = data.recording()
+        seen.append([recording.time, *(recording[each.name] for each in kit.CHANNELS)])
+        return Measured()
+
+    assert recorder.measure(measure) == ""
+    assert [row.tobytes() for row in seen[0]] == [row.tobytes() for row in (time, *block)]
+    assert [path.name for path in tmp_path.iterdir()] == ["trial-00001.trial.part"]
+    writer.publish()
+    assert [path.name for path in tmp_path.iterdir()] == ["trial-00001.trial"]
+    ((finished,), files) = writer.take_entries(), list(tmp_path.iterdir())
+    assert finished.file == files[0].name
 
 
 def test_the_preview_keeps_within_its_points_however_long_the_recording():

@@ -39,8 +39,8 @@ from campaign.trial import Trial
 
 Array = NDArray[np.float64]
 
-Publish = Callable[[Path, Path], None]
-"""Puts a file on the disk and gives it its real name; at once, or with others."""
+Publish = Callable[[Path, Path], Path]
+"""Puts a file on the disk under its real name, at once or with others; returns its present one."""
 Written = tuple[int, str, list[SeriesRecord]]
 """Length of every series, digest of the time base, and the channels."""
 
@@ -50,19 +50,17 @@ class FinishedFile:
     """A trial file that is whole.
 
     Attributes:
+        name: the file's real one.
         archived: the trial as the file has it; a short recording is still in memory.
         sha256: of the file.
         record: digest of the trial's record.
     """
 
+    name: str
     archived: ArchivedTrial
     sha256: str
     bytes: int
     record: str
-
-    @property
-    def name(self) -> str:
-        return self.archived.path.name
 
 
 class TrialFile:
@@ -74,13 +72,13 @@ class TrialFile:
         trial: Trial,
         attempt: int = 1,
         not_kept: str = "",
-        publish: Publish = publish,
+        publish: Publish | None = None,
     ) -> None:
         """`not_kept`: why of the samples only digests are to be kept; empty: all of them are."""
         self._trial = trial
         self._attempt = attempt
         self._not_kept = not_kept
-        self._publish = publish
+        self._publish = publish or _publish_now
         self._final = folder / file_name(trial.number, attempt)
         self._part = self._final.with_name(self._final.name + PART)
         self._channels: tuple[ChannelInfo, ...] = ()
@@ -154,12 +152,12 @@ class TrialFile:
                 groups=groups,
             )
             digest, size = self._file.finish(packed)
-            self._publish(self._part, self._final)
-        place = self._final, entry_name(self._trial.number), record, self._not_kept
+            path = self._publish(self._part, self._final)
+        place = path, entry_name(self._trial.number), record, self._not_kept
         whole = None if self._not_kept else self._whole
         samples = PackedSamples(*place) if whole is None else MemorySamples(*place, rows=whole)
         archived = trial_of_record(self._trial, samples)
-        return FinishedFile(archived, digest, size, record.sha256)
+        return FinishedFile(self._final.name, archived, digest, size, record.sha256)
 
     def discard(self) -> None:
         """Leave nothing of it. Never fails: what cannot be removed is no archive by its name."""
@@ -202,6 +200,11 @@ class TrialFile:
         except (OSError, RuntimeError, ValueError) as error:
             self.discard()
             raise lost_trial(self._part, error) from None
+
+
+def _publish_now(part: Path, final: Path) -> Path:
+    publish(part, final)
+    return final
 
 
 def lost_trial(part: Path, error: Exception) -> ArchiveError:

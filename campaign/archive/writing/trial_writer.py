@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive.layout.files import publish, publish_all, why
+from campaign.archive.layout.files import publish_all, why
 from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished, utc_now
 from campaign.archive.reading.measured import trial_measured
 from campaign.errors import ArchiveError
@@ -21,7 +21,7 @@ from campaign.trial import Trial
 if TYPE_CHECKING:
     from campaign.archive.reading.archived_trial import ArchivedTrial
     from campaign.archive.reading.measured import Measure
-    from campaign.archive.writing.trial_file import TrialFile
+    from campaign.archive.writing.trial_file import Publish, TrialFile
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,9 @@ class FolderWriter:
         """As `RunWriter.begin`."""
         note, attempt = self._entries.append, self._attempts[trial.number]
 
-        def publish(part: Path, final: Path) -> None:
+        def publish(part: Path, final: Path) -> Path:
             self._files.append((part, final))
+            return part
 
         return TrialWriter.open(self._folder, trial, attempt, note, self._timing, publish=publish)
 
@@ -102,7 +103,7 @@ class TrialWriter:
         note: Callable[[Entry], None],
         timing: Timing,
         not_kept: str = "",
-        publish: Callable[[Path, Path], None] = publish,
+        publish: Publish | None = None,
     ) -> Self:
         """Begin the trial's file in the folder of its run; see `RunWriter.begin`."""
         from campaign.archive.writing.trial_file import TrialFile
