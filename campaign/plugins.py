@@ -48,7 +48,8 @@ class Kinds(Mapping[str, K]):
 
         Args:
             room: what a kind is called, e.g. "friction model".
-            package: the room; its modules that have `attribute` are the program's own kinds.
+            package: the room; its modules that have `attribute` are the program's own kinds, and
+                its folders with a module of that name.
             interface: the class of a kind.
             tag: the option that names the kind in a file, where one does.
         """
@@ -128,6 +129,8 @@ class Kinds(Mapping[str, K]):
         found = {}
         for each in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
             module = f"{self._package}.{each.name}"
+            if each.ispkg:  # a folder for one kind has it in a file of its own
+                module = f"{module}.{self._attribute.lower()}"
             name = _declared_name(_source(module), self._attribute)
             if name:
                 found[name] = module
@@ -207,7 +210,7 @@ def _source(module: str) -> str:
     """The text of a module that need not be imported for it."""
     spec = importlib.util.find_spec(module)
     loader: Any = spec.loader if spec is not None else None
-    return loader.get_source(module) or ""
+    return "" if loader is None else loader.get_source(module) or ""
 
 
 def _declared_name(source: str, attribute: str) -> str:

@@ -26,9 +26,9 @@ from campaign.axis_kind import (
 from campaign.backends.serial import _info
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
-from campaign.experiments.preparing.of_its_axis import of_its_axis
-from campaign.experiments.shared.hull_motion import SeriesMotion, ShipMotion
+from campaign.experiments.preparing.axis_units import of_its_axis
 from campaign.experiments.shared.motion_series import kind_of
+from campaign.experiments.stabilization.hull_motion import SeriesMotion, ShipMotion
 from campaign.identifying.tables import systematic
 from campaign.options import TextFile
 from campaign.physics.bench import Bench

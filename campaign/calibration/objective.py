@@ -23,7 +23,7 @@ from campaign.experiments.interface import (
     bench_of,
     with_named_tables,
 )
-from campaign.experiments.preparing.of_its_axis import of_its_axis
+from campaign.experiments.preparing.axis_units import of_its_axis
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test

@@ -1,4 +1,4 @@
-"""Experiments: one file each, with options, trials, analysis, tables and figures."""
+"""Experiments: a file or folder each, with options, trials, analysis, tables and figures."""
 
 from __future__ import annotations
 

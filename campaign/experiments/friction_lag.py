@@ -8,7 +8,7 @@ faster the swing, the wider the loop (Figure 2.10).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,8 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate, Window
-from campaign.experiments.conclusions.behaviour import friction_lag_conclusions
-from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
@@ -29,6 +28,7 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
+from campaign.experiments.shared.model_clauses import Rows, at_ends, each_model, without_rounding
 from campaign.identification.gate import admitted
 from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, where_it_scatters
@@ -40,6 +40,7 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
+    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -254,7 +255,7 @@ def _analyse(data: TestData) -> Result:
         across=min(2, len(loops)),
         trials=trials_of(items[0] for place in found for items in place.by("frequency").values()),
     )
-    conclusions = friction_lag_conclusions(rows, found, Settings.of(data, FrictionLagOptions))
+    conclusions = friction_lag_conclusions(rows, found, parts.Settings.of(data, FrictionLagOptions))
     return Result((table,), (figure,), findings, failures_note(data), conclusions)
 
 
@@ -313,6 +314,22 @@ def _series(loop: Loop) -> str:
 
 def _rates(display: str) -> Axis:
     return Axis("Rate", "rad/s", display)
+
+
+def friction_lag_conclusions(
+    rows: Rows, places: Sequence[Place], settings: parts.Settings
+) -> tuple[Conclusion, ...]:
+    """Width of the loops at the slowest and the fastest swing, of each model."""
+
+    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
+        return at_ends(own, ("frequency", "Hz", ""), "width")
+
+    return (
+        parts.conclusion(
+            "Friction while the rate rises, less that while it falls, at the mean rate: ",
+            each_model(without_rounding(rows, "width"), places, settings, tell),
+        ),
+    )
 
 
 EXPERIMENT = Experiment(

@@ -14,8 +14,8 @@ from campaign.axis_kind import BOTH_ROTARY, Sides, sides_in, speaking_of
 from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
+from campaign.experiments.preparing.axis_units import estimate_here, of_its_axis
 from campaign.experiments.preparing.draws import draws_of, merged
-from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
 from campaign.experiments.preparing.swept_tables import table_names
 from campaign.experiments.preparing.unusable import doubt, doubted, not_measured, notes_on
 from campaign.options import Options

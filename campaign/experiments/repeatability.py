@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.conclusions.friction_map import repeatability_conclusions
 from campaign.experiments.friction_map import fitting
+from campaign.experiments.friction_map.conclusions import repeatability_conclusions
 from campaign.experiments.friction_map.fits import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.repeated import (

@@ -15,9 +15,8 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
-from campaign.experiments.conclusions.behaviour import stick_slip_conclusions
-from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import COUNTED, failures_note
 from campaign.experiments.shared.friction_models import (
@@ -29,6 +28,7 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
+from campaign.experiments.shared.model_clauses import Rows, amount_of, each_model
 from campaign.identification.intervals import of_repeats, shifted_by
 from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options
@@ -40,6 +40,7 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
+    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -170,7 +171,7 @@ def _analyse(data: TestData) -> Result:
     options = StickSlipOptions.model_validate(
         found[0].trials[0].trial.options, context={"si": True}
     )
-    settings = Settings.of(data, StickSlipOptions)
+    settings = parts.Settings.of(data, StickSlipOptions)
     conclusions = stick_slip_conclusions(
         rows, found, settings, options.stiffness, options.pull_rate
     )
@@ -256,6 +257,38 @@ def _what_shows(place: Place, found: Mapping[str, Estimate]) -> str:
     times = f"slips {slips:g} times" if slips != 1 else "slips once"
     every = f", every {amount(period, 's')} after the first" if math.isfinite(period) else ""
     return sentence(f"{who}: it sticks, {times}{every}, and is then up to {top} fast")
+
+
+def stick_slip_conclusions(
+    rows: Rows,
+    places: Sequence[Place],
+    settings: parts.Settings,
+    stiffness: float,
+    pull_rate: float,
+) -> tuple[Conclusion, ...]:
+    """Slips, their period and the largest torque of the spring, of each model.
+
+    The spring's stiffness is in N m/rad, the rate of its far end in rad/s.
+    """
+
+    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
+        row, slips = own[0], own[0].get("slips")
+        # Of a recording that lost samples nobody knows how many slips there were.
+        counted = isinstance(slips, int | float) and math.isfinite(slips)
+        number = parts.setting(float(str(slips))) if counted else None
+        named = (
+            (number, " slips"),
+            ("the first after ", amount_of(row, "first_slip")),
+            ("then one every ", amount_of(row, "period")),
+            ("the spring's torque up to ", amount_of(row, "peak_torque")),
+        )
+        return parts.listed(
+            [(a, b) for a, b in named if a is not None and b is not None], last=", "
+        )
+
+    spring = ("Pulled at ", parts.setting(pull_rate, "rad/s"), " through a spring of ")
+    told = each_model(rows, places, settings, tell)
+    return (parts.conclusion(*spring, parts.setting(stiffness, "N m/rad"), ", ", told),)
 
 
 EXPERIMENT = Experiment(

@@ -8,10 +8,9 @@ torque over a settled window, less J times the residual acceleration, is one poi
 from __future__ import annotations
 
 from campaign.channels import COMMAND
-from campaign.experiments.conclusions.friction_map import map_conclusions
-from campaign.experiments.conclusions.parts import Settings
 from campaign.experiments.friction_map import fitting
 from campaign.experiments.friction_map.choice import STAGE
+from campaign.experiments.friction_map.conclusions import map_conclusions
 from campaign.experiments.friction_map.figures import example_figure, fit_figure, map_figure
 from campaign.experiments.friction_map.fits import fit_map
 from campaign.experiments.friction_map.found import stretches_found
@@ -35,6 +34,7 @@ from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note, grouped
+from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.result import Figure, Finding, Result, Table
 
 

@@ -12,7 +12,7 @@ from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import bench_of
-from campaign.experiments.preparing.of_its_axis import estimate_here, of_its_axis
+from campaign.experiments.preparing.axis_units import estimate_here, of_its_axis
 from campaign.identification.difference import Difference, difference_of
 from campaign.identifying.material import Chosen, same_recordings
 from campaign.identifying.method import (

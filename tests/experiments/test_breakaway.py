@@ -12,9 +12,9 @@ import pytest
 from campaign.channels import GYRO_RATE
 from campaign.estimate import Estimate, Kind, Systematic
 from campaign.experiments import experiments
-from campaign.experiments.breakaway import default_positions
-from campaign.experiments.results.breakaway_figures import DOTS, _what_shows
-from campaign.experiments.results.breakaway_means import _between, mean
+from campaign.experiments.breakaway.experiment import default_positions
+from campaign.experiments.breakaway.figures import DOTS, _what_shows
+from campaign.experiments.breakaway.means import _between, mean
 from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.result import Result

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from campaign.estimate import Systematic
-from campaign.experiments.results.breakaway_figures import position_figure
-from campaign.experiments.results.breakaway_means import Ramps
+from campaign.experiments.breakaway.figures import position_figure
+from campaign.experiments.breakaway.means import Ramps
 from campaign.identification.intervals import with_error
 from tests.experiments.laboratory import execute, trials
 from tests.experiments.test_breakaway import TWO, platform

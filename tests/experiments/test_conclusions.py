@@ -13,11 +13,14 @@ import pytest
 from campaign.access.sentences import remarks, sentence
 from campaign.estimate import Estimate, Origin
 from campaign.experiments import experiments
-from campaign.experiments.conclusions.behaviour import force_rate_conclusions
-from campaign.experiments.conclusions.breakaway import breakaway_conclusions
-from campaign.experiments.conclusions.friction_map import map_conclusions, repeatability_conclusions
-from campaign.experiments.conclusions.observer_gain import observer_conclusions
-from campaign.experiments.conclusions.parts import (
+from campaign.experiments.breakaway.conclusions import breakaway_conclusions
+from campaign.experiments.force_rate import force_rate_conclusions
+from campaign.experiments.frequency_response.conclusions import closed_loop_conclusions
+from campaign.experiments.friction_map.conclusions import map_conclusions, repeatability_conclusions
+from campaign.experiments.interface import TestData
+from campaign.experiments.observer_gain.conclusions import observer_conclusions
+from campaign.experiments.sensitivity.conclusions import sensitivity_conclusions
+from campaign.experiments.shared.conclusion_parts import (
     Settings,
     between,
     conclusion,
@@ -25,11 +28,8 @@ from campaign.experiments.conclusions.parts import (
     ratio_of,
     setting,
 )
-from campaign.experiments.conclusions.sensitivity import sensitivity_conclusions
-from campaign.experiments.conclusions.servo import closed_loop_conclusions
-from campaign.experiments.conclusions.stabilization import stabilization_conclusions
-from campaign.experiments.interface import TestData
 from campaign.experiments.shared.friction_models import Place
+from campaign.experiments.stabilization.conclusions import stabilization_conclusions
 from campaign.identification.stabilization_error import NO_SCATTER, OF_ONE_TRIAL, quotient
 from campaign.protocol import load_protocol, make_plan
 from campaign.result import Amount, Conclusion, Factor, Finding, Result
@@ -204,7 +204,7 @@ def error(method: str, value: float, share: float | None = 0.01, **where: object
 
 
 def with_gains(*errors: Finding) -> tuple[Finding, ...]:
-    from campaign.experiments.shared.comparisons import compared
+    from campaign.experiments.stabilization.comparisons import compared
 
     return (*errors, *compared(errors))
 

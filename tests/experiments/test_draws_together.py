@@ -9,9 +9,9 @@ import pytest
 
 from campaign.access.sentences import sentence
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.conclusions.parts import SET
 from campaign.experiments.preparing.draws import merged
 from campaign.experiments.preparing.draws_together import concluded
+from campaign.experiments.shared.conclusion_parts import SET
 from campaign.result import Amount, Conclusion, Factor, Result
 from tests.experiments.laboratory import MADE_UP
 

@@ -13,9 +13,9 @@ import pytest
 from campaign.archive import ArchivedTrial
 from campaign.backends.serial import SerialBackend, SerialOptions
 from campaign.experiments import experiments
+from campaign.experiments.excitation.account import dynamics_of, motion_of
+from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import Experiment
-from campaign.experiments.results.excitation_account import dynamics_of, motion_of
-from campaign.experiments.shared.excitation_options import ExcitationOptions
 from campaign.identification.gate import UNPHYSICAL
 from campaign.identifying.methods.frequency_response import METHOD as FREQUENCY_RESPONSE
 from campaign.identifying.methods.inverse_dynamics import METHOD as INVERSE_DYNAMICS
@@ -206,9 +206,7 @@ def test_a_force_of_the_wrong_sign_has_no_inertia_and_no_friction(
 ) -> None:
     turned = motion_of(series()[0])
     turned = replace(turned, force=-turned.force)
-    monkeypatch.setattr(
-        "campaign.experiments.results.excitation_account.motion_of", lambda _: turned
-    )
+    monkeypatch.setattr("campaign.experiments.excitation.account.motion_of", lambda _: turned)
     found = dynamics_of(series()[:1]).estimates
     assert found["inertia"].value < 0.0
     for name in ("inertia", "coulomb_positive", "coulomb_negative"):

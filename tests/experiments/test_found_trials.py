@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 
 from campaign.estimate import Window
 from campaign.experiments import experiments
-from campaign.experiments.frequency_response import _point
+from campaign.experiments.frequency_response.experiment import _point
 from campaign.identification.step_response import NOT_SETTLED, step_characteristics
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Result

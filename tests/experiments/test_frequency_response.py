@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from campaign.estimate import Estimate
-from campaign.experiments.frequency_response import EXPERIMENT, _point
+from campaign.experiments.frequency_response.experiment import EXPERIMENT, _point
 from campaign.physics.limits import margins
 from campaign.recording import Recording
 from campaign.result import Figure, Result

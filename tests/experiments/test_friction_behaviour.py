@@ -16,7 +16,7 @@ from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Systematic
 from campaign.execution.measuring import checked
 from campaign.experiments import experiments
-from campaign.experiments.model_output import NO_REVERSAL
+from campaign.experiments.model_output.experiment import NO_REVERSAL
 from campaign.experiments.shared.friction_models import with_model
 from campaign.experiments.stick_slip import TOO_FEW_SLIPS
 from campaign.identification.sampled import ALIKE, LOST

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from campaign.experiments.results.held_current import LATE, UNKNOWN, between_samples
-from campaign.experiments.results.presliding_dynamics import record_of, with_torques_known
+from campaign.experiments.presliding_multisine.dynamics import record_of, with_torques_known
+from campaign.experiments.presliding_multisine.held_current import LATE, UNKNOWN, between_samples
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine
 from tests.experiments.laboratory import execute, trials

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from campaign.experiments.shared.hull_motion import SeriesMotion
 from campaign.experiments.shared.motion_series import MOST_ROWS, kind_of, motion_signal, read_series
-from campaign.experiments.stabilization import EXPERIMENT, StabilizationOptions
+from campaign.experiments.stabilization.experiment import EXPERIMENT, StabilizationOptions
+from campaign.experiments.stabilization.hull_motion import SeriesMotion
 from campaign.options import TextFile
 from campaign.physics.base_motion import base_rate
 from tests.experiments.laboratory import analyse, execute, finding, table, trials

@@ -12,7 +12,8 @@ import pytest
 from campaign.channels import LOAD_RATE
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Origin
-from campaign.experiments import breakaway, experiments
+from campaign.experiments import experiments
+from campaign.experiments.breakaway import experiment as breakaway
 from campaign.experiments.interface import (
     Experiment,
     TestData,

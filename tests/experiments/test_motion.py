@@ -15,7 +15,7 @@ import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.experiments.interface import TestData, measured, result_of
-from campaign.experiments.motion import EXPERIMENT
+from campaign.experiments.motion.experiment import EXPERIMENT
 from campaign.result import Result
 from tests.experiments.test_every_number import lacking
 

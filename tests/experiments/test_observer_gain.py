@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.observer_gain import EXPERIMENT, ObserverGainOptions
-from campaign.experiments.results.observer_metrics import TOO_FEW, Gain, Rejection, measured_corner
+from campaign.experiments.observer_gain.experiment import EXPERIMENT, ObserverGainOptions
+from campaign.experiments.observer_gain.metrics import TOO_FEW, Gain, Rejection, measured_corner
 from campaign.identification.sine_amplitude import amplitude
 from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.recording import Ending, Outcome

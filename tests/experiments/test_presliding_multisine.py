@@ -14,7 +14,7 @@ from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
-from campaign.experiments.presliding_multisine import EXPERIMENT
+from campaign.experiments.presliding_multisine.experiment import EXPERIMENT
 from campaign.experiments.shared.multisine import first_slip, odd_multisine
 from campaign.protocol.bench_file import load_bench
 from campaign.result import Result

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from campaign.experiments import experiments
-from campaign.experiments.frequency_response import (
+from campaign.experiments.frequency_response.experiment import (
     EXPERIMENT,
     FrequencyResponseOptions,
     _refined_range,

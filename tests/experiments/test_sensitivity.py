@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.results.sensitivity_results import RANK, Response, judge, ranking
-from campaign.experiments.sensitivity import EXPERIMENT, SensitivityOptions
+from campaign.experiments.sensitivity.experiment import EXPERIMENT, SensitivityOptions
+from campaign.experiments.sensitivity.results import RANK, Response, judge, ranking
 from campaign.identification.threshold import Threshold
 from campaign.recording import Channel, Recording
 from tests.experiments.laboratory import (

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from campaign.experiments.results.frequency_response_figures import closed_loop_figures
-from campaign.experiments.results.frequency_response_tables import Sweep
-from campaign.experiments.results.servo_marks import SIDE_BY_SIDE, place_names, servo_figure
+from campaign.experiments.frequency_response.figures import closed_loop_figures
+from campaign.experiments.frequency_response.marks import SIDE_BY_SIDE, place_names, servo_figure
+from campaign.experiments.frequency_response.tables import Sweep
 from campaign.identification.servo import characteristics
 from campaign.result import Figure, Mark, Panel
 from tests.identification.loops import closed, response

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.results.identified_compensations import (
+from campaign.experiments.stabilization.experiment import EXPERIMENT, StabilizationOptions
+from campaign.experiments.stabilization.identified_compensations import (
     beside_conclusions,
     beside_rows,
 )
-from campaign.experiments.stabilization import EXPERIMENT, StabilizationOptions
 from campaign.identification.intervals import with_error
 from campaign.result import Factor
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.results.reversal_figures import HELD, can_be_shown, reversal
-from campaign.experiments.results.stabilization_errors import MOST_PANELS, error_figures
-from campaign.experiments.results.stabilization_figures import stabilization_figures
-from campaign.experiments.stabilization import StabilizationOptions
+from campaign.experiments.stabilization.errors import MOST_PANELS, error_figures
+from campaign.experiments.stabilization.experiment import StabilizationOptions
+from campaign.experiments.stabilization.figures import stabilization_figures
+from campaign.experiments.stabilization.reversal_figures import HELD, can_be_shown, reversal
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Figure, Panel
 from campaign.trial import Trial

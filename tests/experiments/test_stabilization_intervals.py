@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Window
-from campaign.experiments.stabilization import EXPERIMENT, OF_A_RECORD
+from campaign.experiments.stabilization.experiment import EXPERIMENT, OF_A_RECORD
 from campaign.identification.sampled import LOST
 from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.physics.bench import Bench

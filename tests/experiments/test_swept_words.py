@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.experiments.shared.swept_words import axis_of, name_of, quantity_of, words
-from campaign.experiments.stabilization import StabilizationOptions
+from campaign.experiments.stabilization.experiment import StabilizationOptions
 from campaign.result import Axis
 from tests.experiments.laboratory import trials
 from tests.physics.benches import bench

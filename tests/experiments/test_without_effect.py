@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from campaign.experiments import experiments
-from campaign.experiments.sensitivity import SensitivityOptions
-from campaign.experiments.stabilization import OF_A_SINE
+from campaign.experiments.sensitivity.experiment import SensitivityOptions
+from campaign.experiments.stabilization.experiment import OF_A_SINE
 from campaign.protocol.bench_file import load_bench
 
 CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import pytest
 
-from campaign.experiments import breakaway
+from campaign.experiments.breakaway import experiment as breakaway
 from campaign.experiments.interface import TrialData
 from campaign.identification.presliding import Presliding
 from campaign.identifying.method import Material

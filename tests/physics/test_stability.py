@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.experiments.observer_gain import predicted_limit
+from campaign.experiments.observer_gain.experiment import predicted_limit
 from campaign.physics.bench import Bench
 from campaign.physics.stability import growth_rate
 from campaign.signals import Sine

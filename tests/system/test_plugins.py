@@ -52,7 +52,7 @@ BACKEND = replace(SIM, name="moody", open=Moody)
 
 BORROWED = """
 from dataclasses import replace
-from campaign.experiments.stabilization import EXPERIMENT as SEA
+from campaign.experiments.stabilization.experiment import EXPERIMENT as SEA
 EXPERIMENT = replace(SEA, name="borrowed")
 """
 

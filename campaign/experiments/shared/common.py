@@ -28,6 +28,16 @@ SHORT_LABELS = {"none": "none", "static": "static", "lugre": "LuGre", "observer"
 """Where little room is: under an axis, beside a dot."""
 
 
+def method(name: object) -> str:
+    """`the LuGre model`; a bench's own name stands for itself."""
+    return f"the {METHOD_LABELS[str(name)]}" if str(name) in METHOD_LABELS else str(name)
+
+
+def loop_words(name: Value) -> str:
+    """`with the LuGre model`, by the name of a compensation."""
+    return "without compensation" if name == "none" else f"with {method(name)}"
+
+
 def short_label(name: str) -> str:
     """A compensation in one word where that is known; a bench's own name stands for itself."""
     return SHORT_LABELS.get(name, name)

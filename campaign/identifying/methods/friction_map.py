@@ -18,8 +18,8 @@ from pydantic import Field
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.conclusions.parts import count
-from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.conclusion_parts import count
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.gate import admitted_together, mattering
 from campaign.identification.over_a_turn import OverATurn

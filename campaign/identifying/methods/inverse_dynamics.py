@@ -15,7 +15,7 @@ from pydantic import Field
 from campaign.channels import DRIVE_TORQUE
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.gate import admitted_together, refused
 from campaign.identification.inverse.motion import Filtering

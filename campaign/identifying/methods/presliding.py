@@ -18,7 +18,7 @@ from pydantic import Field
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
-from campaign.experiments.results.presliding_dynamics import (
+from campaign.experiments.presliding_multisine.dynamics import (
     BY_TORQUE,
     assumed_of,
     damping_figure,
@@ -28,7 +28,7 @@ from campaign.experiments.results.presliding_dynamics import (
     viscous_of,
     with_torques_known,
 )
-from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.identification.gate import admitted
 from campaign.identification.intervals import shifted_by
 from campaign.identification.presliding_dynamics.found import (

@@ -15,11 +15,11 @@ from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
-from campaign.experiments.breakaway import EXPERIMENT as RAMP
-from campaign.experiments.breakaway import curve_of
+from campaign.experiments.breakaway.experiment import EXPERIMENT as RAMP
+from campaign.experiments.breakaway.experiment import curve_of
+from campaign.experiments.breakaway.means import mean
 from campaign.experiments.interface import measured, metrics
 from campaign.experiments.preparing.unusable import not_measured, notes_on
-from campaign.experiments.results.breakaway_means import mean
 from campaign.identification.intervals import of_repeats
 from campaign.identifying.method import Identified, Material, Method, Parameter
 from campaign.options import Options

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.shared.elsewhere import with_scale
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identification.gate import admitted
 from campaign.identification.inverse.motion import Filtering

@@ -8,9 +8,9 @@ import numpy as np
 
 from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
-from campaign.experiments.presliding_multisine import EXPERIMENT as SHAKEN
-from campaign.experiments.presliding_multisine import PreslidingMultisineOptions
-from campaign.experiments.results.presliding_dynamics import record_of
+from campaign.experiments.presliding_multisine.dynamics import record_of
+from campaign.experiments.presliding_multisine.experiment import EXPERIMENT as SHAKEN
+from campaign.experiments.presliding_multisine.experiment import PreslidingMultisineOptions
 from campaign.identification.inverse.motion import whole_pieces
 from campaign.identification.presliding_dynamics.plant import Array
 from campaign.identification.presliding_dynamics.record import FEWEST, Assumed, Record

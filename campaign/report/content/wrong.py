@@ -10,7 +10,7 @@ from campaign.access.analysis import AnalysedTest
 from campaign.archive import ArchivedTrial, RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
-from campaign.experiments.conclusions.stabilization import method
+from campaign.experiments.shared.common import method
 from campaign.recording import Outcome, SafeState
 
 WORDS = {

@@ -1,0 +1,1 @@
+"""Breakaway: torque ramps until the load moves."""

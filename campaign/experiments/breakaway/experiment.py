@@ -1,0 +1,396 @@
+"""Breakaway: a slow torque ramp from rest, and what the presliding curve says (section 4.3.3).
+
+The loop is open; the drive torque rises until the load slides. The torque at that moment is the
+breakaway torque, the start of the friction-position curve gives the bristle stiffness sigma0, and
+an *assumed* damping ratio gives sigma1, which the ramp itself does not show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, JsonValue
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
+from campaign.estimate import Estimate, Origin, Window
+from campaign.experiments.breakaway.conclusions import breakaway_conclusions
+from campaign.experiments.breakaway.figures import position_figure, ramp_figure
+from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
+from campaign.experiments.breakaway.remarks import remarks
+from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.shared import fitting_ramps
+from campaign.experiments.shared.captions import trials_of
+from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.experiments.shared.conclusion_parts import Settings
+from campaign.experiments.shared.found_trials import named_or_found
+from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.found_excitation import found_ramp
+from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
+from campaign.identification.relative_rate import (
+    LONGEST,
+    RelativeRate,
+    made_of_counts,
+    resolved_rate,
+    slides_from,
+    stop_rate,
+)
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.complete import IncompleteBenchError, inertia_of
+from campaign.physics.friction import friction_models
+from campaign.reason import Cause
+from campaign.recording import Array, Recording
+from campaign.result import Figure, Finding, Result, Table
+from campaign.signals import Polyline
+from campaign.trial import Offered, Task, Trial, TrialRequest
+from campaign.units import (
+    Angle,
+    AngularRate,
+    Frequency,
+    Inertia,
+    RotationalDamping,
+    Time,
+    Torque,
+    TorqueRate,
+    rate_here,
+)
+
+WAYS = {"positive": 1.0, "negative": -1.0}
+OF_INERTIA = Cause("part of the inertia", "it serves the inertia's part alone")
+ASSUMED_RATIO = Cause(
+    "assumed damping ratio",
+    "it follows from an assumed damping ratio; a ramp carries no information on it",
+)
+FOR_ORIENTATION = Cause(
+    "for orientation", "torque over stiffness of the strongest interface, for orientation"
+)
+BY_CRITERION = Cause("chosen by a criterion", "chosen by the Bayesian information criterion")
+OWN = ("measurement", "position", "direction")
+"""What distinguishes the ramps of one group."""
+
+
+def default_positions() -> tuple[float, ...]:
+    """Ten angles from -45 to 45 deg (rad)."""
+    return tuple(float(angle) for angle in np.deg2rad(np.linspace(-45.0, 45.0, 10)))
+
+
+class BreakawayOptions(Options):
+    """Options of a breakaway test."""
+
+    positions: tuple[Angle, ...] = Field(default_factory=default_positions, min_length=1)
+    """Angles of the load relative to the hull at which the ramp is run."""
+    directions: tuple[Literal["positive", "negative"], ...] = Field(
+        default=("positive", "negative"), min_length=1, max_length=2
+    )
+    """Ways to which the load is turned, one after the other; friction may differ by direction."""
+    torque_rate: TorqueRate = Field(default=1.0, gt=0)
+    """Slope of the ramp, at the load. Swept, it shows what the ramp's rate does to the results."""
+    peak_torque: Torque = Field(default=60.0, gt=0)
+    """Where the ramp ends if the load has not moved; above the breakaway torque expected."""
+    rest: Time = Field(default=0.5, ge=0)
+    """Standstill before the ramp: it says what the gyro's bias is."""
+    sliding_rate: AngularRate = Field(default=0.005, gt=0)
+    """Rate at which the load counts as sliding; the trial ends when it is four times this fast, and
+    two counts of a gyro at least."""
+    fit_share: float = Field(default=0.8, gt=0.1, lt=1.0)
+    """The presliding curve is fitted up to this share of the breakaway torque."""
+    damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
+    """Assumed damping ratio of presliding, from which sigma1 follows (Eq. 4.12)."""
+    inertia: Inertia | None = Field(default=None, gt=0)
+    """J that Eq. 4.12 takes; absent: that of the bench."""
+    viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
+    """sigma2 that Eq. 4.12 takes off; absent: that of the bench's load side."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
+    windows = windows_of(options)
+    _, ramp = windows
+    ends = stop_rate(options.sliding_rate, Rig(bench).rate_step)
+    places = [(way, position) for way in options.directions for position in options.positions]
+    for number, (direction, position) in enumerate(places, start=1):
+        peak = WAYS[direction] * options.peak_torque
+        yield TrialRequest(
+            Task(
+                mode="torque",
+                command=Polyline(times=(0.0, ramp.start, ramp.stop), values=(0.0, 0.0, peak)),
+                duration=ramp.stop,
+                window=(ramp.start, ramp.stop),
+                sample_rate=options.sample_rate,
+                start_angle=position,
+                stop_rate=ends,
+            ),
+            point={"measurement": number, "position": position, "direction": direction},
+            note=f"ends early, once the load slides at {rate_here(ends)}",
+            windows=windows,
+        )
+
+
+def _warnings(options: BreakawayOptions, bench: Bench) -> Iterator[str]:
+    if bench.axis.inertia is None:
+        yield (
+            "no breakaway torque can be told of its ramps, for the bench does not say axis.inertia "
+            "(what the torque accelerates): add it before they are executed"
+        )
+
+
+def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The ramp of a recording that nobody planned: up to when the load first slides."""
+    known = {RELATIVE_ANGLE} & offered.channels
+    recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
+    seen = _resolved(recording, options.sliding_rate, own_sensor=False)
+    threshold = max(options.sliding_rate, seen.finest)
+    slides = slides_from(seen.values, threshold)
+    if slides is None:
+        raise ValueError(f"the load never slides at {rate_here(threshold)} (sliding_rate)")
+    ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides[0]]))
+    # And what the smoothing needs behind it.
+    stop = min(offered.duration, float(recording.time[slides[1] - 1]) + 0.5 * seen.window)
+    coarse = ""
+    if threshold > options.sliding_rate:
+        coarse = f"; sliding is {rate_here(threshold)}, the least that its sensor resolves"
+    place: dict[str, JsonValue] = {}
+    if known and "position" not in offered.conditions:
+        place["position"] = round(float(recording[RELATIVE_ANGLE][0]), 4)
+    looked_for = Window("rest", 0.0, ramp.start), Window("ramp", ramp.start, stop)
+    windows = named_or_found(offered, looked_for)
+    yield TrialRequest(
+        Task(mode="recorded", duration=stop, window=(ramp.start, stop), sample_rate=1.0),
+        point=place | {"direction": "positive" if ramp.slope > 0 else "negative"},
+        note=f"a ramp of {ramp.slope:.3g} N m/s from {ramp.start:.3g} s was found{coarse}",
+        windows=windows,
+        part=(0.0, stop),
+        options={
+            "torque_rate": float(f"{abs(ramp.slope):.3g}"),
+            "rest": ramp.start,
+            "sliding_rate": threshold,
+        },
+    )
+
+
+def _resolved(recording: Recording, finest: float, *, own_sensor: bool) -> RelativeRate:
+    """The rate of a recording, smoothed until its sensor resolves `finest` (rad/s).
+
+    It may be made of an encoder's counts, of which each is many times as fast; of an imported rate
+    nobody tells. It is then the slope of the angle.
+    """
+    angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
+    rate, step = recording[GYRO_RATE], _step(recording)
+    if angle is not None and own_sensor:
+        own_sensor = not made_of_counts(rate, angle, step)
+    return resolved_rate(rate, angle, step, finest, LONGEST, own_sensor=own_sensor)
+
+
+def _step(recording: Recording) -> float:
+    return float(np.ptp(recording.time)) / max(len(recording.time) - 1, 1)
+
+
+def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
+    """Standstill and ramp, for the plan and for recordings of a plan that did not name them."""
+    stop = options.rest + options.peak_torque / options.torque_rate
+    return Window("rest", 0.0, options.rest), Window("ramp", options.rest, stop)
+
+
+def _windows(trial: Trial, options: BreakawayOptions) -> dict[str, Window]:
+    return {window.name: window for window in trial.windows or windows_of(options)}
+
+
+def _options(trial: Trial) -> BreakawayOptions:
+    return BreakawayOptions.model_validate(trial.options, context={"si": True})
+
+
+def direction_of(trial: Trial) -> str:
+    """Which way the load was turned; before it was an option it was the positive."""
+    return str(trial.point.get("direction", "positive"))
+
+
+def _samples(data: TrialData) -> tuple[Array, Array, Array]:
+    """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,).
+
+    Of an executed ramp a rate of counts is differenced anew, what is below one of them is lost
+    else; and the torque counts from what its sensor shows at rest.
+    """
+    recording, way = data.recording(), WAYS[direction_of(data.trial)]
+    time, rate, torque = recording.time, recording[GYRO_RATE], recording[DRIVE_TORQUE]
+    if data.trial.recording:
+        return time, way * rate, way * torque
+    if RELATIVE_ANGLE in recording.channels:
+        angle, step = recording[RELATIVE_ANGLE], _step(recording)
+        if bench_of(data.trial).rate_is_of_encoder or made_of_counts(rate, angle, step):
+            rate = np.gradient(angle, step)
+    # At rest no torque is commanded: what is shown is the zero of its sensor.
+    rest = _windows(data.trial, _options(data.trial))["rest"]
+    zero = torque[(time >= rest.start) & (time < rest.stop)]
+    zero = zero[np.isfinite(zero)]
+    return time, way * rate, way * (torque - (np.mean(zero) if len(zero) else 0.0))
+
+
+def _seen(data: TrialData, finest: float) -> Array:
+    """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
+    own_sensor = not (data.trial.recording or bench_of(data.trial).rate_is_of_encoder)
+    seen = _resolved(data.recording(), finest, own_sensor=own_sensor)
+    return WAYS[direction_of(data.trial)] * seen.values
+
+
+def curve_of(data: TrialData, breakaway: float) -> Presliding:
+    """The curve of bristles of a ramp whose load slides at `breakaway` (N m).
+
+    Raises ValueError where the ramp shows too little of it.
+    """
+    options = _options(data.trial)
+    start = _windows(data.trial, options)["ramp"].start
+    return fit_presliding(*_samples(data), start, breakaway, options.fit_share)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """Breakaway torque; where the curve of bristles shows, stiffness and what follows from it."""
+    options, bench = _options(data.trial), bench_of(data.trial)
+    inertia = inertia_of(bench, "friction of a load that gathers speed")
+    seen = _seen(data, options.sliding_rate)
+    found = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
+    torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
+    torque = _by_torque_constant(torque, bench)
+    acceleration = Estimate.without_interval(
+        "peak_acceleration", found.acceleration, "rad/s^2", OF_INERTIA()
+    )
+    try:
+        curve = curve_of(data, found.torque.value)
+    except ValueError:
+        return torque, acceleration
+    if _is_of_any_size(curve.stiffness):
+        return torque, acceleration
+    return torque, acceleration, *_of_curve(curve, options, bench)
+
+
+def _is_of_any_size(one: Estimate) -> bool:
+    """Whether a ramp leaves a number open over decades: it would decide the mean of all ramps."""
+    return one.origin is Origin.NOT_DETERMINED and not one.has_interval
+
+
+def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Iterator[Estimate]:
+    viscous = options.viscous_friction
+    if viscous is None:
+        models = friction_models()
+        load = (each for each in bench.friction.values() if each.side == "load")
+        viscous = sum(models[each.model].viscous(each) for each in load)
+    inertia = options.inertia or inertia_of(bench, "a damping ratio")
+    stiffness = curve.interfaces[0].stiffness  # not the end of a bound
+    damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
+    curve = curve.with_damping(damping)
+    yield _by_torque_constant(curve.stiffness, bench)
+    if not _is_of_any_size(curve.stiffness_at_rest):
+        yield _by_torque_constant(curve.stiffness_at_rest, bench)
+    yield Estimate.without_interval(
+        "bristle_damping",
+        damping,
+        "N m s/rad",
+        ASSUMED_RATIO(),
+        origin=Origin.ASSUMED,
+        method="Equation 4.12",
+    )
+    yield Estimate.without_interval("chord", curve.chord, "N m/rad", CHORD())
+    span = curve.interfaces[0].torque / curve.interfaces[0].stiffness
+    yield Estimate.without_interval("presliding_span", span, "rad", FOR_ORIENTATION())
+    count = float(len(curve.interfaces))
+    yield Estimate.without_interval("interfaces", count, "", BY_CRITERION(), kind="count")
+    for share, own in curve.by_window.items():
+        yield Estimate(**{**vars(own), "name": f"bristle_stiffness_to_{share:g}"})
+
+
+def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
+    """Torque and stiffness are as wrong as the torque constant is."""
+    return with_systematic(estimate, bench, TORQUE_CONSTANT, estimate.value)
+
+
+def _analyse(data: TestData) -> Result:
+    notes: list[str] = list(failures_note(data))
+    groups = [_ramps(group, notes) for group in grouped(data.completed(), own=OWN).values()]
+    groups = with_comparisons([ramps for ramps in groups if ramps.found])
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    findings: list[Finding] = []
+    for number, ramps in enumerate(groups, start=1):
+        suffix = f"-{number}" if len(groups) > 1 else ""
+        means = means_of(ramps)
+        tables += [table_of(ramps, means, suffix), *window_table(ramps, suffix)]
+        figures += _figures(ramps, means, suffix)
+        findings += findings_of(ramps, means)
+        notes += remarks(ramps)
+    rates = [_options(item.trial).torque_rate for item in data.completed()]
+    known = any(bench_of(item.trial).axis.inertia is not None for item in data.completed())
+    slid = not findings and any(_slid(item) for item in data.completed())
+    settings = Settings.of(data, BreakawayOptions)
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        breakaway_conclusions(
+            findings, rates, settings, inertia_known=known or not rates, slid=slid
+        ),
+    )
+
+
+def _slid(item: TrialData) -> bool:
+    """Whether the load came to the rate that counts as sliding."""
+    bound = _options(item.trial).sliding_rate
+    return slides_from(_seen(item, bound), bound) is not None
+
+
+def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
+    trials, places, found = [], [], []
+    for item in group:
+        try:
+            own = metrics(item, _measure)
+        except IncompleteBenchError as error:  # said once for all ramps
+            notes.append(f"No breakaway torque: {error}.")
+            continue
+        except ValueError as error:
+            faster = "; a higher sample_rate holds more of it" if _slid(item) else ""
+            notes.append(f"{item.trial.label}: {error}{faster}.")
+            continue
+        trials.append(item)
+        places.append({**conditions(item), "direction": direction_of(item.trial)})
+        found.append(own)
+        if "bristle_stiffness" not in own:
+            notes.append(
+                f"{item.trial.label}: its presliding is too short for a stiffness (a slower ramp "
+                "has more samples of it), or too noisy (a faster one moves more above the noise)."
+            )
+    return Ramps(tuple(trials), tuple(places), tuple(found))
+
+
+def _figures(
+    ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
+) -> Iterator[Figure]:
+    shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
+    if shown is not None:
+        data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
+        curve, place = curve_of(data, torque), ramps.places[shown]
+        yield ramp_figure(_samples(data), curve, torque, suffix, place, trials_of([data]))
+    if len(ramps.found) > 2 and all("position" in place for place in ramps.places):
+        yield position_figure(ramps, means, suffix)
+
+
+EXPERIMENT = Experiment(
+    name="breakaway",
+    summary="breakaway torque and presliding stiffness from a slow torque ramp (Table 4.5)",
+    options=BreakawayOptions,
+    trials=_trials,
+    analyse=_analyse,
+    fit=fitting_ramps.breakaway,
+    warnings=_warnings,
+    measure=_measure,
+    recorded=_found,
+    windows=("rest", "ramp"),
+    requires={
+        DRIVE_TORQUE: "the torque at which the load slides",
+        GYRO_RATE: "the presliding curve, and the moment at which the load slides",
+    },
+)

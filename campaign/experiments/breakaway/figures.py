@@ -1,0 +1,294 @@
+"""Figures of a breakaway test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.axis_kind import is_linear
+from campaign.estimate import Estimate
+from campaign.experiments.breakaway.means import Ramps
+from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
+from campaign.identification.presliding import Presliding
+from campaign.identification.presliding_curve import presliding_torque
+from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, Value
+
+TORQUE = Axis("Drive torque", "N m", "N m")
+OF_A_RAMP = ("measurement", "position", "direction")
+"""Conditions that are a ramp's own, and no mean's."""
+NAMED = 12
+"""Most positions that stand at the axis by their angle."""
+CHANCE = 0.05
+"""How often ramps that do not differ would be told to in any of their quantities, at most."""
+ASIDE = 0.07
+"""How far ramps of a direction are drawn beside their position, in steps from one to the next."""
+DOTS, SMOOTH = 45, 400
+"""Dots of a measured curve, and shares of it over which its way is smoothed."""
+
+
+def ramp_figure(
+    samples: tuple[Array, Array, Array],
+    found: Presliding,
+    breakaway: float,
+    suffix: str,
+    place: Mapping[str, Value],
+    trials: tuple[int, ...],
+) -> Figure:
+    """One ramp: time (s), rate (rad/s) and torque (N m), each (n,), to the positive side."""
+    time, rate, torque = samples
+    axis = Axis("Time", "s", "s")
+    low, high = found.window
+    return Figure(
+        key=f"ramp{suffix}",
+        title="Breakaway: torque ramp, motion, and the presliding curve",
+        caption=f"One ramp, {_where(place)}. The torque rises until the load slides, at "
+        f"{amount(breakaway, 'N m')}. {_gives(found)} The angle is the gyro's rate, integrated "
+        "without its bias: it drifts with the rate's noise. Dots: some of the samples, evenly "
+        "along their curve; last, all of them less the fitted curve.",
+        alt="Drive torque and rate over time, drive torque over angle with the fitted "
+        "presliding curve and its initial slopes, and what the two differ by.",
+        panels=(
+            Panel(
+                axis,
+                TORQUE,
+                [Curve(time, torque, "measured", "measured")],
+                marks=(Mark("breakaway", y=breakaway),),
+            ),
+            Panel(
+                axis,
+                Axis("Rate", "rad/s", "deg/s"),
+                [Curve(time, rate, "measured", "measured")],
+            ),
+            Panel(
+                Axis("Angle from the start", "rad", "mrad"),
+                TORQUE,
+                _curves(samples, found, breakaway),
+                marks=(Mark("breakaway", y=breakaway), Mark("fitted here", y=low, until=high)),
+            ),
+            _residual_panel(samples, found, breakaway),
+        ),
+        thesis=("4.13",),
+        across=2,
+        trials=trials,
+    )
+
+
+def _where(place: Mapping[str, Value]) -> str:
+    position = place.get("position")
+    angle = isinstance(position, int | float) and setting(float(position), "rad", "deg")
+    return f"{place.get('direction')} direction{f' at {angle}' if angle else ''}"
+
+
+def _gives(found: Presliding) -> str:
+    """How the load gives before it slides: true of how many interfaces the curve shows."""
+    before = "Before that the load already gives, elastically"
+    if len(found.interfaces) < 2:
+        return f"{before}: the lower curve begins with the stiffness σ0."
+    count = len(found.interfaces)
+    every = "both" if count == 2 else f"all {count}"
+    return (
+        f"{before}: the lower curve begins with the stiffness of {every} interfaces together and "
+        "goes on, once the weaker ones slip, with that of the strongest."
+    )
+
+
+def _curves(
+    samples: tuple[Array, Array, Array], found: Presliding, breakaway: float
+) -> list[Curve]:
+    angle, torque = _presliding(samples, found, breakaway)
+    top = float(np.max(angle, initial=0.0))
+    fine = np.linspace(0.0, max(top, 0.0), 400)
+    first = found.interfaces[0]
+    tail = sum(each.torque for each in found.interfaces[1:])
+    reach = fine[fine <= breakaway / first.stiffness]
+    curves = [
+        _some(angle, torque),
+        Curve(fine, presliding_torque(fine, found.interfaces), "fitted curve", "fit"),
+        Curve(
+            reach,
+            tail + first.stiffness * reach,
+            f"σ0 = {amount(first.stiffness, 'N m/rad', 'N m/mrad')}",
+            "reference",
+            "thin",
+        ),
+    ]
+    if len(found.interfaces) > 1:
+        at_rest = found.stiffness_at_rest.value
+        steep = fine[fine <= 1.3 * (tail + first.stiffness * top * 0.02) / at_rest]
+        label = f"at rest: {amount(at_rest, 'N m/rad', 'N m/mrad')}"
+        curves.append(Curve(steep, at_rest * steep, label, "alternative"))
+    return curves
+
+
+def _presliding(
+    samples: tuple[Array, Array, Array], found: Presliding, breakaway: float
+) -> tuple[Array, Array]:
+    """Angle (rad) and torque (N m) of a ramp until shortly beyond its breakaway, each (n,)."""
+    time, rate, torque = samples
+    interval = float(np.ptp(time)) / (len(time) - 1)
+    angle = np.cumsum(rate - found.bias) * interval
+    shown = torque <= 1.02 * breakaway
+    return (angle[shown], torque[shown]) if shown.any() else (angle, torque)
+
+
+def _some(angle: Array, torque: Array) -> Curve:
+    """Samples evenly along the curve as it is seen: a line of all would lie under the fit."""
+    known = np.isfinite(angle) & np.isfinite(torque)
+    x, y = angle[known], torque[known]
+    # Noise would count as way: along the averages of a few samples.
+    size = max(1, len(x) // SMOOTH)
+    kernel = np.full(size, 1.0 / size)
+    rough = [np.convolve(each, kernel, mode="valid") / (np.ptp(each) or 1.0) for each in (x, y)]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*(np.diff(each) for each in rough)))])
+    places = np.searchsorted(way, np.linspace(0.0, way[-1], DOTS)) + size // 2
+    places = np.unique(np.minimum(places, len(x) - 1))
+    return Curve(x[places], y[places], "measured", "measured", "points")
+
+
+def _residual_panel(
+    samples: tuple[Array, Array, Array], found: Presliding, breakaway: float
+) -> Panel:
+    """The measured torque less the fitted curve, over the angle."""
+    angle, torque = _presliding(samples, found, breakaway)
+    away = torque - presliding_torque(angle, found.interfaces)
+    level = np.array([0.0, float(np.nanmax(angle, initial=0.0))])
+    return Panel(
+        Axis("Angle from the start", "rad", "mrad"),
+        Axis("Measured less fitted", "N m", "N m"),
+        [
+            Curve(angle, away, "measured", "measured", "thin"),
+            Curve(level, np.zeros(2), "fitted curve", "fit"),
+        ],
+    )
+
+
+def position_figure(
+    ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
+) -> Figure:
+    """Breakaway torque and stiffness over position, with the interval of each ramp, and means."""
+    shown = {"breakaway_torque": "breakaway torque", "bristle_stiffness": "bristle stiffness"}
+    told = [_what_shows(ramps.values(name), word, len(shown)) for name, word in shown.items()]
+    whole = next(iter(means.values()))  # of both directions, where there are two
+    axes = (Axis("Breakaway torque", "N m", "N m"), Axis("σ0", "N m/rad", "N m/mrad"))
+    panels = [
+        Panel(_positions(ramps), axis, [*_dots(ramps, name), *_mean(ramps, whole, name)])
+        for name, axis in zip(shown, axes, strict=True)
+    ]
+    return Figure(
+        key=f"positions{suffix}",
+        title="Breakaway torque and bristle stiffness over position",
+        caption=f"{' '.join(filter(None, told))} {_bars(ramps)}",
+        alt="Breakaway torque and bristle stiffness, one dot with a bar per ramp, and their mean.",
+        panels=tuple(panels),
+        across=2,
+        trials=trials_of(ramps.trials),
+    )
+
+
+def _bars(ramps: Ramps) -> str:
+    """What the bars of single ramps are, where the table has them with more in them."""
+    own = "Bars are the 95 % intervals of each ramp alone"
+    every = (estimate for each in ramps.found for estimate in each.values())
+    if not any(each.has_interval and each.combined != (each.low, each.high) for each in every):
+        return f"{own}."
+    return (
+        f"{own}: whether ramps differ shows by these. What the bench's constants may be off by is "
+        "the same in all ramps: it is in the bar of the mean on the right, and in every interval "
+        "of the table, which are therefore wider than the bars here."
+    )
+
+
+def _what_shows(found: Sequence[Estimate], word: str, tests: int) -> str:
+    """Whether ramps differ by more than their own intervals explain: a chi-square test.
+
+    One of as many `tests`, each of which may be wrong by its share of `CHANCE` (Bonferroni).
+    """
+    from scipy.stats import chi2
+
+    known = [each for each in found if each.standard_error]
+    if len(known) < 2:
+        return ""
+    values = np.array([each.value for each in known])
+    weights = np.array([each.standard_error or np.nan for each in known]) ** -2.0
+    spread = float(np.sum(weights * (values - np.average(values, weights=weights)) ** 2))
+    if spread <= float(chi2.ppf(1.0 - CHANCE / tests, len(known) - 1)):
+        return sentence(f"{word}: the ramps show no difference beyond their own intervals")
+    unit = known[0].unit
+    ends = [amount(float(end), unit, digits=4) for end in (values.min(), values.max())]
+    return sentence(
+        f"{word}: ramps differ by more than their own intervals, from {ends[0]} to {ends[1]}"
+    )
+
+
+def _angles(ramps: Ramps) -> list[float]:
+    return sorted({float(str(place["position"])) for place in ramps.places})
+
+
+def _pitch(angles: Sequence[float]) -> float:
+    """From one position to the next (rad), on average."""
+    return max((angles[-1] - angles[0]) / max(len(angles) - 1, 1), math.radians(1.0))
+
+
+def _behind(angles: Sequence[float]) -> float:
+    """Where the mean stands: right of the last position, clear of it."""
+    return angles[-1] + _pitch(angles)
+
+
+def _positions(ramps: Ramps) -> Axis:
+    angles = _angles(ramps)
+    step = -(-len(angles) // NAMED)
+    # At most every other angle has its name: two panels share the width.
+    step = max(step, 2) if len(angles) > NAMED // 2 else step
+    names = tuple((angle, _place(angle)) for angle in angles[::step])
+    return Axis("Position", "rad", "rad", places=(*names, (_behind(angles), "mean")))
+
+
+def _place(position: float) -> str:
+    if is_linear():
+        return setting(position, "rad", "deg")
+    return f"{np.rad2deg(position):.4g}°".replace("-", "−")
+
+
+def _mean(ramps: Ramps, means: Mapping[str, Estimate], quantity: str) -> Iterator[Curve]:
+    if quantity in means:
+        at = np.array([_behind(_angles(ramps))])
+        dot = Curve.of(at, [means[quantity]], "mean of all", "measured")
+        shared = {k: v for k, v in ramps.places[0].items() if k not in OF_A_RAMP}
+        conditions = {**shared, "statistic": "mean"}
+        yield replace(dot, quantity=quantity, conditions=conditions)
+
+
+def _dots(ramps: Ramps, quantity: str) -> list[Curve]:
+    curves = []
+    several = len(ramps.directions) > 1
+    aside = ASIDE * _pitch(_angles(ramps)) if several else 0.0
+    for direction in ramps.directions:
+        shown = [
+            (float(str(place["position"])), own[quantity])
+            for place, own in zip(ramps.places, ramps.found, strict=True)
+            if quantity in own and place["direction"] == direction
+        ]
+        if not shown:
+            continue
+        ends = np.array([_ends(estimate) for _, estimate in shown])
+        curves.append(
+            Curve(
+                np.array([position for position, _ in shown]),
+                np.array([estimate.value for _, estimate in shown]),
+                f"{direction} direction",
+                direction,
+                "points",
+                low=ends[:, 0],
+                high=ends[:, 1],
+                aside=aside if direction == "positive" else -aside,
+            )
+        )
+    return curves
+
+
+def _ends(estimate: Estimate) -> tuple[float, float]:
+    low, high = estimate.low, estimate.high
+    return np.nan if low is None else low, np.nan if high is None else high

@@ -1,0 +1,142 @@
+"""What a user of a breakaway test should know of its numbers, and can do about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.experiments.breakaway.means import MEASURED, Ramps
+from campaign.experiments.interface import bench_of
+from campaign.identification.breakaway_torque import STILL_RISING
+from campaign.identification.presliding import NOT_RESOLVED, WINDOW
+from campaign.units import angle_here, rate_here
+
+FEW_COUNTS = 10.0
+"""of the encoder in presliding: an angle of fewer shows no curve."""
+SHORT_REST = 0.2
+"""Standstill over the ramp's length below which the gyro's bias widens the interval of sigma0; with
+a third of the ramp's length it hardly does."""
+LONG_REST = 0.3
+WIDE = 0.05
+"""Half-width over value from which a longer standstill is worth its time."""
+
+
+def remarks(ramps: Ramps) -> Iterator[str]:
+    """Sentences; those that ask for something name the option."""
+    yield "σ1 is assumed from a damping ratio; a torque ramp carries no information on it."
+    if any(each.value > 1 for each in ramps.values("interfaces")):
+        yield (
+            "The presliding curve has two slopes: all interfaces stick at first, then the weaker "
+            "one slips and only the stronger goes on deflecting."
+        )
+    yield from _inertia(ramps)
+    yield from _encoder(ramps)
+    yield from _rest(ramps)
+    yield from _rate(ramps)
+    yield from _hidden(ramps)
+    yield from _unfinished(ramps)
+
+
+def _inertia(ramps: Ramps) -> Iterator[str]:
+    found = [abs(each.value) for each in ramps.values("peak_acceleration")]
+    inertia = bench_of(ramps.trials[0].trial).axis.inertia
+    if found and inertia is not None:
+        size = 0.01 * float(np.mean(found)) * inertia
+        yield f"An inertia that is 1 % off moves the breakaway torque by {size:.2g} N·m."
+
+
+def _encoder(ramps: Ramps) -> Iterator[str]:
+    count = bench_of(ramps.trials[0].trial).sensors.encoder.resolution
+    spans = [each.value for each in ramps.values("presliding_span")]
+    if not spans or count == 0 or float(np.median(spans)) >= FEW_COUNTS * count:
+        return
+    yield (
+        f"Presliding spans {float(np.median(spans)) / count:.2g} counts of the encoder: σ0 rests "
+        "on the gyro alone. An angle sensor that is to show presliding needs counts of "
+        f"{angle_here(float(np.median(spans)) / FEW_COUNTS, '.2g')} or finer."
+    )
+
+
+def _rest(ramps: Ramps) -> Iterator[str]:
+    found = ramps.values("bristle_stiffness")
+    trial = ramps.trials[0].trial
+    rest, rate = (float(str(trial.options[name])) for name in ("rest", "torque_rate"))
+    torques = [each.value for each in ramps.values("breakaway_torque")]
+    wide = [each for each in found if _relative(each) > WIDE]
+    if not torques or not wide:
+        return
+    length = float(np.mean(torques)) / rate
+    if rest < SHORT_REST * length:
+        yield (
+            f"After a standstill of {rest:.3g} s the gyro's bias is hardly known, and σ0 is wide: "
+            f"rest {LONG_REST * length:.2g} s or longer."
+        )
+
+
+def _rate(ramps: Ramps) -> Iterator[str]:
+    refused = [
+        name
+        for name in MEASURED
+        if any(each.reason and each.standard_error is not None for each in ramps.values(name))
+        and not any(each.kind in ("at least", "at most") for each in ramps.values(name))
+    ]
+    trial = ramps.trials[0].trial
+    stiffness = ramps.values("bristle_stiffness")
+    shifted = sum(_by_window(each) > 0.5 * _scatter(each) > 0 for each in stiffness)
+    noisy = any(value > 0 for value in _noise(ramps))
+    if noisy and (refused or 2 * shifted > len(stiffness)):
+        rate = float(str(trial.options["torque_rate"]))
+        yield (
+            "The ramp is too fast for the curve of bristles, or its sensors too coarse: choose a "
+            f"torque_rate of {0.25 * rate:.2g} N·m/s, or sweep it to see what it does."
+        )
+
+
+def _hidden(ramps: Ramps) -> Iterator[str]:
+    found = [own for own in ramps.found if "stiffness_at_rest" in own]
+    bounds = sum(own["stiffness_at_rest"].reason in NOT_RESOLVED for own in found)
+    above = sum(own["bristle_stiffness"].reason in NOT_RESOLVED for own in found)
+    if not (bounds or above):
+        return
+    rate = float(str(ramps.trials[0].trial.options["torque_rate"]))
+    yield (
+        f"The gyro's noise may hide a stiffer interface that slips first: of {len(found)} ramps, "
+        f"stiffness at rest is a lower bound in {bounds} and σ0 an upper bound in {above}. A "
+        f"torque_rate of {4.0 * rate:.2g} N·m/s shows twice as much above the noise."
+    )
+
+
+def _unfinished(ramps: Ramps) -> Iterator[str]:
+    bounds = [each for each in ramps.values("breakaway_torque") if each.kind == "at least"]
+    if bounds:
+        rate = float(str(ramps.trials[0].trial.options["sliding_rate"]))
+        risen = all(each.reason in STILL_RISING for each in bounds)
+        why = "was still rising" if risen else "did not fall significantly before"
+        yield (
+            f"Friction {why} {'when ' if risen else ''}ramps ended: their breakaway torque is a "
+            f"bound. Choose a sliding_rate of {rate_here(4.0 * rate, '.2g')} or more."
+        )
+
+
+def _noise(ramps: Ramps) -> tuple[float, float]:
+    gyro = bench_of(ramps.trials[0].trial).sensors.gyro
+    return gyro.noise, gyro.resolution
+
+
+def _relative(estimate: Estimate) -> float:
+    return estimate.half_width / abs(estimate.value) if estimate.value else 0.0
+
+
+def _by_window(estimate: Estimate) -> float:
+    """Systematic part of where the fitted window ends (1 sigma)."""
+    parts = (part for part in estimate.systematic if part.source == WINDOW)
+    return sum(part.standard_uncertainty or 0.0 for part in parts)
+
+
+def _scatter(estimate: Estimate) -> float:
+    """Half of the interval without the systematic parts; 0 where there is none."""
+    if estimate.low is None or estimate.high is None:
+        return 0.0
+    return 0.5 * (estimate.high - estimate.low)

@@ -1,0 +1,1 @@
+"""Friction of components, measured one after another."""

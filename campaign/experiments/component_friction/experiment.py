@@ -1,0 +1,349 @@
+"""Breakaway torque of each component on its own: motor, gearbox, load (section 4.2.1, Table 4.1).
+
+The component is demounted and turned by hand through a torque sensor, to one side and to the other
+in turn. On a simulated bench that is a slow torque ramp with every other friction taken away. What
+is motor-side is measured at the motor shaft, so one count of the sensor counts as many times at the
+load as the gear reduces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from pydantic import Field
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate, Window
+from campaign.experiments.component_friction.conclusions import component_conclusions
+from campaign.experiments.component_friction.figures import Shown, component_figure
+from campaign.experiments.component_friction.sums import load_share, total_of
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.shared.captions import trials_of
+from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.identification.breakaway_torque import breakaway_torque
+from campaign.identification.intervals import shifted_by
+from campaign.identification.readings import (
+    RESOLUTION,
+    deviation_of_readings,
+    mean_of_readings,
+)
+from campaign.identification.relative_rate import STOP_FACTOR
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.complete import inertia_of
+from campaign.physics.friction_paths import torques
+from campaign.physics.limits import worst_friction
+from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
+from campaign.reason import Cause
+from campaign.result import (
+    Cell,
+    Column,
+    Figure,
+    Finding,
+    Result,
+    Table,
+    Value,
+)
+from campaign.signals import Polyline
+from campaign.trial import Task, Tree, TrialRequest
+from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate
+
+REACH = 2.0
+"""The ramp ends at this many times the friction that the bench describes."""
+OWN = ("component", "measurement")
+STILL_ROSE = Cause("friction that still rose", "friction still rose at the end of some readings")
+
+
+class ComponentFrictionOptions(Options):
+    """Options of a component friction test."""
+
+    components: tuple[str, ...] = ()
+    """Interfaces of the bench's friction that are measured one by one; without any, all of them."""
+    direction: Literal["alternating", "positive", "negative"] = "alternating"
+    """Which way the component is turned; friction may differ by direction."""
+    scatter: float | None = Field(default=None, ge=0, le=0.3)
+    """Relative standard deviation of friction from one measurement to the next, of a simulated
+    bench: a part in the hand scatters more than one in its place. Absent: as the bench says."""
+    measurements: int = Field(default=10, ge=1, le=1000)
+    """How often each is measured."""
+    sensor_resolution: Torque = Field(default=0.01, ge=0)
+    """One count of the torque sensor, at the shaft it sits on; 0 for a perfect one."""
+    torque_rate: TorqueRate = Field(default=1.0, gt=0)
+    """Slope of the ramp, at the load."""
+    peak_torque: Torque | None = Field(default=None, gt=0)
+    """Where the ramp ends if nothing moves; absent: twice the friction that the bench describes."""
+    rest: Time = Field(default=0.2, ge=0)
+    """Standstill before the ramp."""
+    sliding_rate: AngularRate = Field(default=0.005, gt=0)
+    """Rate at which the component counts as turning; the trial ends when it is four times this
+    fast."""
+    sample_rate: Frequency = Field(default=250.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+
+def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRequest]:
+    known = ", ".join(bench.friction)
+    if not bench.friction:
+        raise ValueError(f"the bench '{bench.name}' has no friction to measure")
+    stop_rate = STOP_FACTOR * options.sliding_rate
+    for component in options.components or tuple(bench.friction):
+        if component not in bench.friction:
+            raise ValueError(
+                f"the bench '{bench.name}' has no friction interface '{component}'; it has {known}"
+            )
+        alone = _alone(bench, component, options.scatter)
+        peak = options.peak_torque or REACH * worst_friction(alone, stop_rate)
+        if peak <= 0:
+            raise ValueError(f"friction '{component}' is zero: there is nothing to measure")
+        tree: Tree = alone.model_dump(mode="json")
+        stop = options.rest + peak / options.torque_rate
+        for number in range(1, options.measurements + 1):
+            way = _way(options.direction, number)
+            yield TrialRequest(
+                Task(
+                    mode="torque",
+                    command=Polyline(
+                        times=(0.0, options.rest, stop), values=(0.0, 0.0, way * float(peak))
+                    ),
+                    duration=stop,
+                    window=(options.rest, stop),
+                    sample_rate=options.sample_rate,
+                    stop_rate=stop_rate,
+                ),
+                point={"component": component, "measurement": number},
+                bench=tree,
+                note=f"only {component}; ends early, once it turns",
+                windows=(Window("ramp", options.rest, stop),),
+            )
+
+
+def _way(direction: str, number: int) -> float:
+    """Sign of the torque of a measurement; alternating ones begin with the positive."""
+    if direction == "alternating":
+        return 1.0 if number % 2 else -1.0
+    return 1.0 if direction == "positive" else -1.0
+
+
+def _alone(bench: Bench, component: str, scatter: float | None) -> Bench:
+    """The bench with the friction of one component only, and its scatter from trial to trial."""
+    friction = bench.friction[component]
+    alone = bench.with_friction({component: friction})
+    if scatter is None:
+        return alone
+    sliding = {"coulomb_torque", "static_torque"}
+    own = tuple(name for name in torques(friction) if name in sliding) or torques(friction)
+    if not own:
+        raise ValueError(f"the model of friction '{component}' declares no torque that may scatter")
+    together = {TORQUES: Scatter(paths=own, relative=scatter)}
+    variation = alone.variation or VariationOptions()
+    variation = variation.model_copy(update={"trial_to_trial": together})
+    return alone.model_copy(update={"variation": variation})
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One measurement: what the torque sensor shows of it, seen at the load."""
+
+    data: TrialData
+    place: dict[str, Value]
+    component: str
+    measurement: int
+    torque: Estimate
+
+
+def _options(data: TrialData) -> ComponentFrictionOptions:
+    return ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
+
+
+def _count(data: TrialData, component: str) -> float:
+    """One count of the torque sensor, seen at the load (N m)."""
+    options = _options(data)
+    bench = bench_of(data.trial)
+    return options.sensor_resolution * bench.at_load(bench.friction[component])[0]
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """The reading: the largest friction of the ramp, rounded to a count of the torque sensor."""
+    options = _options(data)
+    recording = data.recording()
+    found = breakaway_torque(
+        recording.time,
+        recording[GYRO_RATE],
+        recording[DRIVE_TORQUE],
+        inertia_of(bench_of(data.trial), "friction of a load that gathers speed"),
+        options.sliding_rate,
+    ).torque
+    count = _count(data, str(data.trial.point["component"]))
+    if count == 0:
+        return (found,)
+    shift = round(found.value / count) * count - found.value
+    low, high = (None if end is None else end + shift for end in (found.low, found.high))
+    shown = replace(found, value=found.value + shift, low=low, high=high)
+    return (shifted_by(shown, RESOLUTION, count / math.sqrt(12.0)),)
+
+
+def _read(data: TrialData) -> Reading:
+    place = conditions(data)
+    (torque,) = metrics(data, _measure).values()
+    number = int(str(place["measurement"]))
+    return Reading(data, place, str(place["component"]), number, torque)
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    findings: list[Finding] = []
+    groups = grouped(data.completed(), own=OWN)
+    for number, group in enumerate(groups.values(), start=1):
+        readings: list[Reading] = []
+        for item in group:
+            try:
+                readings.append(_read(item))
+            except ValueError as error:
+                notes.append(f"{item.trial.label}: {error}.")
+        if not readings:
+            continue
+        planned = {str(d.trial.point["component"]) for d in data.trials}
+        suffix = f"-{number}" if len(groups) > 1 else ""
+        tables.append(_table(readings, suffix))
+        figures.append(_figure(readings, suffix))
+        findings += _findings(readings, planned)
+        notes += _remarks(readings, group[0])
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        component_conclusions(findings, [_options(each).torque_rate for each in data.completed()]),
+    )
+
+
+def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
+    components: dict[str, list[Reading]] = {}
+    for reading in readings:
+        components.setdefault(reading.component, []).append(reading)
+    return components
+
+
+def _open_ended(estimate: Estimate) -> Estimate:
+    """Without an interval, because friction still rose."""
+    return replace(estimate, low=None, high=None, standard_error=None, reason=STILL_ROSE())
+
+
+def _statistics(readings: list[Reading]) -> dict[str, Estimate]:
+    """Mean and standard deviation (N m); the latter of these very readings."""
+    torques = [reading.torque.value for reading in readings]
+    count = _count(readings[0].data, readings[0].component)
+    mean = mean_of_readings("breakaway_torque", torques, "N m", count)
+    deviation = deviation_of_readings("breakaway_torque", torques, "N m", count)
+    if any(reading.torque.kind == "at least" for reading in readings):
+        mean = replace(_open_ended(mean), kind="at least")
+        deviation = _open_ended(deviation)
+    return {"mean": mean, "standard deviation": deviation}
+
+
+def _findings(readings: list[Reading], planned: set[str]) -> Iterator[Finding]:
+    shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
+    components = _by_component(readings)
+    for reading in readings:
+        yield Finding.of(reading.torque, reading.place)
+    means: dict[str, Estimate] = {}
+    for component, own in components.items():
+        statistics = _statistics(own)
+        means[component] = statistics["mean"]
+        for statistic, estimate in statistics.items():
+            place = {**shared, "component": component, "statistic": statistic}
+            yield Finding.of(estimate, place)
+    if len(means) > 1 and set(means) == planned:
+        sides = {name: _side(components[name][0]) for name in means}
+        place = {**shared, "component": "sum", "statistic": "mean"}
+        yield Finding.of(total_of(means), place)
+        yield Finding.of(load_share(means, sides), shared)
+
+
+def _side(reading: Reading) -> str:
+    return str(bench_of(reading.data.trial).friction[reading.component].side)
+
+
+def _figure(readings: list[Reading], suffix: str) -> Figure:
+    shown = [
+        Shown(
+            name,
+            tuple(reading.measurement for reading in own),
+            tuple(reading.torque for reading in own),
+            _statistics(own)["mean"],
+            own[0].data,
+            _count(own[0].data, name) if _side(own[0]) == "motor" else 0.0,
+        )
+        for name, own in _by_component(readings).items()
+    ]
+    options = ComponentFrictionOptions.model_validate(
+        readings[0].data.trial.options, context={"si": True}
+    )
+    shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
+    trials = trials_of(reading.data for reading in readings)
+    return component_figure(shown, shared, options.sliding_rate, trials, suffix)
+
+
+def _table(readings: list[Reading], suffix: str) -> Table:
+    components = _by_component(readings)
+    rows: list[dict[str, Cell]] = []
+    for number in sorted({reading.measurement for reading in readings}):
+        row: dict[str, Cell] = {"measurement": number}
+        row |= {r.component: r.torque for r in readings if r.measurement == number}
+        rows.append(row)
+    statistics = {name: _statistics(own) for name, own in components.items()}
+    for statistic in ("mean", "standard deviation"):
+        told: dict[str, Cell] = {name: values[statistic] for name, values in statistics.items()}
+        rows.append({"measurement": statistic, **told})
+    if len(components) > 1:
+        rows[-2]["sum"] = total_of({name: values["mean"] for name, values in statistics.items()})
+    return Table(
+        key=f"component-friction{suffix}",
+        title="Breakaway torque of each component, seen at the load",
+        columns=(
+            Column("measurement", "Measurement", exact=True),
+            *(Column(name, name.capitalize(), "N m", "N m") for name in components),
+            *((Column("sum", "Sum", "N m", "N m"),) if len(components) > 1 else ()),
+        ),
+        rows=tuple(rows),
+        thesis=("4.1",),
+        note="What was measured at the motor shaft is multiplied by the gear ratio. A deviation of "
+        "so few readings is itself one draw: its interval says of what.",
+    )
+
+
+def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
+    options = _options(first)
+    motor = [name for name, own in _by_component(readings).items() if _side(own[0]) == "motor"]
+    gear = bench_of(first.trial).gear
+    if motor and gear is not None and options.sensor_resolution > 0:
+        step = options.sensor_resolution * gear.ratio
+        yield (
+            f"The torque sensor shows multiples of {options.sensor_resolution:g} N·m. Behind the "
+            f"gear that is {step:.3g} N·m at the load: the readings of {' and '.join(motor)} fall "
+            "on a few steps, and their deviation is that of the sensor as much as of friction."
+        )
+    yield (
+        "A single reading is one sample of a friction that scatters from trial to trial; only mean "
+        "and deviation can be compared. Its own interval is that of this one reading."
+    )
+
+
+EXPERIMENT = Experiment(
+    name="component_friction",
+    summary="breakaway torque of each friction interface on its own (Table 4.1)",
+    options=ComponentFrictionOptions,
+    trials=_trials,
+    analyse=_analyse,
+    perturbs_bench=True,
+    measure=_measure,
+    requires={
+        DRIVE_TORQUE: "the torque at which the component turns",
+        GYRO_RATE: "the moment at which it turns",
+    },
+)

@@ -1,0 +1,1 @@
+"""Excitation: a designed command, recorded to identify from."""

@@ -1,0 +1,274 @@
+"""The commands that the options of an excitation come to.
+
+Of what the line to a controller has a word for, a command is that word: sums of sines. All else is
+a polyline, of as few points as its course needs; a controller says how many it takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from campaign.experiments.excitation.options import ExcitationOptions
+from campaign.experiments.shared.multisine import MOST_LINES, PER_LINE
+from campaign.experiments.shared.rig import MOST, Rig
+from campaign.identification.excitation_design.fourier import (
+    FourierSeries,
+    Room,
+    best_series,
+    condition,
+)
+from campaign.identification.excitation_design.multisines import crest_factor, odd_multisine, peak
+from campaign.identification.excitation_design.noise import band_noise
+from campaign.identification.excitation_design.sweep import chirp
+from campaign.identification.frequency.multisine import OddGrid, odd_grid
+from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate
+from campaign.physics.limits import worst_friction
+from campaign.signals import Array, MultiSine, Polyline
+from campaign.units import angle_here, in_words, rate_here
+
+PER_CYCLE = 16.0
+"""Points of a polyline of noise per cycle of its highest frequency, at least."""
+MOST_POINTS = 100_000
+"""of a polyline: a trial carries all of them."""
+NYQUIST_SHARE = 0.4
+"""of the controller's sample rate: the highest frequency that can be told."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """One command, whole: what is measured of it begins at `begin` (s), and ends with it."""
+
+    command: MultiSine | Polyline
+    begin: float
+    duration: float
+    note: str
+    realisation: int | None = None
+
+
+def courses(options: ExcitationOptions, bench: Bench) -> Iterator[Course]:
+    """The commands of a test. Raises ValueError, with a message for the user, where none is."""
+    if options.signal not in ("fourier", "file"):
+        _check_band(options, bench)
+    match options.signal:
+        case "multisine":
+            yield from _multisines(options)
+        case "chirp":
+            yield _chirp(options)
+        case "noise":
+            yield from _noises(options)
+        case "fourier":
+            series = series_of(options, bench)
+            used = condition(series.motion(options.position), options.terms)
+            note = f"condition number {used:.3g} of {', '.join(options.terms)}"
+            yield Course(series.rate, 0.0, options.periods * options.period, note)
+        case "file":
+            if options.table is None:
+                raise ValueError("signal = 'file' needs a table")
+            command = options.table.signal(options.command)
+            note = f"{options.table.file}, {len(command.times)} rows"
+            yield Course(command, 0.0, command.times[-1], note)
+
+
+def _check_band(options: ExcitationOptions, bench: Bench) -> None:
+    highest, control = options.highest, control_rate(bench)
+    if options.sample_rate < PER_LINE * highest * (1.0 - 1e-9):
+        raise ValueError(
+            f"{highest:.4g} Hz needs a sample_rate of {PER_LINE:g} times that; raise sample_rate "
+            "or lower highest"
+        )
+    if control is not None and highest > NYQUIST_SHARE * control:
+        raise ValueError(
+            f"{highest:g} Hz is above {NYQUIST_SHARE:g} of the controller's sample rate "
+            f"({control:g} Hz); lower highest"
+        )
+
+
+def grid_of(options: ExcitationOptions) -> OddGrid:
+    """Lines of a multisine, the same in all of its realisations. Raises ValueError for none."""
+    grid = odd_grid(options.lowest, options.highest, options.period, options.seed, options.group)
+    if len(grid.excited) > MOST_LINES:
+        raise ValueError(
+            f"{len(grid.excited)} lines of 1/{options.period:g} s between {options.lowest:g} and "
+            f"{options.highest:g} Hz; {MOST_LINES} are possible: shorten the period"
+        )
+    return grid
+
+
+@lru_cache(maxsize=64)  # a sweep of the amplitude asks for the same ones again
+def _unscaled(
+    lowest: float, highest: float, period: float, group: int, draws: int, lowered: bool,
+    order: int, seed: int, count: int,
+) -> tuple[MultiSine, ...]:  # fmt: skip
+    grid = odd_grid(lowest, highest, period, seed, group)
+    return tuple(
+        odd_multisine(grid, _derived(seed, number), draws, lowered=lowered, order=order)
+        for number in range(1, count + 1)
+    )
+
+
+def _derived(seed: int, number: int) -> int:
+    """A seed of its own for each realisation."""
+    return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
+
+
+def _multisines(options: ExcitationOptions) -> Iterator[Course]:
+    samples = options.period * options.sample_rate
+    if abs(samples - round(samples)) > 1e-6 * samples:
+        raise ValueError(
+            f"a period of {options.period:g} s is no whole number of samples at "
+            f"{options.sample_rate:g} Hz"
+        )
+    lines = len(grid_of(options).excited)
+    signals = _unscaled(
+        options.lowest, options.highest, options.period, options.group, options.draws,
+        options.phases == "lowered", _order(options), options.seed, options.realisations,
+    )  # fmt: skip
+    # All have the same power, as one response is made of them; the largest value is that of one.
+    scale = options.size / max(peak(each, options.period) for each in signals)
+    for number, signal in enumerate(signals, start=1):
+        told = (
+            f"{lines} odd lines from {signal.frequencies[0]:.4g} to {signal.frequencies[-1]:.4g} "
+            f"Hz, crest factor {crest_factor(signal, options.period):.3g}"
+        )
+        sized = signal.model_copy(
+            update={"amplitudes": tuple(scale * a for a in signal.amplitudes)}
+        )
+        duration = options.settle + options.periods * options.period
+        yield Course(sized, options.settle, duration, told, number)
+
+
+def _order(options: ExcitationOptions) -> int:
+    """Which integral of a command begins at zero: a rate itself, or what a torque makes of it."""
+    return 1 if options.command == "torque" else 0
+
+
+def _chirp(options: ExcitationOptions) -> Course:
+    sweep = chirp(options.lowest, options.highest, options.duration, options.sweep)
+    time = sweep.points()
+    _check_points(len(time), "lower highest, or shorten duration")
+    # A torque begins at its peak, and a free load then neither creeps nor drifts.
+    values = options.size * np.sin(sweep.phase(time) + 0.5 * np.pi * _order(options))
+    note = f"{options.sweep} sweep from {options.lowest:.4g} to {options.highest:.4g} Hz"
+    return Course(_polyline(time, values), 0.0, float(time[-1]), note)
+
+
+def _noises(options: ExcitationOptions) -> Iterator[Course]:
+    share = max(1, int(options.sample_rate / (PER_CYCLE * options.highest) + 1e-9))
+    rate = options.sample_rate / share
+    count = round(options.duration * rate)
+    _check_points(count, "lower highest, or shorten duration")
+    duration = count / rate
+    seeds = [_derived(options.seed, number) for number in range(1, options.realisations + 1)]
+    drawn = [
+        band_noise(options.lowest, options.highest, duration, rate, seed, _order(options))
+        for seed in seeds
+    ]
+    scale = options.size / max(float(np.max(np.abs(each))) for each in drawn)
+    time = np.arange(count + 1) / rate
+    for number, values in enumerate(drawn, start=1):
+        crest = float(np.max(np.abs(values)))
+        note = (
+            f"noise from {options.lowest:.4g} to {options.highest:.4g} Hz, crest factor {crest:.3g}"
+        )
+        yield Course(_polyline(time, scale * values), 0.0, duration, note, number)
+
+
+def _check_points(count: int, remedy: str) -> None:
+    if count > MOST_POINTS:
+        raise ValueError(
+            f"this is a polyline of {count} points, and {MOST_POINTS} are the most: {remedy}"
+        )
+
+
+def _polyline(time: Array, values: Array) -> Polyline:
+    return Polyline(times=tuple(time.tolist()), values=tuple(values.tolist()))
+
+
+def series_of(options: ExcitationOptions, bench: Bench) -> FourierSeries:
+    """The series that a search finds within the limits. Raises ValueError for no room."""
+    room = room_of(options, bench)
+    return best_series(
+        options.period, options.harmonics, options.terms, room, options.position, options.search,
+        options.seed,
+    )  # fmt: skip
+
+
+def room_of(options: ExcitationOptions, bench: Bench) -> Room:
+    """What the test's own limits, or else the bench's, leave a series.
+
+    What friction takes of the torque counts at the largest rate. Raises ValueError for no room.
+    """
+    rig = Rig(bench)
+    rate = options.max_rate or MOST * rig.limits.rate
+    angle = (options.max_angle or MOST * rig.limits.angle) - abs(options.position)
+    torque = options.max_torque or MOST * rig.torque
+    left = torque - worst_friction(bench, rate)
+    if left <= 0:
+        raise ValueError(
+            f"friction at {rate_here(rate)} asks for {in_words(torque - left, 'N m', 'N m')}, and "
+            f"{in_words(torque, 'N m', 'N m')} are allowed: lower max_rate or raise max_torque"
+        )
+    acceleration = options.max_acceleration or MOST * rig.limits.acceleration
+    return Room(angle, rate, min(acceleration, rig.accelerated_by(left)))
+
+
+def start_of(options: ExcitationOptions, bench: Bench, course: Course) -> float:
+    """Where the load begins (rad), so that it swings around the position.
+
+    Of a torque as if nothing rubbed, where nobody says how heavy the load is: at the position.
+    Raises ValueError for a torque that would swing a load without friction beyond the limits.
+    """
+    if options.command == "rate":
+        return options.position - _middle(_travel(course, 1)[1])
+    inertia, largest = bench.axis.inertia, _largest(course)
+    static = Rig(bench).static_torque
+    if inertia is None or (static is not None and largest < static):
+        return options.position
+    rate, angle = (each / inertia for each in _travel(course, 2))
+    limits = Rig(bench).limits
+    swing, fastest = 0.5 * float(np.ptp(angle)), float(np.max(np.abs(rate)))
+    if abs(options.position) + swing > limits.angle or fastest > limits.rate:
+        raise ValueError(
+            f"{in_words(largest, 'N m', 'N m')} would swing a load without friction by "
+            f"{angle_here(swing)} at {rate_here(fastest)}, beyond the bench's limits of "
+            f"{angle_here(limits.angle)} and {rate_here(limits.rate)}; lower torque or raise lowest"
+        )
+    return options.position - _middle(angle)
+
+
+def _largest(course: Course) -> float:
+    time = _fine(course)
+    return float(np.max(np.abs(course.command.sample(time))))
+
+
+def _middle(course: Array) -> float:
+    return 0.5 * float(np.max(course) + np.min(course))
+
+
+def _travel(course: Course, order: int) -> tuple[Array, Array]:
+    """The last two integrals, from zero, of a command that is integrated so many times."""
+    time = _fine(course)
+    command = course.command
+    if isinstance(command, MultiSine):
+        found = [command.integral(time, n) for n in range(order + 1)]
+        for n in range(1, order + 1):
+            found[n] = found[n] - found[n][0]
+        return found[-2], found[-1]
+    values = [command.sample(time)]
+    for _ in range(order):
+        steps = 0.5 * np.diff(time) * (values[-1][1:] + values[-1][:-1])
+        values.append(np.concatenate([[0.0], np.cumsum(steps)]))
+    return values[-2], values[-1]
+
+
+def _fine(course: Course) -> Array:
+    command = course.command
+    if isinstance(command, MultiSine):
+        step = 1.0 / (PER_CYCLE * max(command.frequencies))
+        return np.arange(0.0, course.duration + step, step)
+    return np.asarray(command.times)

@@ -1,0 +1,240 @@
+"""Figures of excitations: asked and reached, response with its distortion, inverse dynamics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE
+from campaign.experiments.excitation.account import (
+    Dynamics,
+    Response,
+    measured_part,
+    motion_of,
+    options_of,
+    reached_rate,
+    wanted_of,
+)
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.captions import setting, trials_of
+from campaign.identification.frequency.best_linear import BestLinear
+from campaign.identification.frequency.distortion import Level
+from campaign.result import Array, Axis, Curve, Figure, Panel, Style
+from campaign.signals import MultiSine
+
+TIME = Axis("Time", "s", "s")
+FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
+PHASE = Axis("Phase", "rad", "deg")
+DECIBEL = 20.0 / math.log(10.0)
+SHOWN = 20.0
+"""s of a course that are drawn, at most."""
+CYCLES = 40.0
+"""of the highest frequency of a sum of sines that are drawn, at most: more are a black band."""
+SEGMENTS = 16
+"""that a course without a period is cut into for its spectrum."""
+FLOOR = -80.0
+"""dB: what lies below is not drawn."""
+
+
+def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
+    """Course and spectrum of the command of the first trial, and of what came of it."""
+    data = group[0]
+    trial, recording = data.trial, data.recording()
+    options, command = options_of(trial), trial.task.command
+    in_torque = trial.task.mode == "torque"
+    time, reached = reached_rate(data)
+    if in_torque:
+        reached = recording[DRIVE_TORQUE][measured_part(trial, recording)]
+    axis = Axis("Torque", "N m", "N m") if in_torque else Axis("Rate", "rad/s", "deg/s")
+    asked = command.sample(time)
+    length, told = SHOWN, f"up to {setting(SHOWN, 's')} of it"
+    if isinstance(command, MultiSine):
+        length, told = options.period, "one period"
+        if CYCLES / max(command.frequencies) < length:
+            length, told = CYCLES / max(command.frequencies), "the beginning of a period"
+    shown = time - time[0] <= length
+    course = [
+        Curve(time[shown], asked[shown], "asked", "reference"),
+        Curve(time[shown], reached[shown], "reached", "measured", "thin"),
+    ]
+    several = " Of several trials the first is drawn." if len(group) > 1 else ""
+    return Figure(
+        key=f"command{suffix}",
+        title="Command, and what came of it",
+        caption=f"Left, {told}; right, where in frequency the command has its power, and what came "
+        f"of it there, both over the largest of the command.{several}",
+        alt="Command and measured course over time, and the levels of both over frequency.",
+        panels=(
+            Panel(TIME, axis, course),
+            _spectrum(command, asked, reached, 1.0 / (time[1] - time[0])),
+        ),
+        across=2,
+        trials=(trial.number,),
+    )
+
+
+def _spectrum(command: object, asked: Array, reached: Array, rate: float) -> Panel:
+    if isinstance(command, MultiSine):
+        at = np.round(np.array(command.frequencies) * len(asked) / rate).astype(int)
+        frequency, lines = np.array(command.frequencies), True
+        one, other = (np.abs(np.fft.rfft(_filled(each)))[at] for each in (asked, reached))
+    else:
+        from scipy.signal import welch
+
+        length = max(8, len(asked) // SEGMENTS)
+        lines = False
+        frequency, one = welch(asked, rate, nperseg=length)
+        other = np.sqrt(welch(_filled(reached), rate, nperseg=length)[1])
+        one = np.sqrt(one)
+    largest = max(float(np.max(one)), 1e-300)
+    curves = []
+    style: Style
+    for values, label, series in ((one, "asked", "reference"), (other, "reached", "measured")):
+        level = _decibel(values / largest)
+        seen = (level > FLOOR) & (frequency > 0)
+        style = ("points" if series == "reference" else "line+points") if lines else "line"
+        curves.append(Curve(frequency[seen], level[seen], label, series, style))
+    return Panel(FREQUENCY, Axis("Level, dB of the largest asked"), curves)
+
+
+def _filled(samples: Array) -> Array:
+    """Zeros where a sample was lost: this is drawn, and not reckoned with."""
+    return np.asarray(np.nan_to_num(samples))
+
+
+def _decibel(values: Array) -> Array:
+    return np.asarray(DECIBEL * np.log(np.maximum(values, 1e-300)))
+
+
+def response_figure(response: Response, group: Sequence[TrialData], suffix: str) -> Figure:
+    """Gain and phase from torque to rate, with intervals."""
+    measured = response.measured
+    size = np.maximum(np.abs(measured.values), 1e-300)
+    half = 1.96 * measured.widened / size
+    half = np.where(half < 1.0, half, np.nan)
+    level, x = _decibel(size), measured.frequency
+    phase = np.unwrap(np.angle(measured.values))
+    phase -= 2.0 * np.pi * np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
+    low, high = level + _decibel(1.0 - half), level + _decibel(1.0 + half)
+    wide = np.arcsin(half)
+    best = response.best
+    told = f"Bars are 95 % intervals. {measured.method.capitalize()}."
+    if best is not None:
+        told = (
+            f"Best linear approximation for an {best.excitation}: with another size or band "
+            "friction makes it another one. Bars are 95 % intervals by scatter over realisations."
+        )
+    return Figure(
+        key=f"response{suffix}",
+        title="Response, drive torque to rate",
+        caption=told,
+        alt="Gain and phase from drive torque to rate over frequency, with intervals.",
+        panels=(
+            Panel(
+                FREQUENCY,
+                Axis("Gain, dB of 1 rad/s per N·m"),
+                [Curve(x, level, "", "measured", "points", low=low, high=high)],
+            ),
+            Panel(
+                FREQUENCY,
+                PHASE,
+                [Curve(x, phase, "", "measured", "points", low=phase - wide, high=phase + wide)],
+            ),
+        ),
+        trials=trials_of(group),
+    )
+
+
+def levels_figure(best: BestLinear, group: Sequence[TrialData], suffix: str) -> Figure:
+    """What the rate has at excited lines, and at those that were left out."""
+    distortion = best.distortion
+    if distortion is None:
+        raise ValueError("a single period tells no distortion")
+    x = best.response.frequency
+    answered = _decibel(np.sqrt(distortion.excited))
+    curves = [Curve(x, answered, "excited lines", "measured", "points")]
+    for name, told in (("even", distortion.even), ("odd", distortion.odd)):
+        curves += _level(name, told)
+    noise = np.concatenate([distortion.even.noise, distortion.odd.noise])
+    at = np.concatenate([distortion.even.frequency, distortion.odd.frequency])
+    order = np.argsort(at)
+    curves.append(Curve(at[order], _decibel(np.sqrt(noise[order])), "noise", "noise", "thin"))
+    return Figure(
+        key=f"levels{suffix}",
+        title="Distortion and noise of the rate",
+        caption="RMS of single lines. At lines that the command leaves out lies what the axis adds "
+        "by itself: at odd ones friction that is alike both ways, at even ones what differs by "
+        "direction. Where no level is drawn, it is no more than the noise.",
+        alt="Levels of the rate over frequency: excited lines, even and odd distortion, noise.",
+        panels=(Panel(FREQUENCY, Axis("RMS of a line, dB of 1 rad/s"), curves),),
+        trials=trials_of(group),
+    )
+
+
+def _level(name: str, told: Level) -> list[Curve]:
+    sure = told.significant
+    if not np.any(sure):
+        return []
+    low, high = told.interval()
+    down = np.where(low[sure] > 0, _decibel(low[sure]), np.nan)
+    level, up = _decibel(told.rms[sure]), _decibel(high[sure])
+    return [Curve(told.frequency[sure], level, name, name, "points", low=down, high=up)]
+
+
+def dynamics_figure(found: Dynamics, group: Sequence[TrialData], suffix: str) -> Figure:
+    """Measured and modelled torque of the first trial, and what is left."""
+    left = found.torque - found.predicted
+    first = found.time - found.time[0] <= options_of(group[0].trial).period
+    moves = found.moves > 0
+    fitted = np.where(moves, left, np.nan)
+    time = found.time[first]
+    return Figure(
+        key=f"torque{suffix}",
+        title="Torque of the series, measured and modelled",
+        caption="One period. The model's torque has the terms that the series was searched for; "
+        "what they leave over is drawn where the axis moves, which is where they are fitted.",
+        alt="Measured and modelled drive torque over time, and their difference.",
+        panels=(
+            Panel(
+                TIME,
+                Axis("Drive torque", "N m", "N m"),
+                [
+                    Curve(time, found.torque[first], "measured", "measured"),
+                    Curve(time, found.predicted[first], "model", "fit", "thin"),
+                ],
+            ),
+            Panel(
+                TIME,
+                Axis("Left over", "N m", "N m"),
+                [Curve(time, fitted[first], "", "measured", "thin")],
+            ),
+        ),
+        trials=(group[0].trial.number,),
+    )
+
+
+def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
+    """Where in angle and rate a series goes, asked and reached."""
+    data = group[0]
+    moved, wanted = motion_of(data), wanted_of(data)
+    first = moved.time - moved.time[0] <= options_of(data.trial).period
+    return Figure(
+        key=f"plane{suffix}",
+        title="Where the series goes",
+        caption="Rate over angle of one period, asked and reached. Friction is told at the rates, "
+        "and what depends on the place at the angles, that lie on the path.",
+        alt="Rate over angle, asked and reached.",
+        panels=(
+            Panel(
+                Axis("Angle", "rad", "deg"),
+                Axis("Rate", "rad/s", "deg/s"),
+                [
+                    Curve(wanted.position[first], wanted.rate[first], "asked", "reference"),
+                    Curve(moved.position[first], moved.rate[first], "reached", "measured", "thin"),
+                ],
+            ),
+        ),
+        trials=(data.trial.number,),
+    )

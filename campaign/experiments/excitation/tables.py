@@ -1,0 +1,172 @@
+"""Tables of excitations, and what of them is a finding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE
+from campaign.estimate import Estimate
+from campaign.experiments.excitation.account import Dynamics
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.common import OF_RECORDING
+from campaign.identification.frequency.best_linear import BestLinear
+from campaign.identification.frequency.distortion import total
+from campaign.identification.inverse.terms import TERMS
+from campaign.physics.complete import limits_of
+from campaign.result import Cell, Column, Table
+
+Account = tuple[TrialData, Mapping[str, Estimate]]
+USED = (("top_angle", "angle"), ("top_rate", "rate"), ("peak_torque", "torque"))
+"""Metrics, and the limits that they are held against."""
+
+
+def reached_tables(accounts: Sequence[Account]) -> Iterator[Table]:
+    """What was asked beside what was reached, trial by trial; one table for each mode."""
+    modes = dict.fromkeys(data.trial.task.mode for data, _ in accounts)
+    for mode in modes:
+        own = [each for each in accounts if each[0].trial.task.mode == mode]
+        yield _reached(own, mode, f"-{mode}" if len(modes) > 1 else "")
+
+
+def _reached(accounts: Sequence[Account], mode: str, suffix: str) -> Table:
+    in_torque = mode == "torque"
+    unit, display = ("N m", "N m") if in_torque else ("rad/s", "deg/s")
+    asked = () if in_torque else (Column("asked_angle", "Angle asked", "rad", "deg", exact=True),)
+    return Table(
+        key=f"reached{suffix}",
+        title="What was asked, and what was reached",
+        columns=(
+            Column("trial", "Trial"),
+            Column("realisation", "Realisation", exact=True),
+            Column("command_peak", "Largest command", unit, display, exact=True),
+            Column("command_rms", "RMS", unit, display, exact=True),
+            Column("crest_factor", "Crest factor", exact=True),
+            *asked,
+            Column("top_angle", "Angle reached", "rad", "deg", reason=OF_RECORDING()),
+            Column("top_rate", "Rate reached", "rad/s", "deg/s", reason=OF_RECORDING()),
+            Column("peak_torque", "Torque reached", "N m", "N m", reason=OF_RECORDING()),
+            Column("used", "Of its limit", "", "percent", reason=OF_RECORDING()),
+            Column("limit", "Nearest limit"),
+        ),
+        rows=tuple(_row(data, found) for data, found in accounts),
+        note="Largest magnitudes; the crest factor is the largest command over its RMS. What came "
+        "nearest to its limit is in the last two columns.",
+    )
+
+
+def _row(data: TrialData, found: Mapping[str, Estimate]) -> dict[str, Cell]:
+    limits = limits_of(bench_of(data.trial))
+    shares = {
+        name: found[metric].value / getattr(limits, name)
+        for metric, name in USED
+        if metric in found and math.isfinite(found[metric].value)
+    }
+    nearest = max(shares, key=lambda name: shares[name], default=None)
+    realisation = data.trial.point.get("realisation")
+    return {
+        "trial": data.trial.name,
+        "realisation": realisation if isinstance(realisation, int) else None,
+        **{name: found[name].value for name in ("command_peak", "command_rms", "crest_factor")},
+        "asked_angle": found["asked_angle"].value if "asked_angle" in found else None,
+        **{name: found.get(name) for name, _ in USED},
+        "used": None if nearest is None else shares[nearest],
+        "limit": nearest,
+    }
+
+
+def distortion_findings(best: BestLinear) -> list[Estimate]:
+    """Even and odd distortion over the RMS of the output; none of a single period."""
+    if best.distortion is None:
+        return []
+    return [total(best.distortion, "even"), total(best.distortion, "odd")]
+
+
+def response_table(best: BestLinear, suffix: str) -> Table:
+    """What the best linear approximation belongs to, and what else the output holds."""
+    excitation, size = best.excitation, np.abs(best.response.values)
+    even, odd = distortion_findings(best) or (None, None)
+    noise = np.sqrt(best.noise * excitation.realisations) / size
+    apart = np.sqrt(best.nonlinear) / size
+    return Table(
+        key=f"best-linear{suffix}",
+        title="Best linear approximation, distortion and noise",
+        columns=(
+            Column("realisations", "Realisations", exact=True),
+            Column("periods", "Periods", exact=True),
+            Column("lines", "Lines", exact=True),
+            Column("lowest", "Lowest", "Hz", "Hz", exact=True),
+            Column("highest", "Highest", "Hz", "Hz", exact=True),
+            Column("torque", "Torque, RMS", "N m", "N m", reason=OF_RECORDING()),
+            Column("even", "Even distortion", "", "percent"),
+            Column("odd", "Odd distortion", "", "percent"),
+            Column("noise", "Noise", "", "percent", reason=OF_RECORDING()),
+            Column("nonlinear", "Nonlinear scatter", "", "percent", reason=OF_RECORDING()),
+        ),
+        rows=(
+            {
+                "realisations": excitation.realisations,
+                "periods": excitation.periods,
+                "lines": excitation.lines,
+                "lowest": excitation.lowest,
+                "highest": excitation.highest,
+                "torque": excitation.rms,
+                "even": even,
+                "odd": odd,
+                "noise": _median(noise),
+                "nonlinear": _median(apart),
+            },
+        ),
+        note="Distortion: RMS over that of the output, from lines that the command left out. Noise "
+        "and nonlinear scatter: of a line in one realisation over the response there, the median "
+        "of all lines; the first is over periods, the second what more there is over realisations.",
+    )
+
+
+def _median(values: np.ndarray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else None
+
+
+def dynamics_table(found: Dynamics, suffix: str) -> Table:
+    """Each coefficient with its meaning, and how well the motion told them apart."""
+    rows: list[dict[str, Cell]] = [
+        {
+            "term": name.replace("_", " "),
+            "meaning": TERMS[name].meaning,
+            "unit": estimate.unit,
+            "value": estimate,
+        }
+        for name, estimate in found.estimates.items()
+    ]
+    designed, reached = found.designed, found.fit.likeness
+    rows += [
+        _plain("condition number, designed", "Of the motion that was asked.", designed),
+        _plain("condition number, reached", "Of the motion as it was recorded.", reached),
+        _plain("left over", "Norm of the residual over that of the torque.", found.fit.relative),
+    ]
+    return Table(
+        key=f"inverse-dynamics{suffix}",
+        title="Inverse dynamics of the series",
+        columns=(
+            Column("term", "Term"),
+            Column("meaning", "Meaning"),
+            Column("unit", "Unit"),
+            Column("value", "Value"),
+        ),
+        rows=tuple(rows),
+        note="Condition numbers are of columns of unit length, which no choice of units changes, "
+        f"behind the same filters. Rows that stand still are left out; {DRIVE_TORQUE} is as it was "
+        "recorded, without a delay: `campaign identify` looks for one, and for further terms.",
+    )
+
+
+def _plain(term: str, meaning: str, value: float) -> dict[str, Cell]:
+    return {
+        "term": term,
+        "meaning": meaning,
+        "unit": "",
+        "value": Estimate.without_interval("value", value, "", OF_RECORDING()),
+    }

@@ -1,0 +1,1 @@
+"""Frequency responses of the loop, opened or closed."""

@@ -1,0 +1,390 @@
+"""Frequency response by stepped sine: closed or open loop, with each compensation (5.2.2, 5.3.4).
+
+One trial per frequency. A closed loop is driven by a sine of the rate command, an open one by a
+sine of the torque. The load starts where a swing around the middle begins, so that neither drifts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate, Window
+from campaign.experiments.frequency_response.conclusions import (
+    closed_loop_conclusions,
+    open_loop_conclusions,
+)
+from campaign.experiments.frequency_response.figures import (
+    closed_loop_figures,
+    torque_figure,
+)
+from campaign.experiments.frequency_response.marks import place_names, servo_figure
+from campaign.experiments.frequency_response.sine_commands import (
+    rate_sine,
+    told_amplitude,
+    torque_sine,
+)
+from campaign.experiments.frequency_response.tables import (
+    Sweep,
+    changes,
+    closed_findings,
+    closed_notes,
+    closed_tables,
+    falling_amplitude,
+    is_extrapolated,
+    method,
+    modes,
+    quality_note,
+)
+from campaign.experiments.interface import (
+    Experiment,
+    Stage,
+    TestData,
+    TrialData,
+    bench_of,
+    metrics,
+)
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
+from campaign.experiments.shared.conclusion_parts import Settings
+from campaign.experiments.shared.found_trials import sine_response
+from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.swept_words import words
+from campaign.identification.frequency_response import Response, make_response
+from campaign.identification.intervals import with_error
+from campaign.identification.refinement import MOST as MOST_REFINED
+from campaign.identification.refinement import PHASE_SHARE, refinement
+from campaign.identification.servo import characteristics
+from campaign.identification.sine_point import SinePoint, sine_point
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.complete import control_rate
+from campaign.reason import Cause
+from campaign.result import Conclusion, Figure, Finding, Result, Table
+from campaign.signals import Sine
+from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
+from campaign.units import (
+    Angle,
+    AngularAcceleration,
+    AngularRate,
+    Frequency,
+    Time,
+    Torque,
+)
+
+AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
+NYQUIST_SHARE = 0.4
+"""of the controller's sample rate: the highest frequency that can be told."""
+MOST_FREQUENCIES = 10_000
+STEADY = "steady"
+"""The window of the whole cycles that are measured."""
+
+
+class FrequencyResponseOptions(Options):
+    """Options of a frequency response test."""
+
+    loop: Literal["closed", "open"] = "closed"
+    """closed: from rate command to gyro rate; open: from drive torque to gyro rate."""
+    compensation: str = "none"
+    """Compensation method, by its name on the bench; none for none."""
+    lowest: Frequency = Field(default=0.5, gt=0)
+    """First frequency of the sweep."""
+    highest: Frequency = Field(default=100.0, gt=0)
+    """Last frequency of the sweep."""
+    step: Frequency = Field(default=0.5, gt=0)
+    """Between the frequencies of the sweep."""
+    frequencies: tuple[Frequency, ...] = ()
+    """Frequencies of your own instead of lowest, highest and step."""
+    amplitude: AngularRate = Field(default=float(np.deg2rad(30.0)), gt=0)
+    """Closed loop: amplitude of the rate command. Friction makes the response depend on it."""
+    max_acceleration: AngularAcceleration | None = Field(default=None, gt=0)
+    """Closed loop: the amplitude falls with frequency so that the command does not exceed this;
+    absent: nine tenths of what the bench's limits of acceleration, torque and current allow."""
+    torque: Torque = Field(default=60.0, gt=0)
+    """Open loop: amplitude of the torque at the load; above the breakaway torque. Friction that
+    differs by direction lets the load creep towards the easier one while it swings."""
+    cycles: int = Field(default=16, ge=1, le=10_000)
+    """Whole cycles that are measured at each frequency."""
+    settle_cycles: int = Field(default=3, ge=0, le=1_000)
+    """Whole cycles before them, at least, for the transient to pass ..."""
+    settle_time: Time = Field(default=0.3, ge=0)
+    """... and as many more as last this long."""
+    samples_per_cycle: int = Field(default=20, ge=8, le=10_000)
+    """of the recording, as far as a sampled controller has them."""
+    position: Angle = 0.0
+    """Angle of the load relative to the hull around which it swings."""
+    refine: bool = False
+    """Closed loop: when the sweep has ended, measure further frequencies around the crossings
+    of -3 dB and of 0 dB and, where it lies in the sweep, the phase crossover."""
+
+    def without_effect(self) -> frozenset[str]:
+        swept = {"lowest", "highest", "step"} if self.frequencies else set()
+        closed = {"amplitude", "max_acceleration", "refine"}
+        return frozenset(swept | ({"torque"} if self.loop == "closed" else closed))
+
+
+def swept_frequencies(options: FrequencyResponseOptions) -> tuple[float, ...]:
+    """Frequencies (Hz), rising. Raises ValueError for an empty or endless sweep."""
+    if options.frequencies:
+        if min(options.frequencies) <= 0:
+            raise ValueError("frequencies must be greater than zero")
+        return tuple(sorted(set(options.frequencies)))
+    if options.highest < options.lowest:
+        raise ValueError("highest must not be below lowest")
+    count = math.floor((options.highest - options.lowest) / options.step + 1e-9) + 1
+    if count > MOST_FREQUENCIES:
+        raise ValueError(f"a sweep of {count} frequencies; at most {MOST_FREQUENCIES} are allowed")
+    return tuple(round(options.lowest + k * options.step, 9) for k in range(count))
+
+
+def _trials(options: FrequencyResponseOptions, bench: Bench) -> Iterator[TrialRequest]:
+    for frequency in swept_frequencies(options):
+        yield _request(options, bench, frequency)
+
+
+def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> TrialRequest:
+    """The trial at one frequency (Hz). Raises ValueError where the bench cannot do it."""
+    rate = _sample_rate(options, bench, frequency)
+    settle = max(options.settle_cycles, math.ceil(options.settle_time * frequency - 1e-9))
+    start, stop = settle / frequency, (settle + options.cycles) / frequency
+    closed = options.loop == "closed"
+    if closed:
+        command, swing = rate_sine(bench, frequency, options.amplitude, options.max_acceleration)
+    else:
+        command, swing = torque_sine(bench, frequency, options.torque, options.position)
+    return TrialRequest(
+        Task(
+            mode="rate" if closed else "torque",
+            command=command,
+            compensation=options.compensation,
+            duration=stop,
+            window=(start, stop),
+            sample_rate=rate,
+            start_angle=options.position - swing,
+        ),
+        point={"frequency": frequency},
+        note=f"{options.cycles} cycles after {settle} to settle; {told_amplitude(command, closed)}",
+        requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
+        windows=(Window(STEADY, start, stop),),
+    )
+
+
+def _found(
+    options: FrequencyResponseOptions, bench: Bench, offered: Offered
+) -> Iterator[TrialRequest]:
+    """The sine that a recording of one frequency is."""
+    mode: Literal["rate", "torque"] = "rate" if options.loop == "closed" else "torque"
+    times = options.settle_cycles, options.settle_time
+    yield sine_response(offered, mode, _excitation(mode), STEADY, *times)
+
+
+def _refined_range(options: FrequencyResponseOptions, bench: Bench) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) of a refinement: those of the sweep, and a little beyond,
+    as far as the controller's sample rate shows them.
+    """
+    swept, control = swept_frequencies(options), control_rate(bench)
+    highest = swept[-1] * (1.0 + PHASE_SHARE)
+    seen = highest if control is None else NYQUIST_SHARE * control
+    return swept[0] * (1.0 - PHASE_SHARE), min(highest, seen)
+
+
+def _most_refined(options: FrequencyResponseOptions, bench: Bench) -> Most:
+    """What a refinement takes at most: all of it at the lowest frequency that it may have."""
+    if not options.refine or options.loop != "closed":
+        return NONE_MORE
+    lowest, highest = _refined_range(options, bench)
+    settle = max(float(options.settle_cycles), options.settle_time * highest + 1.0)
+    longest = max(options.settle_cycles / lowest, options.settle_time + 1.0 / lowest)
+    # A whole share of the controller's rate is less than twice the rate that is asked for.
+    samples = 2 * options.samples_per_cycle * math.ceil(settle + options.cycles)
+    duration = longest + options.cycles / lowest
+    return Most(MOST_REFINED, MOST_REFINED * duration, MOST_REFINED * samples)
+
+
+def _refined(
+    options: FrequencyResponseOptions, bench: Bench, data: TestData
+) -> Iterator[TrialRequest]:
+    """The frequencies that `refinement` finds in the sweep, as far as the bench can show them."""
+    points = []
+    for item in data.completed():
+        with suppress(ValueError):  # the analysis says so
+            points.append(_point(item))
+    if not points:
+        return
+    lowest, highest = _refined_range(options, bench)
+    for frequency in refinement(make_response(points)):
+        if lowest <= frequency <= highest:
+            request = _request(options, bench, round(float(frequency), 9))
+            yield replace(request, note=f"refinement; {request.note}")
+
+
+def _excitation(mode: str) -> str:
+    """The channel to which the gyro's rate is the response."""
+    return COMMAND if mode == "rate" else DRIVE_TORQUE
+
+
+def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> float:
+    """Of the recording (Hz): `samples_per_cycle`, or a whole share of the controller's rate."""
+    control = control_rate(bench)
+    if control is None:
+        return options.samples_per_cycle * frequency
+    if frequency > NYQUIST_SHARE * control:
+        raise ValueError(
+            f"{frequency:g} Hz is above {NYQUIST_SHARE:g} of the controller's sample rate "
+            f"({control:g} Hz); lower the highest frequency"
+        )
+    return control / max(1, math.floor(control / (options.samples_per_cycle * frequency)))
+
+
+def _steady(trial: Trial) -> tuple[float, float]:
+    """The window that is measured (s): the one named so, or an older trial's only one."""
+    named = (window for window in trial.windows if window.name == STEADY)
+    return next(((window.start, window.stop) for window in named), trial.task.window)
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """The response to one sine: its real and imaginary part, and the coherence."""
+    task = data.trial.task
+    recording = data.recording().window(*_steady(data.trial))
+    drive = recording[_excitation(task.mode)]
+    point = sine_point(recording.time, drive, recording[GYRO_RATE], _frequency(data))
+    unit = "" if task.mode == "rate" else TORQUE_TO_RATE
+    method = "least squares over whole cycles"
+    parts = (("response_real", point.response.real), ("response_imag", point.response.imag))
+    return (
+        *(with_error(name, part, unit, point.error, math.inf, method) for name, part in parts),
+        Estimate("coherence", point.coherence, "", reason=AT_HAND()),
+    )
+
+
+COUNTS = 3.0
+"""of its sensor that a response has at least: a staircase of fewer is off by more than 3 %."""
+TORQUE_TO_RATE = "rad/s/(N m)"
+
+
+def _frequency(data: TrialData) -> float:
+    return float(str(data.trial.point["frequency"]))
+
+
+def _point(data: TrialData) -> SinePoint:
+    """The sine of a trial, from its metrics. Raises ValueError where there is none."""
+    found = metrics(data, _measure)
+    real, imaginary = found["response_real"], found["response_imag"]
+    if not math.isfinite(real.value + imaginary.value):
+        raise ValueError("its signals have no numbers")
+    task, size = data.trial.task, abs(complex(real.value, imaginary.value))
+    if isinstance(task.command, Sine) and not data.trial.recording:
+        count = Rig(bench_of(data.trial)).rate_count(2.0 * math.pi * _frequency(data))
+        if not size * task.command.amplitude > COUNTS * count:
+            raise ValueError(f"its response is below {COUNTS:g} counts of the rate's sensor")
+    return SinePoint(
+        _frequency(data),
+        complex(real.value, imaginary.value),
+        real.standard_error or 0.0,
+        found["coherence"].value,
+    )
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    paths = [path for path in swept(data, own=("frequency",)) if path != "loop"]
+    sweeps: list[Sweep] = []
+    for group in grouped(data.completed(), own=("frequency",)).values():
+        points = []
+        for item in group:
+            try:
+                points.append(_point(item))
+            except ValueError as error:
+                notes.append(f"{item.trial.label}: {error}.")
+        notes += falling_amplitude(group)
+        if points:
+            sweeps.append(_sweep(group[0], make_response(points), paths))
+    closed = [sweep for sweep in sweeps if sweep.loop == "closed"]
+    opened = [sweep for sweep in sweeps if sweep.loop == "open"]
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    findings: list[Finding] = []
+    conclusions: list[Conclusion] = []
+    if closed:
+        tables += closed_tables(closed, paths)
+        shown = [(s.label, method(s), s.response) for s in closed]
+        figures += servo_figure(closed)
+        figures += closed_loop_figures(shown, [s.found for s in closed], place_names(closed))
+        findings += [finding for sweep in closed for finding in closed_findings(sweep)]
+        findings += changes(closed)
+        notes += closed_notes(closed)
+        settings = Settings.of(data, FrequencyResponseOptions)
+        beyond = [method(sweep) for sweep in closed if is_extrapolated(sweep)]
+        conclusions += closed_loop_conclusions(findings, _span(closed), beyond, settings)
+    if opened:
+        table, found, doubts = modes(opened, paths)
+        tables.append(table)
+        findings += found
+        notes += doubts
+        figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], found))
+        conclusions += open_loop_conclusions(table.rows, _span(opened))
+    notes += quality_note(sweeps)
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        tuple(conclusions),
+    )
+
+
+def _span(sweeps: Sequence[Sweep]) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) of all of them."""
+    every = np.concatenate([sweep.response.frequency for sweep in sweeps])
+    return float(every.min()), float(every.max())
+
+
+def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
+    place = conditions(first, "compensation", "loop")
+    place.pop("frequency", None)
+    loop = "closed" if first.trial.task.mode == "rate" else "open"
+    label = method_label(str(place["compensation"]))
+    swept = {path: place.get(path) for path in paths if path != "compensation"}
+    others = words(swept, first.trial, FrequencyResponseOptions)
+    found = characteristics(response) if loop == "closed" else None
+    return Sweep(place, loop, ", ".join([label, *others]), response, found)
+
+
+EXPERIMENT = Experiment(
+    name="frequency_response",
+    summary="stepped-sine response, bandwidth and margins (Tables 5.3 and 5.9, Figure 4.5)",
+    options=FrequencyResponseOptions,
+    trials=_trials,
+    analyse=_analyse,
+    measure=_measure,
+    fit=fitting.frequency_response,
+    recorded=_found,
+    windows=(STEADY,),
+    requires={
+        GYRO_RATE: "the response",
+        COMMAND: "what a closed loop responds to",
+        DRIVE_TORQUE: "what an open loop responds to",
+    },
+    stages=(
+        Stage(
+            name="refinement",
+            why="bandwidth and margins are read between frequencies: more of them around "
+            "each crossing",
+            most=_most_refined,
+            trials=_refined,
+        ),
+    ),
+)

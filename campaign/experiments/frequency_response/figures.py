@@ -1,0 +1,252 @@
+"""Bode diagrams of measured responses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.experiments.frequency_response.marks import bandwidths, margins
+from campaign.identification.continuation import DECIBEL, Continuation
+from campaign.identification.frequency_response import Response, open_loop
+from campaign.identification.servo import ServoCharacteristics
+from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
+
+FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
+PHASE = Axis("Phase", "rad", "deg")
+SHOWN_BEYOND = 1.2
+"""An extrapolated curve is drawn to this many times the crossover that it is for."""
+
+NOTICEABLE = 0.02
+"""Half-width, as a share of the response, from which on a point's interval is drawn: 0.2 dB, 1°."""
+TWO_SIDED = 1.96
+BARE = "none"
+"""The series of a response without compensation."""
+
+Named = tuple[str, str, Response]
+"""Label, series and response of one curve."""
+
+
+def closed_loop_figures(
+    sweeps: Sequence[Named],
+    found: Sequence[ServoCharacteristics | None],
+    names: Sequence[str] | None = None,
+) -> Iterator[Figure]:
+    """Figures 5.5 and 5.19 (closed loop), 5.6 and 5.20 (open loop from it).
+
+    names: short ones, of the sweeps, for the labels of their bandwidths and margins.
+    """
+    names = [series for _, series, _ in sweeps] if names is None else names
+    several = len(sweeps) != len({series for _, series, _ in sweeps})
+    named = [(label, label if several else series, r) for label, series, r in sweeps]
+    methods = {series for _, series, _ in sweeps}
+    observed, modelled = "observer" in methods, bool(methods & {"lugre", "static"})
+    widths = bandwidths(named, found, names)
+    yield _bode(
+        "closed-loop",
+        "Closed-loop response, rate command to gyro rate",
+        "Up to the bandwidth, where the gain has fallen by 3 dB"
+        + (" (dots)" if any(mark.point for mark in widths.gain_marks) else "")
+        + ", the load follows its command. Compensation is harmless where its curve stays with the "
+        "uncompensated one.",
+        "Gain and phase of the closed loop over frequency, one curve per compensation.",
+        Axis("Gain", "dB"),
+        [(label, series, r, r.level, _turned(r)) for label, series, r in named],
+        thesis=_chosen(("5.5", modelled), ("5.19", observed)),
+        level_marks=(Mark("-3 dB", y=-3.0), *widths.gain_marks),
+        more_gain=widths.gain,
+    )
+    loops = [(label, series, open_loop(r)) for label, series, r in named]
+    kept = margins(loops, [_turned(r) for _, _, r in loops], found, names)
+    beyond = list(_continued(loops, found))
+    yield _bode(
+        "open-loop",
+        "Open-loop response, rate error to gyro rate",
+        "The distance of the phase from -180° where the gain is 0 dB is the phase margin; how far "
+        "the gain is below 0 dB where the phase is -180° is the gain margin."
+        + (" Both are drawn where they were found." if kept.gain_marks or kept.phase_marks else "")
+        + (
+            " What lies above the sweep is extrapolated (thin), by one of the fits between which "
+            "the margin may lie."
+            if beyond
+            else ""
+        )
+        + " Bands and bars are 95 % intervals, where they are wide enough to be seen.",
+        "Gain and phase of the open loop over frequency, one curve per compensation, with the "
+        "0 dB and -180° lines and the margins.",
+        Axis("Gain", "dB"),
+        [(label, series, r, r.level, _turned(r)) for label, series, r in loops],
+        thesis=_chosen(("5.6", modelled), ("5.20", observed)),
+        level_marks=(Mark("0 dB", y=0.0), *kept.gain_marks),
+        phase_marks=(Mark("-180°", y=-np.pi), *kept.phase_marks),
+        more_gain=[*(level for level, _ in beyond), *kept.gain],
+        more_phase=[*(phase for _, phase in beyond), *kept.phase],
+    )
+
+
+def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
+    """Figure 4.5: drive torque to gyro rate, and the inertia that it looks like."""
+    several = len(sweeps) != len({series for _, series, _ in sweeps})
+    named = [(label, label if several else series, r) for label, series, r in sweeps]
+    found = [mode.value for mode in modes][:1]
+    bode = _bode(
+        "torque-to-rate",
+        "Open-loop response, drive torque to gyro rate",
+        "A rigid axis falls by 20 dB per decade with the phase at -90°; friction lifts the phase "
+        "and flattens the gain at low frequencies. An elastic mode is a dip and a peak side by "
+        "side: in the inertia that torque over acceleration amounts to, a peak and a dip on top "
+        "of the axis' own.",
+        "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
+        Axis("Gain, dB of 1 rad/s per N·m"),
+        [(label, series, r, r.level, _turned(r)) for label, series, r in named],
+        thesis=("4.5",),
+        level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
+        phase_marks=tuple(Mark("", x=value) for value in found),
+    )
+    inertia = Panel(
+        FREQUENCY,
+        Axis("Apparent inertia", "kg m^2", "kg m^2"),
+        [Curve(r.frequency, _apparent_inertia(r), label, series) for label, series, r in named],
+        marks=tuple(Mark("", x=value) for value in found),
+    )
+    return replace(bode, panels=(*bode.panels, inertia))
+
+
+def _apparent_inertia(response: Response) -> Array:
+    """Torque over acceleration (kg m^2), shape (n,): what a rigid free axis would have."""
+    omega = 2.0 * np.pi * response.frequency
+    return np.asarray(1.0 / (omega * np.maximum(np.abs(response.values), 1e-300)))
+
+
+def _chosen(*numbers: tuple[str, bool]) -> tuple[str, ...]:
+    """Numbers whose condition holds; all of them when none does."""
+    return tuple(number for number, holds in numbers if holds) or tuple(n for n, _ in numbers)
+
+
+def _turned(response: Response) -> Array:
+    """Phase (rad) with its median within half a turn of -90°."""
+    phase = response.phase
+    turns = np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
+    return np.asarray(phase - 2.0 * np.pi * turns)
+
+
+def _continued(
+    loops: Sequence[Named], found: Sequence[ServoCharacteristics | None]
+) -> Iterator[tuple[Curve, Curve]]:
+    """Gain and phase above the sweep, up to a crossover that lies there."""
+    label = "extrapolated"
+    for (_, series, loop), read in zip(loops, found, strict=True):
+        gain = read.crossing(read.gain_margin) if read else None
+        phase = read.crossing(read.phase_margin) if read else None
+        if gain is None or phase is None or not gain.extrapolated:
+            continue
+        told = loop.told
+        beyond = Continuation.of(told, phase.frequency.value)
+        if beyond is None:
+            continue
+        at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency.value, 60)
+        shift = _turned(loop)[0] - loop.phase[0]
+        yield (
+            Curve(at, beyond.level(at), label, series, "thin"),
+            Curve(at, beyond.phase(at) + shift, label, series, "thin"),
+        )
+        label = ""
+
+
+def _with_interval(
+    response: Response, values: Array, label: str, series: str, per_share: float
+) -> Curve:
+    """A curve with its band where that is noticeable; `per_share` turns shares into its unit."""
+    half = TWO_SIDED * response.relative_error
+    if not np.any(half > NOTICEABLE):
+        return Curve(response.frequency, values, label, series)
+    half = np.where(half > NOTICEABLE, half * per_share, np.nan)
+    low, high = values - half, values + half
+    return Curve(response.frequency, values, label, series, low=low, high=high)
+
+
+def _bode(
+    key: str,
+    title: str,
+    caption: str,
+    alt: str,
+    gain: Axis,
+    curves: Sequence[tuple[str, str, Response, Array, Array]],
+    thesis: tuple[str, ...],
+    level_marks: tuple[Mark, ...] = (),
+    phase_marks: tuple[Mark, ...] = (),
+    more_gain: Sequence[Curve] = (),
+    more_phase: Sequence[Curve] = (),
+) -> Figure:
+    less = list(_differences(curves))
+    every = [curve.x for curve in more_gain] + [r.frequency for _, _, r, _, _ in curves]
+    across = _range(np.concatenate(every)) if less else FREQUENCY
+    below = " Below: what compensation changes, less the response without." if less else ""
+    return Figure(
+        key=key,
+        title=title,
+        caption=caption + below,
+        alt=alt + below,
+        panels=(
+            Panel(
+                across,
+                gain,
+                [_with_interval(r, level, label, s, DECIBEL) for label, s, r, level, _ in curves]
+                + list(more_gain),
+                marks=level_marks,
+            ),
+            Panel(
+                across,
+                PHASE,
+                [_with_interval(r, phase, label, s, 1.0) for label, s, r, _, phase in curves]
+                + list(more_phase),
+                marks=phase_marks,
+            ),
+            *(replace(panel, x=across) for panel in less),
+        ),
+        thesis=thesis,
+        across=2 if less else 1,
+    )
+
+
+def _range(frequency: Array) -> Axis:
+    """An axis over all frequencies (Hz), so that panels below each other have the same."""
+    known = frequency[np.isfinite(frequency)]
+    if not known.size:
+        return FREQUENCY
+    return replace(FREQUENCY, limits=(float(known.min()), float(known.max())))
+
+
+def _differences(
+    curves: Sequence[tuple[str, str, Response, Array, Array]],
+) -> Iterator[Panel]:
+    """Gain and phase of each method less those without compensation, with their 95 % intervals.
+
+    Nothing where there is not one response without, or none to compare at the same frequencies:
+    curves that lie on one another do not show what compensation changes.
+    """
+    bare = [each for each in curves if each[1] == BARE]
+    if len(bare) != 1:
+        return
+    _, _, reference, level, phase = bare[0]
+    others = [
+        each
+        for each in curves
+        if each[1] != BARE and np.array_equal(each[2].frequency, reference.frequency)
+    ]
+    if not others:
+        return
+    gains, phases = [], []
+    for label, series, response, own_level, own_phase in others:
+        half = TWO_SIDED * np.hypot(response.relative_error, reference.relative_error)
+        at, away = response.frequency, own_level - level
+        turned = (own_phase - phase + np.pi) % (2.0 * np.pi) - np.pi
+        gains.append(_within(at, away, half * DECIBEL, label, series))
+        phases.append(_within(at, turned, half, label, series))
+    yield Panel(FREQUENCY, Axis("Change of gain", "dB"), gains, marks=(Mark("", y=0.0),))
+    yield Panel(FREQUENCY, Axis("Change of phase", "rad", "deg"), phases, marks=(Mark("", y=0.0),))
+
+
+def _within(at: Array, values: Array, half: Array, label: str, series: str) -> Curve:
+    return Curve(at, values, label, series, low=values - half, high=values + half)

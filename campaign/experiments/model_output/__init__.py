@@ -1,0 +1,1 @@
+"""Outputs of friction models for prescribed motions."""

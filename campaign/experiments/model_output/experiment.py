@@ -1,0 +1,261 @@
+"""What friction models say to a prescribed sinusoidal rate, without a plant (Figures 4.10, 4.14).
+
+The load is moved exactly as prescribed, so nothing but the model decides the torque. The friction
+of the bench can be described by several models, its compensators run on the same rate, and each
+parameter can be varied (Figures 5.12 and 5.13).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from pydantic import Field, JsonValue
+
+from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
+from campaign.estimate import Estimate
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.model_output.conclusions import model_output_conclusions
+from campaign.experiments.model_output.figures import (
+    UNCHANGED,
+    cycle,
+    shown_torque,
+    sine_figure,
+    source,
+    static_figure,
+    variation_figures,
+)
+from campaign.experiments.shared.common import (
+    conditions,
+    failures_note,
+    grouped,
+    with_changes,
+)
+from campaign.experiments.shared.friction_models import (
+    OF_ONE,
+    combined,
+    in_models,
+    places,
+    simulated,
+)
+from campaign.identification.sampled import LOST, at_sample, bracketed, named, peak
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.reason import Cause
+from campaign.result import (
+    Array,
+    Cell,
+    Column,
+    Figure,
+    Finding,
+    Result,
+    Table,
+)
+from campaign.signals import Sine
+from campaign.trial import Task, Tree, TrialRequest
+from campaign.units import AngularRate, Frequency
+
+OWN = ("model", "compensation")
+VARIED = ("parameter", "factor")
+METRICS = ("peak", "at_amplitude", "at_reversal")
+JUMP = 20.0
+"""times the step of the torque from sample to sample beside it."""
+NO_REVERSAL = Cause("no reversal", "the rate does not fall through zero, or {why}")
+JUMPS = Cause("torque that jumps", "the torque jumps where the rate changes its sign")
+CYCLES = 2
+"""of the prescribed rate; the first brings the bristles into their cycle, the last is shown."""
+
+
+class ModelOutputOptions(Options):
+    """Options of a model-output test."""
+
+    amplitude: AngularRate = Field(default=0.2, gt=0)
+    """Amplitude of the prescribed rate."""
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the prescribed rate."""
+    models: tuple[str, ...] = ("stribeck", "lugre")
+    """Friction models to describe the bench's friction by, beside each other; none: its own."""
+    compensation: tuple[str, ...] = ()
+    """Compensations of the bench with a friction model inside, shown beside the friction."""
+    vary: tuple[str, ...] = ()
+    """Parameters of the bench's friction to vary, one at a time."""
+    factors: tuple[float, ...] = Field(default=(0.5, 1.5), max_length=100)
+    """What each varied parameter is multiplied by."""
+    sample_rate: Frequency = Field(default=2000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+    def without_effect(self) -> frozenset[str]:
+        return frozenset(() if self.vary else {"factors"})
+
+
+def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]:
+    known: set[str] = set()
+    for point, tree in in_models(bench, options.models):
+        if not options.vary:
+            yield _request(options, point, tree)
+            continue
+        own = bench if tree is None else Bench.model_validate(tree, context={"si": True})
+        yield _request(options, {**point, "parameter": UNCHANGED, "factor": 1.0}, tree)
+        for parameter in options.vary:
+            for factor in options.factors:
+                if changes := _scaled(own, parameter, factor):
+                    known.add(parameter)
+                    varied = {**point, "parameter": parameter, "factor": factor}
+                    yield _request(options, varied, with_changes(own, changes))
+    if missing := [name for name in options.vary if name not in known]:
+        raise ValueError(f"no friction of the bench '{bench.name}' has a '{missing[0]}' to vary")
+    for name in options.compensation:
+        if name not in bench.compensation:
+            raise ValueError(
+                f"the bench '{bench.name}' has no compensation '{name}'; it has "
+                f"{', '.join(bench.compensation) or 'none'}"
+            )
+        if not getattr(bench.compensation[name], "friction", None):
+            raise ValueError(f"the compensation '{name}' has no friction model to show")
+        yield _request(options, {"compensation": name}, None, name)
+
+
+def _request(
+    options: ModelOutputOptions,
+    point: dict[str, JsonValue],
+    bench: Tree | None,
+    compensation: str = "none",
+) -> TrialRequest:
+    duration = CYCLES / options.frequency
+    return TrialRequest(
+        Task(
+            mode="prescribed",
+            command=Sine(amplitude=options.amplitude, frequency=options.frequency),
+            compensation=compensation,
+            duration=duration,
+            window=(duration - 1.0 / options.frequency, duration),
+            sample_rate=options.sample_rate,
+            start_angle=-options.amplitude / (2.0 * np.pi * options.frequency),
+        ),
+        point=point,
+        bench=bench,
+        requires=(LOAD_RATE, shown_torque(compensation)),
+    )
+
+
+def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
+    """Values (SI) by dotted path: the parameter in every interface and direction that has it."""
+    changes = {}
+    for name, friction in bench.friction.items():
+        for path, holder in (("", friction), ("negative.", getattr(friction, "negative", None))):
+            value = getattr(holder, parameter, None)
+            if isinstance(value, float):
+                changes[f"friction.{name}.{path}{parameter}"] = value * factor
+    return changes
+
+
+def _analyse(data: TestData) -> Result:
+    measured = list(data.completed())
+    rows: list[dict[str, Cell]] = []
+    findings: list[Finding] = []
+    plain = places((item for item in measured if "parameter" not in item.trial.point), OWN)
+    varied = places((item for item in measured if "parameter" in item.trial.point), VARIED)
+    for place in (*plain, *varied):
+        for repeats in grouped(place.trials).values():
+            found = combined(repeats, _measure)
+            row = {name: found.get(f"model_{name}") or _not_found(name) for name in METRICS}
+            rows.append({**place.point, "source": source(repeats[0]), **row})
+            findings += [
+                Finding.of(row[name], conditions(repeats[0])) for name in ("peak", "at_reversal")
+            ]
+    if not rows:
+        return Result(notes=failures_note(data))
+    options = ModelOutputOptions.model_validate(measured[0].trial.options, context={"si": True})
+    figures: list[Figure] = []
+    for number, place in enumerate(plain, start=1):
+        suffix = f"-{number}" if len(plain) > 1 else ""
+        figures += [
+            static_figure(place.trials[0], suffix, options.amplitude),
+            sine_figure(place.trials, suffix),
+        ]
+    for number, place in enumerate(varied, start=1):
+        figures += variation_figures(place.trials, f"-{number}" if len(varied) > 1 else "")
+    table = Table(
+        key="model-output",
+        title="Output of the models at a sinusoidal rate",
+        columns=(
+            *(*plain, *varied)[0].columns,
+            Column("source", "Model"),
+            Column("peak", "Largest torque", "N m", "N m"),
+            Column("at_amplitude", "At the largest rate", "N m", "N m"),
+            Column("at_reversal", "Where the rate falls through zero", "N m", "N m"),
+        ),
+        rows=tuple(rows),
+        note="Where the rate falls through zero a static model jumps, and a dynamic one still "
+        "holds the torque of its bristles. " + OF_ONE,
+    )
+    conclusions = model_output_conclusions(rows, options.amplitude, options.frequency)
+    return Result(
+        (table,),
+        tuple(figures),
+        tuple(findings),
+        failures_note(data),
+        conclusions,
+        telling=next((figure.key for figure in figures if figure.key.startswith("sine")), ""),
+    )
+
+
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    """Torque of the last cycle: the largest, at the largest rate, and where the rate reverses.
+
+    Without what cannot be told because samples of the rate were lost (NaN).
+    """
+    cut, torque = cycle(data)
+    rate = cut[LOAD_RATE]
+    found = [peak("peak", torque, "N m")]
+    if np.all(np.isfinite(rate)):
+        found.append(at_sample("at_amplitude", torque, int(np.argmax(rate)), "N m"))
+        found += _at_reversal(rate, torque)
+    return simulated(named(each, f"model_{each.name}") for each in found)
+
+
+def _not_found(name: str) -> Estimate:
+    reason = NO_REVERSAL(why=LOST()) if name == "at_reversal" else LOST()
+    return Estimate.without_interval(f"model_{name}", math.nan, "N m", reason)
+
+
+def _at_reversal(rate: Array, torque: Array) -> Iterator[Estimate]:
+    """Torque (N m) where the rate falls through zero: between two samples, unless it jumps there.
+
+    A jump is a step between neighbours that is far larger than those beside it.
+    """
+    falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
+    if not len(falling):
+        return
+    at = int(falling[0])
+    value = float(torque[at])
+    near = torque[max(at - 2, 0) : at + 5]
+    if not np.all(np.isfinite(near)):
+        yield Estimate.without_interval("at_reversal", math.nan, "N m", LOST())
+        return
+    steps = np.abs(np.diff(near))
+    if np.max(steps) > JUMP * np.median(steps):
+        # A sine's zero is not quite zero, and a jump goes through it.
+        middle = 0.0 if abs(value) < 1e-9 * float(np.nanmax(torque)) else value
+        yield Estimate.without_interval("at_reversal", middle, "N m", JUMPS())
+        return
+    ends = value, float(torque[at + 1])
+    yield bracketed("at_reversal", value, "N m", ends, "between the samples around it")
+
+
+EXPERIMENT = Experiment(
+    name="model_output",
+    summary="friction models at a prescribed sinusoidal rate, without a plant (Figures 4.10, 4.14)",
+    options=ModelOutputOptions,
+    trials=_trials,
+    analyse=_analyse,
+    perturbs_bench=True,
+    requires={
+        LOAD_RATE: "the rate that the models are told",
+        FRICTION_TORQUE: "the output of a friction model",
+        COMPENSATION_TORQUE: "the output of a compensation",
+    },
+    measure=_measure,
+)

@@ -1,0 +1,1 @@
+"""Recorded motion: what anybody moved the axis by."""

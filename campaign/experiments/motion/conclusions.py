@@ -1,0 +1,107 @@
+"""What recorded motions come to: friction of each direction, and how far a reference was met."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from campaign.estimate import Estimate
+from campaign.experiments.motion.account import Motion
+from campaign.experiments.shared.conclusion_parts import (
+    Part,
+    conclusion,
+    count,
+    determined,
+    listed,
+    ratio_of,
+)
+from campaign.result import Amount, Conclusion, Factor
+
+
+def is_surely_something(estimate: Estimate) -> bool:
+    """Whether an interval lies on one side of zero."""
+    low, high = estimate.low, estimate.high
+    return low is not None and high is not None and (low > 0 or high < 0)
+
+
+TOLD = 4
+"""recordings that are told one by one."""
+
+
+def motion_conclusions(motions: Sequence[Motion]) -> tuple[Conclusion, ...]:
+    """Of each recording, the first few."""
+    told = [each for motion in motions[:TOLD] for each in _of_one(motion, len(motions) > 1)]
+    if len(motions) > TOLD:
+        told.append(conclusion(f"{len(motions) - TOLD} more recordings are in the table"))
+    return tuple(told)
+
+
+def _named(motion: Motion) -> str:
+    """`trial 2 (joint = 2, joints.csv)`: by what was set, and by its file."""
+    told = [f"{name} = {value}" for name, value in motion.place.items()]
+    files = motion.data.trial.recording.get("files")
+    if isinstance(files, list):
+        told += [str(each["name"]) for each in files if isinstance(each, dict)]
+    where = f" ({', '.join(told)})" if told else ""
+    return f"trial {motion.data.trial.number}{where}"
+
+
+def _of_one(motion: Motion, several: bool) -> Iterator[Conclusion]:
+    who = f"{_named(motion)}: " if several else ""
+    for direction, line in motion.lines.items():
+        yield conclusion(
+            f"{who}in the {direction} direction Coulomb friction is ",
+            Amount(line.reported["coulomb_torque"], "N m"),
+            " and viscous friction ",
+            Amount(line.reported["viscous_friction"], "N m s/rad"),
+            f", from {count(line.stretches, 'steady stretch', 'steady stretches')}",
+        )
+    if motion.levels:
+        told: list[tuple[Part, ...]] = [
+            (Amount(level, "N m"), f" in the {direction} direction")
+            for direction, level in motion.levels.items()
+        ]
+        yield conclusion(f"{who}friction at the speeds there are is ", listed(told))
+    if motion.coefficient is not None:
+        yield conclusion(
+            f"{who}friction over normal load is ",
+            Amount(motion.coefficient),
+            f", over {count(len(motion.stretches), 'steady stretch', 'steady stretches')}",
+        )
+    if len(motion.lines) == 2:
+        positive, negative = (motion.lines[name] for name in ("positive", "negative"))
+        compared: list[tuple[Part, ...]] = []
+        for name, one, other in (
+            ("Coulomb friction ", negative.coulomb, positive.coulomb),
+            ("viscous friction ", negative.viscous, positive.viscous),
+        ):
+            if determined(one) and determined(other) and min(one.value, other.value) > 0:
+                compared.append((name, Factor(ratio_of(one, other, of_same_trials=True))))
+        constant = motion.constant
+        if constant is not None and is_surely_something(constant):
+            yield conclusion(
+                f"{who}half of what they differ by at standstill is ",
+                Amount(constant, "N m"),
+                ": a load that acts on the axis, or friction that differs by direction",
+            )
+        if compared:
+            yield conclusion(
+                f"{who}the negative direction against the positive: ", listed(compared, "; ", "; ")
+            )
+    error = motion.found.get("rms_error")
+    if error is not None and determined(error):
+        peak = motion.found["peak_error"]
+        yield conclusion(
+            f"{who}the reference is met within ",
+            Amount(error, "mrad"),
+            " (RMS) and ",
+            Amount(peak, "mrad"),
+            " at most",
+        )
+    if not motion.lines and not motion.levels:
+        top = motion.found["top_rate"]
+        yield conclusion(
+            f"{who}the axis moves at up to ",
+            Amount(top, "deg/s"),
+            "; friction over rate does not follow from ",
+            count(len(motion.stretches), "steady stretch", "steady stretches"),
+        )

@@ -1,0 +1,1 @@
+"""Stabilization over the gain of a friction observer."""

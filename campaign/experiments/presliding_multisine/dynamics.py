@@ -1,0 +1,315 @@
+"""What a joint fit below breakaway looks like: records of trials, tables, figures, remarks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimate import Estimate, Origin
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.presliding_multisine.held_current import between_samples
+from campaign.experiments.shared.captions import amount
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.identification.intervals import shifted_by
+from campaign.identification.presliding import damping_by_ratio
+from campaign.identification.presliding_dynamics.driven_torque import Driven, driven_torques
+from campaign.identification.presliding_dynamics.found import PreslidingDynamics
+from campaign.identification.presliding_dynamics.plant import Appendage
+from campaign.identification.presliding_dynamics.record import Assumed, Record
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.physics.loop import at_load
+from campaign.result import Array, Axis, Cell, Column, Curve, Figure, Mark, Panel, Table
+from campaign.signals import MultiSine
+
+NAMES = {"bristle_stiffness": "stiffness_at_rest", "damping": "damping_at_rest"}
+"""What is found below the first slip is the sum over all interfaces, and is called so."""
+BY_TORQUE = ("stiffness_at_rest", "damping_at_rest", "inertia", "appendage_inertia")
+"""What is as wrong as the torque constant is."""
+QUANTITIES = ("stiffness_at_rest", "damping_at_rest", "inertia")
+SPLIT = ("bristle_damping", "viscous_friction")
+"""Of which small motions tell the sum, and seldom each."""
+ACCURACY = 1e-4
+"""Share of the rate by which the simulation itself may be off."""
+SHOWN = 2000
+"""Samples of a record in a figure."""
+LAGS = 60
+"""of the autocorrelation in a figure."""
+TIME, RATE = Axis("Time", "s", "s"), Axis("Rate", "rad/s", "mrad/s")
+
+
+def record_of(data: TrialData, period: float | None = None) -> Record:
+    """Torque and motion of a trial that begins at rest, by the best of its sensors.
+
+    Raises ValueError where it has none, or where the record is too short.
+    """
+    recording = data.recording()
+    rate = next((name for name in (GYRO_RATE, RELATIVE_RATE) if name in recording.channels), None)
+    angle = (
+        recording[RELATIVE_ANGLE] if rate is None and RELATIVE_ANGLE in recording.channels else None
+    )
+    return Record(
+        1.0 / data.trial.task.sample_rate,
+        recording[DRIVE_TORQUE],
+        rate=None if rate is None else recording[rate],
+        angle=angle,
+        period=period,
+        label=data.trial.label,
+    )  # fmt: skip
+
+
+def with_torques_known(trials: Sequence[TrialData], records: Sequence[Record]) -> list[Record]:
+    """The records, with all that is known of the torque of those that a multisine shook.
+
+    That is their torque without its sensor's noise and with what it is between its samples, and
+    what it may be off by. All trials are of one bench.
+    """
+    commands = {
+        number: command
+        for number, (trial, record) in enumerate(zip(trials, records, strict=True))
+        if (command := _multisine(trial)) is not None and record.at_rest
+    }
+    found, doubts = list(records), 0
+    for step in sorted({records[number].step for number in commands}):
+        alike = [number for number in commands if records[number].step == step]
+        driven = [Driven(records[n].torque, commands[n].sample) for n in alike]
+        highest = max(max(commands[n].frequencies) for n in alike)
+        told = driven_torques(driven, step, highest)
+        for number, (torque, doubt) in zip(alike, told, strict=True):
+            columns = np.column_stack([np.zeros((len(torque), doubts)), doubt])
+            found[number] = replace(records[number], torque=torque, doubt=columns)
+        doubts = max(doubts, *(found[number].doubts.shape[1] for number in alike))
+    found = [each.with_doubts(doubts) for each in found]
+    if not commands:
+        return found
+    for number, each in enumerate(found):
+        missing, more = np.zeros(len(each.torque)), np.zeros(len(each.torque))
+        if number in commands:
+            bench = bench_of(trials[number].trial)
+            missing, more = between_samples(each.time, commands[number], bench)
+        # By how much that is off is the same in all trials.
+        columns = np.column_stack([each.doubts, more])
+        found[number] = replace(each, torque=each.torque + missing, doubt=columns)
+    return found
+
+
+def _multisine(data: TrialData) -> MultiSine | None:
+    """The torque that a trial was commanded, where it was a multisine."""
+    task = data.trial.task
+    return task.command if task.mode == "torque" and isinstance(task.command, MultiSine) else None
+
+
+def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumed:
+    """What a bench says beforehand: a first guess of viscous friction, and its appendage.
+
+    Both dampings are free: interfaces whose bristles differ yield with other shares of damping than
+    of stiffness, and only the sum of all damping is the same for them and for one bristle.
+    span: lowest and highest frequency of the excitation (Hz); an appendage within is fitted, too.
+    """
+    viscous = viscous_of(bench)
+    if bench.appendage is None:
+        return Assumed(viscous, viscous_free=True)
+    part = bench.appendage
+    free = span[0] < part.frequency < span[1]
+    told = Appendage(part.inertia, part.frequency, part.damping_ratio)
+    return Assumed(viscous, viscous_free=True, appendage=told, appendage_free=free)
+
+
+def viscous_of(bench: Bench) -> float:
+    """sigma2 at the load that a bench states, of all interfaces (N m s/rad)."""
+    models, viscous = friction_models(), 0.0
+    for each in bench.friction.values():
+        torque, rate = at_load(each, bench)
+        viscous += torque * rate * models[each.model].viscous(each)
+    return viscous
+
+
+def estimates_of(found: PreslidingDynamics, bench: Bench) -> dict[str, Estimate]:
+    """The numbers by their names here, with what no repetition would show."""
+    told = {}
+    for name, estimate in found.estimates.items():
+        own = replace(estimate, name=NAMES.get(name, name))
+        if own.has_interval and not name.endswith("delay"):
+            own = shifted_by(own, "simulation", ACCURACY * abs(own.value))
+        if own.has_interval and own.name in BY_TORQUE and bench.motor is not None:
+            own = with_systematic(own, bench, TORQUE_CONSTANT, own.value)
+        told[own.name] = own
+    return told
+
+
+def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
+    """One row for each record, and for all of them together."""
+    return Table(
+        key=f"presliding-dynamics{suffix}",
+        title="Stiffness, damping and inertia below breakaway",
+        columns=(
+            Column("amplitude", "Largest torque", "N m", "N m", exact=True),
+            Column("stiffness_at_rest", "Stiffness at rest", "N m/rad", "N m/rad"),
+            Column("damping_at_rest", "Damping at rest", "N m s/rad", "N m s/rad"),
+            Column("inertia", "Inertia", "kg m^2", "kg m^2"),
+            Column("damping_ratio", "Damping ratio"),
+            Column("natural_frequency", "Natural frequency", "Hz", "Hz"),
+        ),
+        rows=tuple(rows),
+        note="Fitted to the whole motion by its simulation; the last row to all trials at once. "
+        "Stiffness and damping are the sums over all interfaces, before any of them slips; damping "
+        "is bristles' and viscous friction's together, which small motions do not tell apart.",
+    )
+
+
+def figures_of(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]) -> Iterator[Figure]:
+    """Measured and simulated motion, and what is left over."""
+    largest = int(np.argmax([record.amplitude for record in found.fit.records]))
+    yield _answer_figure(found, largest, suffix, trials)
+    yield _left_figure(found, suffix, trials)
+
+
+def _answer_figure(
+    found: PreslidingDynamics, number: int, suffix: str, trials: tuple[int, ...]
+) -> Figure:
+    record, channel = found.fit.records[number], found.fit.channels[number][0]
+    simulated = found.fit.answers(number)[0]
+    there = channel.there > 0
+    x = np.linspace(-1.0, 1.0, len(simulated))
+    off = np.polyfit(x[there], (channel.samples - simulated)[there], 1)
+    simulated = simulated + np.polyval(off, x)
+    measured = np.where(channel.kept, channel.samples, np.nan)
+    cut = slice(len(measured) // 2, len(measured) // 2 + SHOWN)
+    time, axis = record.time, RATE if channel.name == "rate" else Axis("Angle", "rad", "mrad")
+    return Figure(
+        key=f"answer{suffix}",
+        title="Motion below breakaway, measured and simulated",
+        caption=f"A part of the trial with {amount(record.amplitude, 'N m')}: torque, the measured "
+        "and the simulated motion, with the sensor's offset and drift, and what the two differ by.",
+        alt="Torque over time, measured and simulated motion over time, and their difference.",
+        panels=(
+            Panel(
+                TIME,
+                Axis("Drive torque", "N m", "N m"),
+                [Curve(time[cut], record.torque[cut], "", "measured")],
+            ),
+            Panel(
+                TIME,
+                axis,
+                [
+                    Curve(time[cut], measured[cut], "measured", "measured", "thin"),
+                    Curve(time[cut], simulated[cut], "simulated", "fit"),
+                ],
+            ),
+            Panel(
+                TIME,
+                replace(axis, label="Residual"),
+                [Curve(time[cut], (measured - simulated)[cut], "", "measured", "thin")],
+            ),
+        ),
+        trials=trials,
+    )
+
+
+def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]) -> Figure:
+    lags = np.arange(1.0, LAGS + 1.0)
+    bands = found.misfit.bands
+    step = found.fit.records[0].step
+    curves = [
+        Curve(lags * step, _autocorrelation(left[0]), _label(record), _label(record), "thin")
+        for record, left in zip(found.fit.records, found.fit.residuals, strict=True)
+    ]
+    chance = 1.96 / np.sqrt(min(len(record.torque) for record in found.fit.records))
+    frequency = np.array([band.frequency for band in bands])
+    error = np.array([abs(band.error) for band in bands])
+    return Figure(
+        key=f"left-over{suffix}",
+        title="What the fit leaves over",
+        caption="Autocorrelation of the residuals, with the noise taken for an autoregression: "
+        "between the lines is what white noise has. Beside it the part of the simulated motion "
+        "that is left over in the residuals, by frequency: an elastic part or a second inertia "
+        "would stand out.",
+        alt="Autocorrelation of residuals over lag, and share of the motion left over by "
+        "frequency.",
+        panels=(
+            Panel(
+                Axis("Lag", "s", "ms"),
+                Axis("Autocorrelation"),
+                curves,
+                marks=(Mark("", y=chance), Mark("", y=-chance)),
+            ),
+            Panel(
+                Axis("Frequency", "Hz", "Hz", "log"),
+                Axis("Left over", "", "percent"),
+                [Curve(frequency, error, "", "measured", "line+points")],
+            ),
+        ),
+        across=2,
+        trials=trials,
+    )
+
+
+def _label(record: Record) -> str:
+    return amount(record.amplitude, "N m")
+
+
+def _autocorrelation(residuals: Array) -> Array:
+    """At lags of 1 to `LAGS` samples."""
+    energy = float(residuals @ residuals) or 1.0
+    return np.array([residuals[lag:] @ residuals[:-lag] / energy for lag in range(1, LAGS + 1)])
+
+
+def damping_figure(
+    amplitudes: Array,
+    alone: Sequence[Estimate],
+    joint: Mapping[str, Estimate],
+    ratio: float,
+    suffix: str,
+    trials: tuple[int, ...],
+) -> Figure:
+    """Damping of each record and of all, and what a rule of thumb would have made of it.
+
+    amplitudes (N m), shape (n,), belong to `alone`, which may be empty: then they are a range.
+    """
+    stiffness, inertia = joint["stiffness_at_rest"], joint["inertia"]
+    rule = damping_by_ratio(stiffness.value, inertia.value, 0.0, ratio)
+    ends = np.array([float(np.min(amplitudes)), float(np.max(amplitudes))])
+    together = Curve.of(ends, [joint["damping_at_rest"]] * 2, "all together", "fit", "line")
+    each = [Curve.of(amplitudes, alone, "each trial", "measured")] if alone else []
+    return Figure(
+        key=f"damping{suffix}",
+        title="Damping of the bristles, measured and assumed",
+        caption=f"Measured: {amount(joint['damping_at_rest'].value, 'N m s/rad')}. A damping ratio "
+        f"of {ratio:g}, as it is assumed where nothing was measured (Equation 4.12), would make it "
+        f"{amount(rule, 'N m s/rad')}.",
+        alt="Damping over the largest torque of each trial, the joint fit, and the assumed one.",
+        panels=(
+            Panel(
+                Axis("Largest torque", "N m", "N m"),
+                Axis("Damping at rest", "N m s/rad", "N m s/rad"),
+                [*each, together],
+                marks=(Mark("assumed", y=rule),),
+            ),
+        ),
+        trials=trials,
+    )
+
+
+def remarks(found: PreslidingDynamics) -> Iterator[str]:
+    """Notes on what a reader should know of a fit: what was refused, what goes together."""
+    if found.reason:
+        yield f"No interval: {found.reason}."
+    for name, each in found.estimates.items():
+        if name in SPLIT:
+            continue  # only their sum is asked for
+        if each.origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND) and not found.reason:
+            yield f"{NAMES.get(name, name).replace('_', ' ').capitalize()}: {each.reason}."
+    names, shares = found.fit.parameters.names, found.spread.correlation
+    for i, one in enumerate(names):
+        for j, other in enumerate(names[:i]):
+            if abs(shares[i, j]) >= 0.9 and not {one, other} & {*SPLIT, "yielding"}:
+                told = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
+                yield f"{told[0]} and {told[1]} go together (correlation {shares[i, j]:.3f})."
+    if np.any(np.isfinite(found.spread.freedom)):
+        yield (
+            "The trials differ by more than their noise: intervals are from how they differ. "
+            "Friction has changed between them, or its curve is not a single bristle's."
+        )

@@ -1,1 +1,0 @@
-"""What experiments make of their metrics: means, tables, figures, remarks."""

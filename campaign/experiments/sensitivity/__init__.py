@@ -1,0 +1,1 @@
+"""Stabilization with wrong parameters of the compensation."""

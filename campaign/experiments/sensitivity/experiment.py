@@ -1,0 +1,274 @@
+"""Sensitivity of a model-based compensation to each of its parameters (section 5.2.2.4).
+
+Stabilization under a sinusoidal base motion, with one parameter at a time of the compensation's
+friction model changed by a share of itself, in every interface of the model and both directions.
+The plant keeps its own friction. How much a parameter may be wrong before the error passes a
+threshold says how well it has to be identified, and ranks the parameters (Figure 5.14).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
+from campaign.estimate import Estimate
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.sensitivity.conclusions import sensitivity_conclusions
+from campaign.experiments.sensitivity.figures import (
+    sensitivity_figure,
+    thresholds_figure,
+)
+from campaign.experiments.sensitivity.model_variation import model_figures, model_trials
+from campaign.experiments.sensitivity.results import (
+    SYMBOLS,
+    Judged,
+    Response,
+    judge,
+    sensitivity_findings,
+    sensitivity_table,
+)
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import failures_note, with_changes
+from campaign.experiments.shared.pointing_error import (
+    error_of,
+    found,
+    measured_part,
+    of_each,
+    windows_of,
+)
+from campaign.identification.stabilization_error import over_trials
+from campaign.identification.threshold import Threshold
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.complete import pointing_high_pass
+from campaign.result import Figure, Finding, Result, Value
+from campaign.signals import Sine
+from campaign.trial import Task, TrialRequest
+from campaign.units import Angle, AngularAcceleration, Frequency, in_words
+
+CHANGES = (-0.8, -0.65, -0.5, -0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8)
+
+
+class SensitivityOptions(Options):
+    """Options of a sensitivity study."""
+
+    compensation: str = "lugre"
+    """The model-based compensation that is varied, by its name on the bench."""
+    parameters: tuple[str, ...] = Field(default=tuple(SYMBOLS), min_length=1)
+    """Parameters of its friction model, varied one at a time."""
+    changes: tuple[float, ...] = Field(default=CHANGES, min_length=1, max_length=1000)
+    """Relative changes of each; -0.2 is 20 % less."""
+    repeats: int = Field(default=3, ge=1, le=1000)
+    """Trials at each value, whose errors are averaged."""
+    threshold: Angle = Field(default=0.2e-3, gt=0)
+    """Error whose passing counts as too much."""
+    threshold_ratio: float | None = Field(default=None, gt=1)
+    """Instead: how many times the error with the unchanged model counts as too much."""
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the base motion."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
+    """Amplitude of the base's angular acceleration."""
+    cycles: int = Field(default=3, ge=1, le=10_000)
+    """Whole cycles of the base motion that are measured."""
+    settle_cycles: int = Field(default=1, ge=0, le=1_000)
+    """Cycles before them, for the transient to pass."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+    model_output: bool = True
+    """Also run the model alone at a prescribed rate (Figures 5.12, 5.13): in simulation only."""
+    model_change: float = Field(default=0.5, gt=0, lt=1)
+    """Relative change, either way, that its output is shown for."""
+
+    def without_effect(self) -> frozenset[str]:
+        threshold = set() if self.threshold_ratio is None else {"threshold"}
+        return frozenset(threshold | (set() if self.model_output else {"model_change"}))
+
+
+def varied_paths(bench: Bench, compensation: str, parameter: str) -> dict[str, float]:
+    """Dotted path on the bench to value (SI), wherever the compensation's model has `parameter`."""
+    if compensation not in bench.compensation:
+        named = ", ".join(bench.compensation) or "none"
+        raise ValueError(f"the bench has no compensation '{compensation}'; it has {named}")
+    interfaces = bench.compensation[compensation].model_dump(mode="json").get("friction")
+    if not isinstance(interfaces, Mapping):
+        raise ValueError(f"'{compensation}' has no friction model whose parameters could vary")
+    found: dict[str, float] = {}
+    for name, model in interfaces.items():
+        where = f"compensation.{compensation}.friction.{name}"
+        for prefix, table in (("", model), ("negative.", model.get("negative") or {})):
+            value = table.get(parameter)
+            if isinstance(value, float | int):
+                found[f"{where}.{prefix}{parameter}"] = float(value)
+    return found
+
+
+def _varied(bench: Bench, options: SensitivityOptions, parameter: str, change: float) -> Any:
+    """The bench's tree with one parameter changed; ValueError when the bench refuses it."""
+    paths = varied_paths(bench, options.compensation, parameter)
+    return with_changes(bench, {path: value * (1.0 + change) for path, value in paths.items()})
+
+
+def _refusals(bench: Bench, options: SensitivityOptions) -> dict[tuple[str, float], str]:
+    """Changes that the bench cannot have, and why."""
+    refused = {}
+    for parameter in options.parameters:
+        if not varied_paths(bench, options.compensation, parameter):
+            continue
+        for change in options.changes:
+            try:
+                _varied(bench, options, parameter, change)
+            except ValueError as error:
+                refused[parameter, change] = str(error)
+    return refused
+
+
+def _trials(options: SensitivityOptions, bench: Bench) -> Iterator[TrialRequest]:
+    known = [p for p in options.parameters if varied_paths(bench, options.compensation, p)]
+    if not known:
+        raise ValueError(
+            f"the model of '{options.compensation}' has none of {', '.join(options.parameters)}"
+        )
+    start = options.settle_cycles / options.frequency
+    stop = start + options.cycles / options.frequency
+    task = Task(
+        mode="rate",
+        base_acceleration=Sine(amplitude=options.acceleration, frequency=options.frequency),
+        compensation=options.compensation,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=options.sample_rate,
+    )
+    refused = _refusals(bench, options)
+    places: list[tuple[str, float]] = [("", 0.0)]
+    places += [(p, c) for p in known for c in options.changes if c and (p, c) not in refused]
+    for parameter, change in places:
+        tree = _varied(bench, options, parameter, change) if parameter else None
+        for repetition in range(1, options.repeats + 1):
+            yield TrialRequest(
+                task,
+                can_use=(),
+                point={"parameter": parameter, "change": change, "repetition": repetition},
+                note=f"{parameter} {change:+.0%}" if parameter else "the model as it is",
+                bench=tree,
+                windows=windows_of(task),
+            )
+    if options.model_output:
+        yield from model_trials(bench, options, known, _varied)
+
+
+def _measure(data: TrialData) -> list[Estimate]:
+    """The stabilization error; of the model alone there is no metric, only a figure."""
+    if data.trial.task.mode != "rate":
+        return []
+    return found([error_of(measured_part(data), data.trial.task)])
+
+
+def _responses(measured: Sequence[TrialData]) -> dict[str, Response]:
+    """By parameter; the trials with the model as it is belong to every one of them."""
+    errors: dict[str, dict[float, list[Estimate]]] = {}
+    for data in measured:
+        for error in of_each([data], _measure, "stabilization_error"):
+            place = errors.setdefault(str(data.trial.point["parameter"]), {})
+            place.setdefault(float(str(data.trial.point["change"])), []).append(error)
+    unchanged = errors.pop("", {})
+    responses = {}
+    for parameter, by_change in errors.items():
+        ordered = sorted({**unchanged, **by_change}.items())
+        responses[parameter] = Response(
+            change=np.array([change for change, _ in ordered]),
+            errors=tuple(over_trials(each) for _, each in ordered),
+            dots=np.array([(change, one.value) for change, each in ordered for one in each]),
+        )
+    return responses if unchanged else {}
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    measured = list(data.completed())
+    if not measured:
+        return Result(notes=tuple(notes))
+    options = SensitivityOptions.model_validate(measured[0].trial.options, context={"si": True})
+    responses = _responses(measured)
+    figures = tuple(model_figures(measured, options.compensation))
+    if not responses:
+        notes.append("No trial with the unchanged model completed: there is nothing to compare.")
+        return Result(figures=figures, notes=tuple(notes))
+    unchanged = next(iter(responses.values())).unchanged
+    ratio = options.threshold_ratio
+    limit = Threshold(options.threshold if ratio is None else ratio * unchanged.value, ratio)
+    if unchanged.value > limit.value:
+        notes.append(
+            f"The error is {in_words(unchanged.value, 'rad', 'mrad')} with the unchanged model, "
+            f"already beyond the threshold of {in_words(limit.value, 'rad', 'mrad')}; no change "
+            "has a meaning then."
+        )
+    judged = judge(responses, limit)
+    told: dict[str, Value] = {
+        "compensation": options.compensation,
+        "frequency": options.frequency,
+        "acceleration": options.acceleration,
+    }
+    findings: list[Finding] = []
+    whole = len(measured) == len(data.trials)
+    if whole:
+        findings += sensitivity_findings(judged, told)
+    else:
+        notes.append("Thresholds and ranks are not compared: they need every trial.")
+    findings.append(Finding.of(unchanged, told))
+    notes += _skipped_notes(measured, options)
+    return Result(
+        (sensitivity_table(judged, limit),),
+        (*_figures(judged, limit, told, whole), *figures),
+        tuple(findings),
+        tuple(notes),
+        sensitivity_conclusions(
+            findings,
+            limit.value,
+            SYMBOLS,
+            pointing_high_pass(bench_of(measured[0].trial)),
+        ),
+    )
+
+
+def _figures(
+    judged: Sequence[Judged], limit: Threshold, told: Mapping[str, Value], whole: bool
+) -> Iterator[Figure]:
+    """Thresholds, compared with published ones where all trials are there, and all errors."""
+    compensation = str(told["compensation"])
+    yield from thresholds_figure(judged, limit, compensation, told if whole else None)
+    yield sensitivity_figure(judged, limit, compensation)
+
+
+def _skipped_notes(measured: Sequence[TrialData], options: SensitivityOptions) -> Iterator[str]:
+    plain = next((d for d in measured if not d.trial.point["parameter"]), None)
+    if plain is None:
+        return
+    bench = bench_of(plain.trial)
+    for parameter in options.parameters:
+        if not varied_paths(bench, options.compensation, parameter):
+            yield f"The model of '{options.compensation}' has no {parameter}; it was not varied."
+    for (parameter, change), why in _refusals(bench, options).items():
+        yield f"{parameter} {change:+.0%} was skipped: {why}."
+
+
+EXPERIMENT = Experiment(
+    name="sensitivity",
+    summary="error over the change of each parameter of a compensation's model (Figure 5.14)",
+    options=SensitivityOptions,
+    trials=_trials,
+    analyse=_analyse,
+    fit=fitting.base_motion,
+    perturbs_bench=True,
+    measure=_measure,
+    requires={POINTING_ERROR: "the stabilization error"},
+    can_use={
+        COMPENSATION_TORQUE: "figures of the model alone",
+        RELATIVE_RATE: "figure of the model alone for its parameters of sliding",
+    },
+    # A model stiffer than the bristles it stands for takes away more than there is.
+    seeks_instability=True,
+)

@@ -1,0 +1,1 @@
+"""Stabilization while the hull moves, by compensation."""

@@ -1,0 +1,332 @@
+"""Stabilization under base motion: how still the load stays in space, by compensation method.
+
+The hull swings, the rate command is zero, and the standard deviation of the integrated gyro rate is
+the stabilization error (sections 5.2 and 5.3): over whole cycles where the motion is sinusoidal,
+over the whole window where it is a measured series or a ship's roll.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from campaign.channels import (
+    BASE_RATE,
+    COMPENSATION_TORQUE,
+    FRICTION_TORQUE,
+    GYRO_RATE,
+    POINTING_ERROR,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+    missing,
+)
+from campaign.estimate import Estimate
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
+from campaign.experiments.shared.conclusion_parts import Settings
+from campaign.experiments.shared.found_trials import hull_sine
+from campaign.experiments.shared.pointing_error import (
+    MEASURED,
+    error_of,
+    found,
+    largest_of,
+    measured_part,
+    of_each,
+    rate_of,
+    windows_of,
+)
+from campaign.experiments.stabilization.comparisons import compared, preload_of
+from campaign.experiments.stabilization.conclusions import stabilization_conclusions
+from campaign.experiments.stabilization.figures import stabilization_figures
+from campaign.experiments.stabilization.hull_motion import (
+    Motion,
+    SeriesMotion,
+    ShipMotion,
+    SineMotion,
+)
+from campaign.experiments.stabilization.identified_compensations import (
+    beside_conclusions,
+    beside_rows,
+    beside_table,
+)
+from campaign.identification.place import of_next
+from campaign.identification.sampled import LOST
+from campaign.identification.stabilization_error import BLOCKS, over_trials, whole_cycles
+from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time_stuck
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.complete import pointing_high_pass
+from campaign.reason import Cause, Reason
+from campaign.recording import Recording
+from campaign.result import Cell, Column, Finding, Result, Table, Value
+from campaign.signals import Sine
+from campaign.trial import Offered, Task, Trial, TrialRequest
+from campaign.units import AngularAcceleration, Frequency
+
+SAMPLES_PER_CYCLE = 10
+"""of the base motion, at least: the standard deviation needs the shape of the error."""
+LARGEST = "largest_error"
+OF_A_RECORD = Cause(
+    "largest of its record", "the largest of its record: a longer one holds a larger"
+)
+SPREAD = Cause(
+    "spread of the trials", "the standard deviation of the trials about the error before it"
+)
+STUCK = "time_stuck"
+SHOW_STUCK = (BASE_RATE, RELATIVE_ANGLE, GYRO_RATE)
+"""Channels of the rate of the hull and of what resolves the rate relative to it."""
+
+
+class StabilizationOptions(Options):
+    """Options of a stabilization test."""
+
+    motion: Motion = SineMotion()
+    """How the hull moves; frequency, acceleration and cycles are those of a sine."""
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the base motion."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
+    """Amplitude of the base's angular acceleration."""
+    compensation: str = "none"
+    """Compensation method, by its name on the bench; none for none."""
+    cycles: int = Field(default=6, ge=1, le=10_000)
+    """Whole cycles of the base motion that are measured."""
+    settle_cycles: int = Field(default=2, ge=0, le=1_000)
+    """Cycles before them, for the transient to pass."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+    def without_effect(self) -> frozenset[str]:
+        return frozenset(() if isinstance(self.motion, SineMotion) else OF_A_SINE)
+
+
+OF_A_SINE = ("frequency", "acceleration", "cycles", "settle_cycles")
+
+
+def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialRequest]:
+    if not isinstance(options.motion, SineMotion):
+        yield _irregular(options, options.motion)
+        return
+    if options.sample_rate < SAMPLES_PER_CYCLE * options.frequency:
+        raise ValueError(
+            f"a recording at {options.sample_rate:.4g} Hz shows fewer than {SAMPLES_PER_CYCLE} "
+            f"samples per cycle of a {options.frequency:.4g} Hz motion; raise sample_rate"
+        )
+    start = options.settle_cycles / options.frequency
+    stop = start + options.cycles / options.frequency
+    task = Task(
+        mode="rate",
+        base_acceleration=Sine(amplitude=options.acceleration, frequency=options.frequency),
+        compensation=options.compensation,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=options.sample_rate,
+    )
+    note = f"{options.cycles} cycles measured after {options.settle_cycles} to settle"
+    yield TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
+
+
+def _found(options: StabilizationOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The swinging hull of a recording that nobody planned."""
+    request = hull_sine(offered, MEASURED, options.settle_cycles)
+    compensated = request.task.model_copy(update={"compensation": options.compensation})
+    yield replace(
+        request, task=compensated, can_use=_can_use(options), windows=windows_of(compensated)
+    )
+
+
+def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion) -> TrialRequest:
+    """The trial of a motion that is no sine: all of it is measured once it has settled."""
+    given = [name for name in OF_A_SINE if name in options.model_fields_set]
+    if given:
+        raise ValueError(
+            f"{', '.join(given)}: for a sinusoidal motion only, and this one is of kind "
+            f"'{motion.kind}'; remove one or the other"
+        )
+    signal, start, stop = motion.signal()
+    task = Task(
+        mode="rate",
+        base_acceleration=signal,
+        compensation=options.compensation,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=options.sample_rate,
+    )
+    note = f"{stop - start:.4g} s measured after {start:.4g} s to settle"
+    return TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
+
+
+def _can_use(options: StabilizationOptions) -> tuple[str, ...]:
+    """Channels of its figures; those of what a compensation adds where there is one."""
+    rates = (BASE_RATE, RELATIVE_RATE, RELATIVE_ANGLE, GYRO_RATE)
+    if options.compensation == "none":
+        return rates
+    return (*rates, COMPENSATION_TORQUE, FRICTION_TORQUE)
+
+
+def _measure(data: TrialData) -> list[Estimate]:
+    """Error (rad, 1 sigma), largest deviation from the mean (rad), time stuck of one trial."""
+    recording = measured_part(data)
+    if len(recording.time) < 2:
+        raise ValueError("nothing was recorded in the window that is measured")
+    peak = largest_of(recording[POINTING_ERROR])
+    largest = Estimate.without_interval(LARGEST, peak, "rad", OF_A_RECORD(), kind="quantile")
+    error = error_of(recording, data.trial.task)
+    return found([error, largest, *_time_stuck(recording, data.trial)])
+
+
+def _time_stuck(recording: Recording, trial: Trial) -> Iterator[Estimate]:
+    """Share of the time that the load moves with the hull, where its channels were recorded."""
+    if missing(SHOW_STUCK, recording.channels):
+        return
+    signal, rate = trial.task.base_acceleration, rate_of(recording)
+    cycles = (
+        whole_cycles(len(recording.time), rate / signal.frequency)
+        if isinstance(signal, Sine)
+        else 0
+    )
+    parts = 2 * cycles if cycles else BLOCKS
+    base, angle, gyro = (recording[name] for name in SHOW_STUCK)
+    yield time_stuck(base, angle, gyro, 1.0 / rate, parts)
+
+
+def _told(data: TrialData, columns: Sequence[str]) -> dict[str, Value]:
+    """Conditions of the trial; an irregular motion has its kind, not a sine's numbers."""
+    motion = data.trial.options.get("motion")
+    kind = motion.get("kind", "sine") if isinstance(motion, Mapping) else "sine"
+    if kind == "sine":
+        return conditions(data, *columns)
+    told = conditions(data, "compensation")
+    return {**told, "motion": str(kind)}
+
+
+def _analyse(data: TestData) -> Result:
+    groups = grouped(data.completed())
+    paths = swept(data)
+    columns = ("compensation", "frequency", "acceleration")
+    findings: list[Finding] = []
+    rows: list[dict[str, Cell]] = []
+    for group in groups.values():
+        told = _told(group[0], columns) | preload_of(group[0])
+        row = _row(group)
+        told_of = (row["error"], row.get("next"))
+        findings += [Finding.of(cell, told) for cell in told_of if isinstance(cell, Estimate)]
+        rows.append({**told, **row})
+    firsts = [group[0] for group in groups.values()]
+    high_pass = pointing_high_pass(bench_of(firsts[0].trial)) if firsts else 0.0
+    errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
+    findings += compared(errors)
+    figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
+    ended = [
+        (_told(item, columns) | preload_of(item), str(item.ending.outcome))
+        for item in data.trials
+        if item.ending.outcome != "completed" and item.trial.role == "measurement"
+    ]
+    extra = [path for path in paths if path not in columns]
+    tables = [_table(rows, extra, _seen_through(high_pass))]
+    beside = beside_rows(rows)
+    if beside:
+        tables.insert(0, beside_table(beside, extra))  # what such a test is about
+    return Result(
+        tuple(tables),
+        tuple(figures),
+        tuple(findings),
+        failures_note(data),
+        (
+            *stabilization_conclusions(
+                findings, Settings.of(data, StabilizationOptions), ended, high_pass
+            ),
+            *beside_conclusions(beside),
+        ),
+        telling=next((f.key for f in figures if "error" in f.key), ""),
+    )
+
+
+def _row(group: Sequence[TrialData]) -> dict[str, Cell]:
+    """What the repetitions of one place say, one of them or more."""
+    errors = of_each(group, _measure, "stabilization_error")
+    peaks = of_each(group, _measure, LARGEST)
+    stuck = over_recordings(of_each(group, _measure, STUCK))
+    shown = any(not missing(SHOW_STUCK, data.channel_names()) for data in group)
+    row: dict[str, Cell] = {
+        "error": over_trials(errors) if errors else _nothing("stabilization_error", LOST()),
+        "peak": over_trials(peaks) if peaks else _nothing(LARGEST, LOST()),
+        "stuck": stuck or (_nothing(STUCK, UNRESOLVED()) if shown else None),
+        "repeats": len(group),
+    }
+    if len(errors) > 1:
+        values = [error.value for error in errors]
+        row["spread"] = float(np.std(values, ddof=1))
+        row["next"] = of_next("stabilization_error_of_one_trial", values, "rad")
+    return row
+
+
+def _nothing(name: str, reason: Reason) -> Estimate:
+    return Estimate.without_interval(name, math.nan, "", reason)
+
+
+def _table(rows: Sequence[Mapping[str, Cell]], extra: Sequence[str], remark: str) -> Table:
+    irregular = any("motion" in row for row in rows)
+    sines = any("frequency" in row for row in rows)
+    columns = [Column("compensation", "Compensation")]
+    if irregular:
+        columns.append(Column("motion", "Motion"))
+    if sines:
+        columns += [
+            Column("frequency", "Frequency", "Hz", "Hz", exact=True),
+            Column("acceleration", "Base acceleration", "rad/s^2", "deg/s^2", exact=True),
+        ]
+    columns += [
+        *(Column(path, path, exact=True) for path in extra),
+        Column("error", "Error (1σ)", "rad", "mrad"),
+        Column("peak", "Largest error", "rad", "mrad"),
+    ]
+    if any(row["stuck"] is not None for row in rows):
+        columns.append(Column("stuck", "Time stuck", "", "percent"))
+    if any(row["repeats"] != 1 for row in rows):
+        columns += [
+            Column("repeats", "Repeats", exact=True),
+            Column("spread", "Spread (1σ)", "rad", "mrad", reason=SPREAD()),
+            Column("next", "One more trial", "rad", "mrad"),
+        ]
+    return Table(
+        key="stabilization-error",
+        title="Stabilization error by compensation method",
+        columns=tuple(columns),
+        rows=tuple(rows),
+        thesis=("5.2", "5.8", "5.4", "5.10", "5.5", "5.11", "5.6", "5.12", "5.7", "5.13"),
+        note="The error is the standard deviation of the integrated gyro rate over "
+        + ("the measured time." if irregular else "whole cycles.")
+        + remark,
+    )
+
+
+def _seen_through(corner: float) -> str:
+    """A sentence when the bench sees its position error through a high-pass (Hz)."""
+    return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""
+
+
+EXPERIMENT = Experiment(
+    name="stabilization",
+    summary="stabilization error under base motion, by compensation (Tables 5.2 and 5.8)",
+    options=StabilizationOptions,
+    trials=_trials,
+    analyse=_analyse,
+    fit=fitting.base_motion,
+    recorded=_found,
+    windows=(MEASURED,),
+    measure=_measure,
+    requires={POINTING_ERROR: "the stabilization error"},
+    can_use={
+        BASE_RATE: "time stuck, and no figure of the relative rate",
+        RELATIVE_RATE: "figure of the relative rate",
+        RELATIVE_ANGLE: "time stuck",
+        GYRO_RATE: "time stuck",
+        COMPENSATION_TORQUE: "figure of what the compensation adds",
+        FRICTION_TORQUE: "true friction beside the compensation torque",
+    },
+)

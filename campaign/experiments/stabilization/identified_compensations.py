@@ -1,0 +1,95 @@
+"""Compensations with identified values beside those they are the twins of, at each place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from campaign.estimate import Estimate
+from campaign.experiments.shared.common import METHOD_LABELS
+from campaign.experiments.shared.conclusion_parts import (
+    conclusion,
+    determined,
+    held_at_once,
+    shown_by,
+)
+from campaign.identification.stabilization_error import quotient
+from campaign.physics.compensation.identified import stated_name
+from campaign.result import Cell, Column, Conclusion, Factor, Table
+
+Row = Mapping[str, Cell]
+RATIO = "ratio"
+ERROR = "stabilization_error"
+OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
+"""What of a row of errors is not the place it is of."""
+PRELOAD_PATH = "bench.gear.preload.torque"
+"""Said already by the average friction."""
+
+
+def beside_rows(rows: Sequence[Row]) -> tuple[Row, ...]:
+    """One for each twin at each place where what it is the twin of was tried, too."""
+    return tuple(_pairs(rows))
+
+
+def _pairs(rows: Sequence[Row]) -> Iterator[Row]:
+    for row in rows:
+        stated = stated_name(str(row["compensation"]))
+        other = next((o for o in rows if o["compensation"] == stated and _at(o) == _at(row)), None)
+        error, before = row["error"], None if other is None else other["error"]
+        if not isinstance(error, Estimate) or not isinstance(before, Estimate):
+            continue
+        if not determined(error) or not determined(before):
+            continue
+        ratio = shown_by(quotient(RATIO, error, before))
+        yield {
+            "compensation": stated,
+            **_at(row),
+            "stated": before,
+            "identified": error,
+            RATIO: ratio,
+        }
+
+
+def _at(row: Row) -> dict[str, Cell]:
+    return {name: value for name, value in row.items() if name not in OWN}
+
+
+def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
+    """Of `beside_rows`; extra: paths that the test sweeps besides those which have columns."""
+    columns = [Column("compensation", "Compensation")]
+    if any("frequency" in row for row in rows):
+        columns.append(Column("frequency", "Frequency", "Hz", "Hz", exact=True))
+    if len({row.get("average_friction") for row in rows}) > 1:
+        columns.append(Column("average_friction", "Preload", "N m", "N m", exact=True))
+    columns += [Column(p, p, exact=True) for p in extra if p != PRELOAD_PATH]
+    columns += [
+        Column("stated", "Error (1σ), as stated", "rad", "mrad", quantity=ERROR),
+        Column("identified", "Error (1σ), as identified", "rad", "mrad"),
+        Column(RATIO, "Identified over stated"),
+    ]
+    return Table(
+        "identified-beside-stated",
+        "Compensations with identified values beside those they replace",
+        tuple(columns),
+        tuple(rows),
+        note="Both have the same gain. A ratio below 1: what was identified leaves less.",
+    )
+
+
+def beside_conclusions(rows: Sequence[Row]) -> Iterator[Conclusion]:
+    """Of each method, what its identified values change: of several places best and worst."""
+    for name in dict.fromkeys(str(row["compensation"]) for row in rows):
+        ratios = [r[RATIO] for r in rows if r["compensation"] == name]
+        known = [each for each in ratios if isinstance(each, Estimate) and each.has_interval]
+        if not known:
+            continue
+        known.sort(key=lambda each: each.value)
+        ends = [
+            Factor(held_at_once(each, len(known)), above="more", below="less")
+            for each in (known[0], known[-1])
+        ]
+        start = f"error with the {METHOD_LABELS.get(name, name)}, with identified values against "
+        if len(known) == 1:
+            yield conclusion(f"{start}the stated: ", ends[0])
+        else:
+            where = f"the stated, over {len(known)} places: at best "
+            yield conclusion(f"{start}{where}", ends[0], "; at worst ", ends[1])

@@ -1,0 +1,302 @@
+"""Step response of the rate loop, as a rule without friction: how it was tuned (section 4.2.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field, ValidationError, field_validator
+
+from campaign.channels import COMMAND, GYRO_RATE
+from campaign.estimate import Estimate, Window
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.shared import fitting
+from campaign.experiments.shared.common import (
+    conditions,
+    failures_note,
+    grouped,
+    method_label,
+    swept,
+)
+from campaign.experiments.shared.conclusion_parts import Settings
+from campaign.experiments.shared.found_trials import step_found
+from campaign.experiments.shared.swept_words import words as swept_words
+from campaign.experiments.step_response.conclusions import step_conclusions
+from campaign.experiments.step_response.results import Step, step_figure, step_table
+from campaign.identification.intervals import of_repeats
+from campaign.identification.rise_time import rise_interval
+from campaign.identification.sampled import where_it_scatters
+from campaign.identification.step_response import (
+    NOT_SETTLED,
+    StepCharacteristics,
+    step_characteristics,
+)
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.reason import Cause
+from campaign.recording import Recording
+from campaign.result import Finding, Result
+from campaign.signals import Polyline
+from campaign.trial import Offered, Task, Tree, Trial, TrialRequest
+from campaign.units import Angle, AngularRate, Frequency, Time
+
+LEAST_REST = 0.01
+"""s of standstill before a step."""
+
+
+class StepResponseOptions(Options):
+    """Options of a step response test."""
+
+    step: AngularRate = float(np.deg2rad(1.0))
+    """Height of the step of the rate command; negative: downwards, or to the negative side."""
+    ramp: Time = Field(default=0.005, ge=0)
+    """How long the command takes to rise: a jump would break any limit of acceleration, so 0 is
+    for recordings only."""
+    linear: bool = True
+    """Without the bench's friction, as the loop was tuned; false: as it is. Friction can be taken
+    away from a simulated bench only."""
+    compensation: str = "none"
+    """Compensation method, by its name on the bench; none for none."""
+    rest: Time = Field(default=0.1, ge=LEAST_REST)
+    """Standstill before the step."""
+    duration: Time = Field(default=1.0, gt=0)
+    """From the start of the step to the end of the trial."""
+    band: float = Field(default=0.02, gt=0, lt=0.5)
+    """The response has settled once it stays this close, as a share of the step."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+    position: Angle = 0.0
+    """Angle of the load relative to the hull at the start."""
+
+    @field_validator("step")
+    @classmethod
+    def _is_one(cls, step: float) -> float:
+        if step == 0.0:
+            raise ValueError("a step of zero is none")
+        return step
+
+
+def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest]:
+    if options.ramp == 0.0:
+        raise ValueError("a jump of the command breaks any limit of acceleration; give it a ramp")
+    if options.ramp > 0.1 * options.duration:
+        raise ValueError("a ramp of over a tenth of the duration is no step; shorten ramp")
+    stop = options.rest + options.duration
+    yield TrialRequest(
+        Task(
+            mode="rate",
+            command=Polyline(
+                times=(0.0, options.rest, options.rest + options.ramp),
+                values=(0.0, 0.0, options.step),
+            ),
+            compensation=options.compensation,
+            duration=stop,
+            window=(options.rest, stop),
+            sample_rate=options.sample_rate,
+            start_angle=options.position,
+        ),
+        bench=_without_friction(bench) if options.linear else None,
+        note="without the bench's friction" if options.linear else "",
+        windows=tuple(_windows(options)),
+    )
+
+
+REST, ANSWER = "rest", "answer"
+"""Windows: standstill before the step, and all that follows it."""
+
+
+def _windows(options: StepResponseOptions) -> Iterator[Window]:
+    """For the plan, and for archived trials that are older than windows."""
+    yield Window(REST, 0.0, options.rest)
+    yield Window(ANSWER, options.rest, options.rest + options.duration)
+
+
+def _found(options: StepResponseOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+    """The step of a recording that nobody planned."""
+    request = step_found(offered, (REST, ANSWER))
+    if float(str(request.options["rest"])) < LEAST_REST:
+        raise ValueError(
+            f"{COMMAND}: its step comes within {1e3 * LEAST_REST:g} ms of its begin; "
+            "the standstill before it is needed too"
+        )
+    yield request
+
+
+def _answer(trial: Trial) -> Window:
+    """The window that all follows in: the one named so, or else from the step on."""
+    options = _options(trial)
+    named = [window for window in trial.windows if window.name == ANSWER]
+    return (named or [each for each in _windows(options) if each.name == ANSWER])[0]
+
+
+def _options(trial: Trial) -> StepResponseOptions:
+    """Of a trial. Raises ValueError, in words for a reader, where they are none of such a test."""
+    try:
+        return StepResponseOptions.model_validate(trial.options, context={"si": True})
+    except ValidationError as error:
+        wrong = ", ".join(str(each["loc"][0]) for each in error.errors() if each["loc"])
+        raise ValueError(f"these options fit no step response: {wrong}") from None
+
+
+def _characteristics(
+    trial: Trial, recording: Recording
+) -> tuple[StepCharacteristics, Estimate | None]:
+    """What a step says, and its rise time with the interval that its noise leaves, if any."""
+    options, start = _options(trial), _answer(trial).start
+    rate = recording[GYRO_RATE]
+    found = step_characteristics(recording.time, rate, start, options.step, options.band)
+    if not math.isfinite(found.rise_time):
+        return found, None
+    told = rise_interval(recording.time, rate, start, options.step, found)
+    if told is None:
+        return found, None
+    rise, rise_from = told
+    reasons = found.reasons | ({} if math.isfinite(rise.value) else {"rise_time": rise.reason})
+    found = replace(found, rise_time=rise.value, rise_from=rise_from, reasons=reasons)
+    return found, rise
+
+
+def _measure(data: TrialData) -> Sequence[Estimate]:
+    """Rise, settling, overshoot and what error stays; without those that were not seen."""
+    found, rise = _characteristics(data.trial, data.recording())
+    values = ((name, float(getattr(found, name)), unit) for name, unit in QUANTITIES)
+    return tuple(
+        rise
+        if rise is not None and name == rise.name
+        else Estimate(name, value, unit, reason=ONE_STEP())
+        for name, value, unit in values
+        if math.isfinite(value)
+    )
+
+
+ONE_STEP = Cause("of one step", "it is of one step: repeats would show how it scatters")
+NOT_SEEN = Cause("not seen in every step", "not every step was seen to do that")
+
+
+def _without_friction(bench: Bench) -> Tree:
+    tree: Tree = bench.model_copy(update={"friction": {}}).model_dump(mode="json")
+    return tree
+
+
+def _evaluate(data: TrialData, paths: list[str]) -> Step:
+    options = _options(data.trial)
+    recording: Recording = data.recording()  # for the figure, and for why there is no number
+    again, _ = _characteristics(data.trial, recording)
+    found = dict(metrics(data, _measure))
+    for name, unit in QUANTITIES:
+        if name not in found:
+            reason = again.reasons.get(name, NOT_SEEN())
+            found[name] = Estimate.without_interval(name, math.nan, unit, reason)
+    rate, start = recording[GYRO_RATE], _answer(data.trial).start
+    before = rate[(recording.time < start) & np.isfinite(rate)]
+    place = conditions(data, "compensation", "linear")
+    words = ["linear loop" if options.linear else "with friction"]
+    if options.compensation != "none" or "compensation" in paths:
+        words.append(method_label(options.compensation))
+    others = {path: place.get(path) for path in paths if path not in ("compensation", "linear")}
+    label = ", ".join([*words, *swept_words(others, data.trial, StepResponseOptions)])
+    plain = options.linear and options.compensation == "none"
+    return Step(
+        place,
+        label,
+        "measured" if plain else label,
+        recording.time - start,
+        rate,
+        recording[COMMAND] if COMMAND in recording.channels else None,
+        float(np.mean(before)) if before.size else 0.0,
+        options,
+        again.rise_from - start,
+        found,
+    )
+
+
+QUANTITIES = (
+    ("rise_time", "s"),
+    ("settling_time", "s"),
+    ("steady_state_error", "rad/s"),
+    ("overshoot", ""),
+)
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    paths = list(swept(data))
+    steps: list[Step] = []
+    findings: list[Finding] = []
+    for group in grouped(data.completed()).values():
+        try:
+            repeats = [_evaluate(item, paths) for item in group]
+        except ValueError as error:
+            notes.append(f"{group[0].trial.label}: {error}.")
+            continue
+        steps += repeats
+        findings += (
+            Finding.of(_together(repeats, name, unit), repeats[0].place)
+            for name, unit in QUANTITIES
+        )
+    if not steps:
+        return Result(notes=tuple(notes))
+    notes += [note for step in steps for note in _notes(step)]
+    tables = (
+        step_table(steps, [path for path in paths if path not in ("linear", "compensation")]),
+    )
+    options, settings = steps[0].options, Settings.of(data, StepResponseOptions)
+    return Result(
+        tables,
+        (step_figure(steps),),
+        tuple(findings),
+        tuple(dict.fromkeys(notes)),
+        step_conclusions(findings, options.step, options.band, settings),
+    )
+
+
+def _notes(step: Step) -> Iterator[str]:
+    """What of a step has no number, and why."""
+    label = f"{step.label[0].upper()}{step.label[1:]}"
+    for name, what in UNSEEN.items():
+        reason = step.found[name].reason
+        if math.isfinite(step.value(name)):
+            continue
+        if reason in NOT_SETTLED:
+            band = f"{100 * step.options.band:g} %"
+            yield f"{label}: the rate does not stay within {band} of the step."
+        else:
+            yield f"{label}: no {what}: {reason}."
+
+
+UNSEEN = {"rise_time": "rise time", "settling_time": "settling time", "overshoot": "overshoot"}
+"""What a step may not show, in words."""
+
+
+def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
+    """Mean of a characteristic over repeated steps, with the interval of their scatter.
+
+    Of one step it is its own, with what its noise leaves open.
+    """
+    if len(repeats) == 1 and repeats[0].found[name].has_interval:
+        return repeats[0].found[name]
+    values = [step.value(name) for step in repeats]
+    if not all(map(math.isfinite, values)):
+        unseen = [step.found[name].reason for step in repeats if math.isnan(step.value(name))]
+        # Told where all read alike: their values may differ by less than a text shows.
+        why = unseen[0] if len(set(map(str, unseen))) == 1 else NOT_SEEN()
+        return Estimate.without_interval(name, math.nan, unit, why)
+    return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
+
+
+EXPERIMENT = Experiment(
+    name="step_response",
+    summary="rise, settling and steady state of the rate loop (Figure 4.7)",
+    options=StepResponseOptions,
+    trials=_trials,
+    analyse=_analyse,
+    measure=_measure,
+    fit=fitting.step_response,
+    recorded=_found,
+    windows=(REST, ANSWER),
+    perturbs_bench=True,
+    requires={GYRO_RATE: "the response"},
+    can_use={COMMAND: "command in the figure"},
+)
