@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import json
 import math
 import pkgutil
@@ -54,7 +55,9 @@ def test_the_names_read_from_sources_are_those_that_the_modules_have(package: st
     registry, attribute = ROOMS[package]
     names = []
     for each in pkgutil.iter_modules(importlib.import_module(package).__path__):
-        module = importlib.import_module(f"{package}.{each.name}")
+        inner = f"{package}.{each.name}.{attribute.lower()}"
+        has_file = each.ispkg and importlib.util.find_spec(inner) is not None
+        module = importlib.import_module(inner if has_file else f"{package}.{each.name}")
         if hasattr(module, attribute):
             names.append(getattr(module, attribute).name)
     kinds: Kinds[Any] = registry()

@@ -11,8 +11,17 @@ import pytest
 from campaign.experiments import experiments
 
 ROOM = Path(__file__).parents[2] / "campaign" / "experiments"
-KINDS = sorted(path for path in ROOM.glob("*.py") if path.stem not in ("__init__", "interface"))
-HELPERS = sorted(path for path in ROOM.glob("*/*.py"))
+FILES = sorted(path for path in ROOM.glob("*.py") if path.stem not in ("__init__", "interface"))
+KINDS = {path.stem: path for path in FILES} | {
+    path.parent.name: path for path in sorted(ROOM.glob("*/experiment.py"))
+}
+"""The file of every experiment, by the name of its file or folder."""
+INNER = sorted(ROOM.glob("*/*.py"))
+
+
+def kind_of(path: Path) -> str:
+    """The experiment that a file belongs to, or the folder of what helps."""
+    return path.stem if path.parent == ROOM else path.parent.name
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -26,17 +35,19 @@ def imported(path: Path) -> Iterator[str]:
 
 def kinds_among(names: Iterator[str]) -> set[str]:
     parts = [name.split(".") for name in names if name.startswith("campaign.experiments.")]
-    return {part[2] for part in parts} & {path.stem for path in KINDS}
+    return {part[2] for part in parts} & KINDS.keys()
 
 
 def test_every_module_of_the_room_is_an_experiment() -> None:
     assert len(KINDS) == len(list(experiments()))
-    assert [path.name for path in KINDS if "\nEXPERIMENT = " not in path.read_text("utf-8")] == []
+    assert [
+        path.name for path in KINDS.values() if "\nEXPERIMENT = " not in path.read_text("utf-8")
+    ] == []
 
 
-@pytest.mark.parametrize("path", [*KINDS, *HELPERS], ids=lambda path: path.stem)
-def test_no_module_imports_an_experiment(path: Path) -> None:
-    assert kinds_among(imported(path)) == set()
+@pytest.mark.parametrize("path", [*FILES, *INNER], ids=lambda path: f"{kind_of(path)}.{path.stem}")
+def test_no_module_imports_another_experiment(path: Path) -> None:
+    assert kinds_among(imported(path)) <= {kind_of(path)}
 
 
 def test_an_import_of_an_experiment_would_be_seen(tmp_path: Path) -> None:
