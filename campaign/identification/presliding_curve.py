@@ -51,7 +51,8 @@ def presliding_angle(torque: Array, interfaces: Sequence[Interface]) -> Array:
     angle = torque / sum(stiffness for stiffness, _ in interfaces)
     for _ in range(STEPS):
         # As `presliding_torque` and `presliding_stiffness` have it, in one pass.
-        carried, slope = 0.0, 0.0
+        carried: Array | float = 0.0
+        slope: Array | float = 0.0
         for stiffness, limit in interfaces:
             bent = -stiffness * angle / limit
             carried = carried - limit * np.expm1(bent)

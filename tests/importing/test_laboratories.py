@@ -22,8 +22,8 @@ PLACES = {
 EXCITED = {"inertia", "coulomb positive", "coulomb negative"}
 """What each of these motions asks for; viscous friction of some is small beside the others."""
 EVERY_METHOD = {"linear motor", "joint"}
-"""Identified by every method, as the docs begin; the others by the one that all of them suffice for:
-what the methods make of a motion is tried in tests/identifying."""
+"""Identified by every method, as the docs begin; the others by one that all of them suffice for, as
+what methods make of a motion is tried in tests/identifying."""
 
 
 def campaign(*words: str) -> None:

@@ -112,4 +112,4 @@ def _fitted_around(below: int, periods: int, above: int) -> tuple[NDArray[np.int
     away = away[away % periods != 0]
     away = np.sort(away[np.argsort(np.abs(away), kind="stable")[:AROUND]])
     basis = np.vander(away / AROUND, ORDER + 1, increasing=True)
-    return away, basis, np.linalg.pinv(basis)
+    return np.asarray(away, dtype=np.intp), np.asarray(basis), np.asarray(np.linalg.pinv(basis))

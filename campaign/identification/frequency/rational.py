@@ -286,13 +286,13 @@ def _refined(
     held = up + 1 + int(np.argmax(np.max(powers, axis=0) * np.abs(start[up + 1 : -1])))
     start = np.append(start[:-1] / start[held], start[-1])
     size = np.append(np.maximum(np.abs(start[:-1]), 1e-12), 1.0 / (2.0 * np.pi * scale))
-    powers = _powers(s, start[: up + 1], start[up + 1 : -1])
+    powers_of_s = _powers(s, start[: up + 1], start[up + 1 : -1])
 
     def function(scaled: Array) -> tuple[Array, Array]:
         theta = scaled * size
         model = _model(theta, s, up, scale)
         left = (model - values) / error
-        by = _log_jacobian_of(powers, s, theta[: up + 1], theta[up + 1 : -1], scale)
+        by = _log_jacobian_of(powers_of_s, s, theta[: up + 1], theta[up + 1 : -1], scale)
         by = by * (model / error)[:, None] * size
         return np.concatenate([left.real, left.imag]), np.concatenate([by.real, by.imag])
 

@@ -58,7 +58,7 @@ def _gains(
     Beyond a spring and friction: a long wave looks like these.
     """
     squares = np.zeros((len(periods), 7, 7))
-    rights, sizes, rows = np.zeros((len(periods), 7)), np.zeros(len(periods)), np.zeros(len(periods))
+    rights, (sizes, rows) = np.zeros((len(periods), 7)), np.zeros((2, len(periods)))
     for k, period in enumerate(periods.tolist()):
         own = steps * FEWEST_ROWS <= period
         if float(steps[own].sum()) < FEWEST_PERIODS * period:
@@ -85,4 +85,5 @@ def _unexplained(squares: Array, rights: Array, sizes: Array) -> Array:
     """
     least = float(np.finfo(float).eps) * squares.shape[-1]
     inverse = np.linalg.pinv(squares, rcond=least, hermitian=True)
-    return np.maximum(sizes - np.einsum("mi,mij,mj->m", rights, inverse, rights), 0.0)
+    told = np.einsum("mi,mij,mj->m", rights, inverse, rights)
+    return np.asarray(np.maximum(sizes - told, 0.0))
