@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -104,6 +104,7 @@ def function(sine: Sine) -> Function:
     return lambda t: sine.amplitude * math.sin(2 * math.pi * sine.frequency * t + sine.phase)
 
 
+@cache
 def thesis(
     compensation: str = "none", bristles: bool = False, periods: float = 3.0, low_pass: float = 0.0
 ) -> Case:
