@@ -122,47 +122,55 @@ BROKEN = {
     "1 / 0": "ZeroDivisionError: division by zero",
     "": "has no attribute 'FRICTION'",
     "FRICTION = 7": "it is 'int', no FrictionModel of this program",
-    GREASE.replace("grease_film.film", "film").replace('name="grease"', 'name="oil"'): (
+    GREASE.replace('name="grease"', 'name="oil"'): (
         "it calls itself 'oil'; both names must be the same"
     ),
-    GREASE.replace("grease_film.film", "film").replace("=GreaseOptions", "=dict"): (
-        "its options are no subclass"
-    ),
-    GREASE.replace("grease_film.film", "film").replace('Literal["grease"]', "str"): (
+    GREASE.replace("=GreaseOptions", "=dict"): "its options are no subclass",
+    GREASE.replace('Literal["grease"]', "str"): (
         "its options lack the field `model: Literal['grease']`"
     ),
 }
 
 
-@pytest.mark.parametrize("source", BROKEN)
-def test_a_broken_one_is_named_with_its_package_and_harms_no_other(
-    packages: Packages, source: str
-) -> None:
-    files = {"sticky.py": source, "film.py": FILM}
-    packages.install("sticky_pack", files, {"campaign.friction/grease": "sticky:FRICTION"}, "2.1")
-    code = """
+def test_each_broken_one_is_named_with_its_package_and_harms_no_other(packages: Packages) -> None:
+    """Side by side in one process: kinds `grease0`, `grease1` ..., each of its own package."""
+
+    def own(text: str, n: int) -> str:
+        text = text.replace("grease_film.film", f"film{n}")
+        return re.sub("""(["'])grease(["'])""", rf"\1grease{n}\2", text)
+
+    for n, source in enumerate(BROKEN):
+        files = {f"sticky{n}.py": own(source, n), f"film{n}.py": FILM}
+        entry = {f"campaign.friction/grease{n}": f"sticky{n}:FRICTION"}
+        packages.install(f"sticky_pack{n}", files, entry, "2.1")
+    code = f"""
 import json
 from campaign.errors import UsageError
 from campaign.physics.friction import friction_models
 models = friction_models()
 messages = []
 for attempt in range(2):
-    try:
-        models["grease"]
-    except UsageError as error:
-        messages.append(str(error))
+    for n in range({len(BROKEN)}):
+        try:
+            models[f"grease{{n}}"]
+        except UsageError as error:
+            messages.append(str(error))
 print(json.dumps([list(models), models["lugre"].name, messages]))
 """
-    names, works, [message, again] = said(packages, code)
-    assert names == ["coulomb", "grease", "lugre", "stribeck"]
+    names, works, messages = said(packages, code)
+    numbers = range(len(BROKEN))
+    assert names == sorted(["coulomb", "lugre", "stribeck", *(f"grease{n}" for n in numbers)])
     assert works == "lugre"
-    assert message.startswith(
-        "the friction model 'grease' of the package sticky_pack 2.1 (entry point sticky:FRICTION) "
-        "cannot be used: "
-    )
-    assert BROKEN[source] in message
-    assert "\n" not in message
-    assert again == message
+    assert len(messages) == 2 * len(BROKEN)
+    for n, (source, again) in enumerate(zip(BROKEN, messages[len(BROKEN) :], strict=True)):
+        message = messages[n]
+        assert message.startswith(
+            f"the friction model 'grease{n}' of the package sticky_pack{n} 2.1 (entry point "
+            f"sticky{n}:FRICTION) cannot be used: "
+        )
+        assert own(BROKEN[source], n) in message
+        assert "\n" not in message
+        assert again == message
 
 
 def test_a_name_of_the_program_stays_the_program_s(packages: Packages) -> None:

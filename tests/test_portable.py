@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -90,8 +91,14 @@ def _walk(node: ast.AST, function: str) -> Iterator[tuple[str, ast.AST]]:
         yield from _walk(child, inner)
 
 
-def found(file: str) -> set[tuple[str, str]]:
-    return set(uses(ast.parse((ROOT / file).read_text(encoding="utf-8"))))
+@cache
+def parsed(file: str) -> ast.Module:
+    return ast.parse((ROOT / file).read_text(encoding="utf-8"))
+
+
+@cache
+def found(file: str) -> frozenset[tuple[str, str]]:
+    return frozenset(uses(parsed(file)))
 
 
 def test_nothing_that_windows_lacks_is_used_without_saying_so() -> None:
@@ -135,7 +142,7 @@ def test_text_files_are_opened_with_their_encoding() -> None:
     loose = [
         f"{file}:{node.lineno}"
         for file in OURS
-        for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(file))
         if isinstance(node, ast.Call) and _opens_text(node)
     ]
     assert not loose

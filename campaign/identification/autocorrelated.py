@@ -53,9 +53,9 @@ def errors_of(jacobian: Array, residuals: Array) -> FitErrors:
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0):
         raise ValueError("a parameter of the fit changes nothing")
-    tried = [_whitened_fit(jacobian / scale, residuals, float(each)) for each in COEFFICIENTS]
-    best = int(np.argmax([likelihood for likelihood, _, _ in tried]))
-    _, triangle, variance = tried[best]
+    best = int(np.argmax(_likelihoods(jacobian / scale, residuals, COEFFICIENTS)[0]))
+    _, triangles, variances = _likelihoods(jacobian / scale, residuals, COEFFICIENTS[[best]])
+    triangle, variance = triangles[0], float(variances[0])
     if np.linalg.cond(triangle) > 1e8:
         raise ValueError("the parameters of the fit cannot be told apart")
     inverse = np.linalg.inv(triangle) / scale[:, None]
@@ -83,18 +83,27 @@ def whitened(values: Array, coefficient: float) -> Array:
     return np.concatenate([first, values[1:] - coefficient * values[:-1]])
 
 
-def _whitened_fit(
-    design: Array, residuals: Array, coefficient: float
-) -> tuple[float, Array, float]:
-    """Restricted log likelihood of an AR(1) coefficient, triangle of the whitened design (k, k),
-    and variance of the innovations.
+def _likelihoods(
+    design: Array, residuals: Array, coefficients: Array
+) -> tuple[Array, Array, Array]:
+    """Restricted log likelihoods of m AR(1) coefficients, shape (m,), triangles of the whitened
+    design (m, k, k), and variances of the innovations (m,).
     """
-    orthogonal, triangle = np.linalg.qr(whitened(design, coefficient))
-    left = whitened(residuals, coefficient)
-    left = left - orthogonal @ (orthogonal.T @ left)
+    first = np.sqrt(1.0 - coefficients**2)
+    columns = np.ascontiguousarray(design.T)
+    inner = np.empty((len(coefficients), *columns.shape))
+    inner[:, :, 0] = first[:, None] * columns[:, 0]
+    inner[:, :, 1:] = columns[:, 1:] - coefficients[:, None, None] * columns[:, :-1]
+    left = np.empty((len(coefficients), len(residuals)))
+    left[:, 0] = first * residuals[0]
+    left[:, 1:] = residuals[1:] - coefficients[:, None] * residuals[:-1]
+    orthogonal, triangle = np.linalg.qr(inner.transpose(0, 2, 1))
+    share = np.matmul(left[:, None, :], orthogonal)[:, 0, :, None]
+    left -= np.matmul(orthogonal, share)[:, :, 0]
     freedom = len(residuals) - design.shape[1]
     tiny = float(np.finfo(float).tiny)
-    variance = max(float(left @ left) / freedom, tiny)
-    determinant = 2.0 * float(np.sum(np.log(np.maximum(np.abs(np.diag(triangle)), tiny))))
-    likelihood = -0.5 * (freedom * np.log(variance) - np.log(1.0 - coefficient**2) + determinant)
-    return float(likelihood), triangle, variance
+    variance = np.maximum(np.einsum("mn,mn->m", left, left) / freedom, tiny)
+    diagonal = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+    determinant = 2.0 * np.sum(np.log(np.maximum(diagonal, tiny)), axis=1)
+    likelihood = -0.5 * (freedom * np.log(variance) - np.log(1.0 - coefficients**2) + determinant)
+    return likelihood, triangle, variance

@@ -131,11 +131,12 @@ def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None
     data = ramp.rate[used] / scale
     bias = float(np.mean(data[: ramp.resting])) if ramp.resting else 0.0
     lower, upper = np.array([*start.lower, -np.inf]), np.array([*start.upper, np.inf])
+    bent = _Bent(ramp)
     solutions = [
         least_squares(
-            lambda vector: _rates(ramp, vector)[used] / scale + vector[-1] - data,
+            lambda vector: bent.rates(vector)[used] / scale + vector[-1] - data,
             np.clip([*vector, bias], lower + 1e-9, upper - 1e-9),
-            jac=lambda vector: _derivatives(ramp, vector, scale)[used] / scale,
+            jac=lambda vector: bent.derivatives(vector, scale)[used] / scale,
             bounds=(lower, upper),
             x_scale="jac",
             max_nfev=EVALUATIONS,
@@ -177,19 +178,32 @@ def _interfaces(vector: Array) -> tuple[Interface, ...]:
     )
 
 
-def _rates(ramp: Ramp, vector: Array) -> Array:
-    """Mean rate of every bin without bias (rad/s), shape (n,)."""
-    angle = presliding_angle(ramp.torque, _interfaces(vector))
-    return np.diff(angle) / np.diff(ramp.edges)
+class _Bent:
+    """Rates of a ramp's bins and their derivatives; the angles of the last vector are kept."""
 
+    def __init__(self, ramp: Ramp) -> None:
+        self._ramp = ramp
+        self._width = np.diff(ramp.edges)
+        self._last: tuple[bytes, Array] = (b"", np.empty(0))
 
-def _derivatives(ramp: Ramp, vector: Array, scale: float) -> Array:
-    """Of the rates by the parameters, shape (n, k)."""
-    parts = _interfaces(vector)
-    angle = presliding_angle(ramp.torque, parts)
-    slopes = np.diff(angle_derivatives(angle, parts), axis=0) / np.diff(ramp.edges)[:, None]
-    columns = [slopes[:, 0] * parts[0].stiffness, slopes[:, 1] * float(np.exp(vector[1]))]
-    if len(parts) > 1:  # what the second carries, the first does not
-        of_torque = (slopes[:, 3] - slopes[:, 1]) * parts[1].torque
-        columns += [slopes[:, 2] * parts[1].stiffness, of_torque]
-    return np.stack([*columns, np.full(len(slopes), scale)], axis=1)
+    def _angle(self, vector: Array) -> Array:
+        """A search asks for the rates and then for their derivatives."""
+        key = vector.tobytes()
+        if self._last[0] != key:
+            self._last = key, presliding_angle(self._ramp.torque, _interfaces(vector))
+        return self._last[1]
+
+    def rates(self, vector: Array) -> Array:
+        """Mean rate of every bin without bias (rad/s), shape (n,)."""
+        return np.asarray(np.diff(self._angle(vector)) / self._width)
+
+    def derivatives(self, vector: Array, scale: float) -> Array:
+        """Of the rates by the parameters, shape (n, k)."""
+        parts = _interfaces(vector)
+        slopes = np.diff(angle_derivatives(self._angle(vector), parts), axis=0)
+        slopes /= self._width[:, None]
+        columns = [slopes[:, 0] * parts[0].stiffness, slopes[:, 1] * float(np.exp(vector[1]))]
+        if len(parts) > 1:  # what the second carries, the first does not
+            of_torque = (slopes[:, 3] - slopes[:, 1]) * parts[1].torque
+            columns += [slopes[:, 2] * parts[1].stiffness, of_torque]
+        return np.stack([*columns, np.full(len(slopes), scale)], axis=1)

@@ -19,6 +19,8 @@ from campaign.identification.unknowns import shares_of
 
 from .laboratory import FREQUENCIES, INERTIA, PROTOCOL, VISCOUS, error, problem, table, write
 
+ONE_START = PROTOCOL.replace("starts = 2", "starts = 1")
+
 
 def run(path: Path, workers: int = 1, leave_out: bool = False) -> CalibrationOutcome:
     return calibrate(
@@ -57,7 +59,7 @@ def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
 
 def test_disagreeing_cells_widen_the_intervals_and_spoil_predictions(tmp_path: Path) -> None:
     scale = (1.1, 0.9, 1.1, 0.9)
-    outcome = run(write(tmp_path, published=table(scale)), leave_out=True)
+    outcome = run(write(tmp_path, ONE_START, published=table(scale)), leave_out=True)
     assert outcome.uncertainty is not None
     assert outcome.uncertainty.scatter > 2
     result = tomllib.loads(result_text(outcome, "b.toml"))
@@ -80,7 +82,7 @@ path = "compensation.static.gain"
 lower = 0.1
 upper = 1.0
 """
-    path = write(tmp_path, PROTOCOL.replace("starts = 2", "starts = 1") + idle)
+    path = write(tmp_path, ONE_START + idle)
     result = tomllib.loads(result_text(run(path), "b.toml"))
     by_name = {entry["name"]: entry for entry in result["parameter"]}
     assert not by_name["idle"]["identified"]
@@ -92,7 +94,7 @@ upper = 1.0
 
 
 def test_names_a_parameter_at_its_bound(tmp_path: Path) -> None:
-    narrow = PROTOCOL.replace('lower = "20 kg m^2"', 'lower = "45 kg m^2"')
+    narrow = ONE_START.replace('lower = "20 kg m^2"', 'lower = "45 kg m^2"')
     outcome = run(write(tmp_path, narrow))
     result = tomllib.loads(result_text(outcome, "b.toml"))
     inertia, viscous = result["parameter"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,20 @@ import pytest
 
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.comparing import comparison
 from campaign.experiments import experiments
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
 from campaign.protocol import load_protocol, make_plan
 from campaign.resources import protocols_folder
+from tests.analysed_once import analysed_once
+
+
+@pytest.fixture(autouse=True, scope="package")
+def analyses() -> Iterator[None]:
+    """The same runs are compared by many tests."""
+    with analysed_once(comparison):
+        yield
 
 
 @pytest.fixture(scope="session")

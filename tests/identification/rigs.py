@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,26 +55,19 @@ def random_rigs(
     travel = np.ptp(wanted, axis=0)
     count_size = travel * 10 ** draw.uniform(-6.5, -5 if stribeck else -4, count)
     shaking = forward * 10 ** draw.uniform(-2, -1, count)
-    angle, rate, seen_rate, before = (np.zeros(count) for _ in range(4))
-    seen, force = np.empty((samples, count)), np.empty((samples, count))
-    step, rigs = 1.0 / (RATE * FINE), np.arange(count)
-    for k in range(samples):
-        encoder = np.round(angle / count_size) * count_size
-        seen_rate = seen_rate + 0.2 * ((encoder - before) * RATE - seen_rate)
-        before = encoder
-        force[k] = stiff * (wanted[k] - encoder) + damped * (wanted_rate[k] - seen_rate)
-        seen[k] = encoder
-        acting = force[np.maximum(k - late, 0), rigs] + shaking * draw.standard_normal(count)
-        for _ in range(FINE):
-            fall = 1.0 + (ratio - 1.0) * np.exp(-((rate / slow) ** 2))
-            sliding = np.where(
-                rate > 0, forward * fall + viscous * rate, -backward * fall + viscous_back * rate
-            )
-            up, down = forward * ratio, backward * ratio
-            freed = np.where(acting > up, acting - up, np.where(acting < -down, acting + down, 0.0))
-            new = rate + step * np.where(rate == 0.0, freed, acting - sliding) / inertia
-            new = np.where(rate * new < 0.0, 0.0, new)
-            angle, rate = angle + 0.5 * step * (rate + new), new
+    seen, force = _run(
+        wanted,
+        wanted_rate,
+        stiff,
+        damped,
+        count_size,
+        shaking[:, None] * draw.standard_normal((samples, count)).T,
+        late,
+        inertia,
+        ratio,
+        slow,
+        np.stack([forward, viscous, backward, viscous_back], axis=1),
+    )
     return [
         Rig(
             {
@@ -87,12 +81,64 @@ def random_rigs(
                 "delay": (float(late[i]) + 0.5) / RATE,  # half a sample: the force is held
             },
             time,
-            seen[:, i],
-            force[:, i],
+            seen[i],
+            force[i],
             wanted[:, i],
         )
         for i in range(count)
     ]
+
+
+@numba.njit(error_model="numpy")
+def _run(
+    wanted: Array,
+    wanted_rate: Array,
+    stiff: Array,
+    damped: Array,
+    count_size: Array,
+    shaking: Array,
+    late: Array,
+    inertia: Array,
+    ratio: Array,
+    slow: Array,
+    friction: Array,
+) -> tuple[Array, Array]:
+    """Angle that the encoder shows and force that is recorded, (rigs, n) each.
+
+    `friction`: Coulomb and viscous of both directions, shape (rigs, 4); the others of each rig.
+    """
+    samples, count = wanted.shape
+    seen, force = np.empty((count, samples)), np.empty((count, samples))
+    step = 1.0 / (RATE * FINE)
+    for rig in range(count):
+        angle, rate, seen_rate, before = 0.0, 0.0, 0.0, 0.0
+        forward, viscous, backward, viscous_back = friction[rig]
+        up, down = forward * ratio[rig], backward * ratio[rig]
+        for k in range(samples):
+            encoder = np.rint(angle / count_size[rig]) * count_size[rig]
+            seen_rate = seen_rate + 0.2 * ((encoder - before) * RATE - seen_rate)
+            before = encoder
+            force[rig, k] = stiff[rig] * (wanted[k, rig] - encoder) + damped[rig] * (
+                wanted_rate[k, rig] - seen_rate
+            )
+            seen[rig, k] = encoder
+            acting = force[rig, max(k - late[rig], 0)] + shaking[rig, k]
+            for _ in range(FINE):
+                if rate == 0.0:
+                    left = acting - up if acting > up else min(acting + down, 0.0)
+                else:
+                    fall = 1.0
+                    if ratio[rig] != 1.0:
+                        fall += (ratio[rig] - 1.0) * np.exp(-((rate / slow[rig]) ** 2))
+                    if rate > 0.0:
+                        left = acting - (forward * fall + viscous * rate)
+                    else:
+                        left = acting - (viscous_back * rate - backward * fall)
+                new = rate + step * left / inertia[rig]
+                if rate * new < 0.0:
+                    new = 0.0
+                angle, rate = angle + 0.5 * step * (rate + new), new
+    return seen, force
 
 
 def _wanted(draw: np.random.Generator, time: Array, fastest: Array) -> tuple[Array, Array]:

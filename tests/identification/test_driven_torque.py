@@ -114,7 +114,7 @@ def test_a_clean_torque_is_taken_as_it_was_measured() -> None:
         assert doubt.shape == (COUNT, 0)
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [3, pytest.param(40, marks=pytest.mark.statistics)])
 def test_a_torque_with_little_noise_is_regressed_where_the_rate_has_less(count: int) -> None:
     held = []
     for seed in range(count):

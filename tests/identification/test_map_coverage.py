@@ -291,7 +291,7 @@ def held_at_a_bound(count: int, seed: int) -> dict[str, list[bool]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.statistics)])
 def test_a_parameter_at_its_bound_is_not_known_to_the_others(count: int) -> None:
     """Tc held in 49 % of the maps with the viscous friction at 0 when they took it as known."""
     held = held_at_a_bound(count, 41)

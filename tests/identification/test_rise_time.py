@@ -15,7 +15,7 @@ from tests.identification.coverage import holds, rejected
 
 TIME = np.arange(-0.1, 1.0, 1e-3)
 COMMAND = np.clip(TIME / 0.005, 0.0, 1.0)
-SEEDS = 40
+SEEDS = 30
 
 
 def second_order(omega: float, damping: float) -> np.ndarray:

@@ -309,6 +309,7 @@ def test_a_separator_that_is_not_told_is_a_tab(tmp_path):
     assert len(opened(path, "lvm")) == 2
 
 
+@pytest.mark.usefixtures("started")
 def test_nothing_in_the_folder_of_a_file_is_run(tmp_path, monkeypatch):
     mat(tmp_path / "a.mat")
     (tmp_path / "numpy.py").write_text("open('run', 'w')\nraise SystemExit(7)\n")

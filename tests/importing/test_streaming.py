@@ -13,6 +13,8 @@ from tests.importing.whole import whole
 
 READER = "tests.importing.falling"
 
+pytestmark = pytest.mark.usefixtures("started")
+
 
 @pytest.fixture
 def file(tmp_path: Path, monkeypatch) -> Path:

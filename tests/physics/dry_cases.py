@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,13 @@ class Case:
 
     def expected(self) -> dict[str, np.ndarray]:
         """By the reference, each millisecond."""
+        return self.solved[0]
+
+    @cached_property
+    def solved(self) -> tuple[dict[str, np.ndarray], list[tuple[float, int]]]:
+        """By the reference: values each millisecond, instants and directions of the regimes."""
         times = np.arange(round(self.duration * 1000)) * 1e-3
-        return simulate_events(self.reference, times, max_step=2e-3)[0]
+        return simulate_events(self.reference, times, max_step=2e-3)
 
     def found(self, step: float | None) -> dict[str, np.ndarray]:
         """By the engine, each millisecond, or each step where that is longer.
@@ -98,6 +104,7 @@ def function(sine: Sine) -> Function:
     return lambda t: sine.amplitude * math.sin(2 * math.pi * sine.frequency * t + sine.phase)
 
 
+@cache
 def thesis(
     compensation: str = "none", bristles: bool = False, periods: float = 3.0, low_pass: float = 0.0
 ) -> Case:

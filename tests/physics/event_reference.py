@@ -127,6 +127,7 @@ class DryLoop:
     def rates(self, t: float, y: np.ndarray, direction: int) -> list[float]:
         """State: w, its integral, relative angle, i, both PI integrals, bristles of plant and
         compensation, w', filtered rate."""
+        t, y = float(t), y.tolist()  # of Python: a quarter faster than those of numpy
         w, _, _, i, current_sum, rate_sum, zl, zm, zlc, zmc, observed, filtered = y
         v = w - self.base_rate(t)
         dw = (self.driving(t, y) - self.friction_torque(t, y, direction)) / self.inertia

@@ -17,7 +17,7 @@ from campaign.physics.lanes import Lane, together
 from campaign.signals import Sine
 from tests.physics.benches import Tree, bench, run, stribeck, task
 from tests.physics.dry_cases import Case, drawn, errors, steep_rise, swing, thesis
-from tests.physics.event_reference import DryLoop, simulate_events, simulate_sampled
+from tests.physics.event_reference import DryLoop, simulate_sampled
 
 J, H, TC = 35.0, 1e-3, 26.0
 RIGID = np.zeros((2, 3, 1))
@@ -174,13 +174,14 @@ def test_whatever_acts_friction_stays_within_its_limits() -> None:
 
 
 STEPS = (2e-3, 1e-3, 0.25e-3)
+PLAIN = thesis(periods=2.0)
 CASES = {
     # Bound at 1 ms of the rate over time.
-    "dry": (thesis(periods=2.0), 1e-4),
-    "dry, LuGre compensation": (thesis("lugre", periods=2.0), 5e-4),
-    "dry, LuGre compensation, filtered": (thesis("lugre", periods=2.0, low_pass=1e-3), 1e-4),
-    "dry, static compensation": (thesis("static", periods=2.0), 1e-3),
-    "dry, observer": (thesis("observer", periods=2.0), 5e-3),
+    "dry": (PLAIN, 1e-4),
+    "dry, LuGre compensation": (thesis("lugre", periods=1.5), 5e-4),
+    "dry, LuGre compensation, filtered": (thesis("lugre", periods=1.5, low_pass=1e-3), 1e-4),
+    "dry, static compensation": (thesis("static", periods=1.5), 1e-3),
+    "dry, observer": (thesis("observer", periods=1.5), 5e-3),
     "LuGre, static compensation": (thesis("static", bristles=True, periods=2.0), 1e-3),
     "steep rise": (steep_rise(), 3e-4),
     **{f"drawn {seed}": (drawn(seed), 3e-5) for seed in (0, 1, 2, 8)},
@@ -248,11 +249,11 @@ def test_a_stuck_load_does_not_creep_while_its_compensation_does() -> None:
     assert np.max(np.abs(moved[inside])) < 1e-15
 
 
-@pytest.mark.parametrize("case", [thesis(periods=2.0), drawn(9)], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [PLAIN, drawn(9)], ids=lambda case: case.name)
 def test_it_stops_and_breaks_away_when_the_reference_does(case: Case) -> None:
     """No chatter: the same directions in the same order, each within a step of 1 ms."""
     times = np.arange(round(case.duration * 1000)) * 1e-3
-    _, history = simulate_events(case.reference, times)
+    _, history = case.solved
     direction = np.sign(case.found(1e-3)["relative_rate"])
     switched = np.flatnonzero(np.diff(direction))
     assert [direction[0], *direction[switched + 1]] == [way for _, way in history]

@@ -325,7 +325,7 @@ def test_a_compensation_that_jumps_with_dry_friction_leaves_what_is_right(
 def test_what_compensates_a_dry_bench_meets_its_jumps_in_shorter_steps(
     compensation: str, step: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    case = thesis(compensation, periods=2.0)
+    case = thesis(compensation, periods=1.5)
     found = longest_step(case.bench, task(base_acceleration=case.base, compensation=compensation))
     assert found.because == f"jumps of dry friction at compensation.{compensation}"
     assert found.step == step

@@ -141,8 +141,8 @@ def _selecting(parameters: Any, state: Any, motion: Motion) -> tuple[float, floa
 @pytest.mark.parametrize(
     ("step", "lanes", "members"),
     [  # what goes by single numbers anyway needs no vector of every kind
-        *((_branching, *sizes) for sizes in ((1, 4), (LANES, 2))),
-        *((_selecting, *sizes) for sizes in ((1, 1), (1, 4), (LANES, 1), (LANES, 2))),
+        (_branching, LANES, 2),
+        *((_selecting, *sizes) for sizes in ((1, 4), (LANES, 1), (LANES, 2))),
     ],
 )
 def test_step_functions_of_many_interfaces_and_lanes(step: Any, lanes: int, members: int) -> None:

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from campaign.trending import members
+from tests.analysed_once import analysed_once
 from tests.trending.laboratory import STATIC, archived, monthly
+
+
+@pytest.fixture(autouse=True, scope="package")
+def analyses() -> Iterator[None]:
+    """The same runs are followed by many tests."""
+    with analysed_once(members):
+        yield
 
 
 @pytest.fixture(scope="session")

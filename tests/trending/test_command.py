@@ -77,9 +77,9 @@ def test_parameters_of_a_model_are_followed_by_the_structure_of_the_first_run(
     runs: Path, tmp_path: Path
 ):
     assert "inverse_dynamics" in methods()
-    names = [f"drift-{n}" for n in range(4)]
+    names = [f"drift-{n}" for n in range(3)]
     typed(runs, names, tmp_path / "out", ["inverse_dynamics"])
     data = json.loads((tmp_path / "out" / "trend.json").read_text(encoding="utf-8"))
     own = [each for each in data["numbers"] if each["test"] == "inverse_dynamics"]
     refused = [text for text in data["problems"] if "inverse_dynamics" in text]
-    assert own or len(refused) == 4
+    assert own or len(refused) == 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -103,20 +104,29 @@ def test_of_several_benches_is_refused_in_one_line(runs: Path, tmp_path: Path):
 
 
 def test_the_same_simulation_counts_once(runs: Path, tmp_path: Path):
-    """Eight archives of two simulations hold two numbers, not eight."""
-    again = {f"twin-{n}": Wanted(at=START + timedelta(days=n), seed=n % 2) for n in range(8)}
-    paths = archived(tmp_path, again)
-    found = follow([open_run(path) for path in paths.values()], experiments())
-    assert not found.judged
-    for each in found.followed:
+    """Four archives of two simulations hold two numbers, not four."""
+    found = []
+    for n in range(4):
+        path = tmp_path / f"twin-{n}.nxs"
+        shutil.copy(runs / f"still-{n % 2}.nxs", path)
+        one = open_run(path)
+        created = (START + timedelta(days=n)).isoformat()
+        header = one.header.model_copy(update={"created": created, "name": path.stem})
+        found.append(replace(one, header=header, root=f"{one.root} {n}"))
+    followed = follow(found, experiments())
+    assert not followed.judged
+    for each in followed.followed:
         assert (
-            str(each.reason) == "found in 2 runs, the same simulation as in 6: three are the least"
+            str(each.reason) == "found in 2 runs, the same simulation as in 2: three are the least"
         )
 
 
-def test_runs_of_one_moment_have_an_order_and_no_time(tmp_path: Path):
-    at_once = {f"run-{n}": Wanted(seed=n) for n in range(3)}
-    found = [open_run(path) for path in archived(tmp_path, at_once).values()]
+def test_runs_of_one_moment_have_an_order_and_no_time(runs: Path):
+    at_once = {"created": START.isoformat()}
+    found = [
+        replace(run, header=run.header.model_copy(update=at_once))
+        for run in opened(runs, "still", 1, 2, 3)
+    ]
     with pytest.raises(UsageError, match="--over order"):
         follow(found, experiments())
     ordered = follow(found, experiments(), "order")
@@ -152,25 +162,17 @@ def test_what_follows_the_temperature_is_told_per_kelvin(tmp_path: Path):
     }
 
 
-def test_a_recorded_temperature_counts_before_a_noted_one(tmp_path: Path):
+def test_a_recorded_temperature_counts_before_a_noted_one_and_a_damaged_is_refused(tmp_path: Path):
     warm = [(20.0, "degC"), (297.15, "K"), None, (22.0, "degC")]
     wanted = {
         f"run-{n}": Wanted((), START + timedelta(days=n), ("temperature=31",), 800 + n, each)
         for n, each in enumerate(warm)
     }
-    found = [open_run(path) for path in archived(tmp_path, wanted).values()]
-    followed = follow(found, experiments(), "temperature")
+    paths = list(archived(tmp_path, wanted).values())
+    followed = follow([open_run(path) for path in paths], experiments(), "temperature")
     assert followed.judged
     for each in followed.followed:
         assert each.x.tolist() == pytest.approx([20.0, 24.0, 31.0, 22.0])
-
-
-def test_a_damaged_temperature_is_refused(tmp_path: Path):
-    wanted = {
-        f"run-{n}": Wanted((), START + timedelta(days=n), (), 800 + n, (20.0 + n, "degC"))
-        for n in range(3)
-    }
-    paths = list(archived(tmp_path, wanted).values())
     with h5py.File(paths[1], "r+") as file:
         file["trial_00001/data/temperature"][7] += 1e-9
     with pytest.raises(ArchiveError, match="/trial_00001/data/temperature: does not match"):

@@ -10,8 +10,10 @@ Process. 25 (2011) 2892; Pintelon and Schoukens (2012), 7.2).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.identification.frequency_response import Array, ComplexArray
 
@@ -19,6 +21,8 @@ ORDER = 2
 """of the polynomial through the transient ..."""
 AROUND = 10
 """... fitted to so many lines around a harmonic that belong to none."""
+REACH = 2 * AROUND
+"""Lines to either side of a harmonic among which these are."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +85,11 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
     transient = np.zeros_like(own)
     noise = np.zeros((count, channels, channels), dtype=complex)
     free = float(AROUND - ORDER - 1)
-    for k, bin_ in enumerate(at):
-        near = _near(int(bin_), periods, bins.shape[-1])
-        offset = (near - bin_) / AROUND
-        basis = np.vander(offset, ORDER + 1, increasing=True)
-        inverse = np.linalg.pinv(basis)
-        there = bins[..., near]
+    for k, bin_ in enumerate(at.tolist()):
+        away, basis, inverse = _fitted_around(
+            min(bin_, REACH + 1), periods, min(bins.shape[-1] - bin_, REACH + 1)
+        )
+        there = bins[..., bin_ + away]
         found = there @ inverse.T
         transient[..., k] = found[..., 0]
         left = there - found @ basis.T
@@ -98,10 +101,15 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
     )
 
 
-def _near(harmonic: int, periods: int, count: int) -> Array:
-    """The lines nearest to a harmonic that belong to none and are not that of the mean."""
-    reach = AROUND * 2
-    lines = np.arange(max(1, harmonic - reach), min(count, harmonic + reach + 1))
-    lines = lines[lines % periods != 0]
-    order = np.argsort(np.abs(lines - harmonic), kind="stable")[:AROUND]
-    return np.asarray(np.sort(lines[order]))
+@cache
+def _fitted_around(below: int, periods: int, above: int) -> tuple[NDArray[np.intp], Array, Array]:
+    """How far the lines lie from a harmonic that its polynomial is fitted to; basis and inverse.
+
+    The nearest that belong to no harmonic and are not that of the mean, which lies `below` lines
+    lower, and within the spectrum, which ends `above` lines higher.
+    """
+    away = np.arange(max(1 - below, -REACH), min(above, REACH + 1))
+    away = away[away % periods != 0]
+    away = np.sort(away[np.argsort(np.abs(away), kind="stable")[:AROUND]])
+    basis = np.vander(away / AROUND, ORDER + 1, increasing=True)
+    return np.asarray(away, dtype=np.intp), np.asarray(basis), np.asarray(np.linalg.pinv(basis))

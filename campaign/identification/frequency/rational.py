@@ -159,7 +159,17 @@ def _roots(coefficients: Array, scale: float) -> ComplexArray:
 def _log_jacobian(
     s: ComplexArray, numerator: Array, denominator: Array, scale: float
 ) -> ComplexArray:
-    powers = s[:, None] ** np.arange(max(len(numerator), len(denominator)))
+    return _log_jacobian_of(_powers(s, numerator, denominator), s, numerator, denominator, scale)
+
+
+def _powers(s: ComplexArray, numerator: Array, denominator: Array) -> ComplexArray:
+    """Powers of s, shape (n, most coefficients)."""
+    return np.asarray(s[:, None] ** np.arange(max(len(numerator), len(denominator))))
+
+
+def _log_jacobian_of(
+    powers: ComplexArray, s: ComplexArray, numerator: Array, denominator: Array, scale: float
+) -> ComplexArray:
     up = powers[:, : len(numerator)] / (powers[:, : len(numerator)] @ numerator)[:, None]
     down = powers[:, : len(denominator)] / (powers[:, : len(denominator)] @ denominator)[:, None]
     return np.column_stack([up, -down, -s * (2.0 * np.pi * scale)])
@@ -246,10 +256,18 @@ def _sanathanan(
 
 def _model(theta: Array, s: ComplexArray, up: int, scale: float) -> ComplexArray:
     numerator, denominator = theta[: up + 1], theta[up + 1 : -1]
-    over = np.polynomial.polynomial.polyval(s, denominator)
+    over = _polynomial(s, denominator)
     over = np.where(np.abs(over) > 1e-300, over, 1e-300)
     delayed = np.exp(-s * (2.0 * np.pi * scale * theta[-1]))
-    return np.asarray(delayed * np.polynomial.polynomial.polyval(s, numerator) / over)
+    return np.asarray(delayed * _polynomial(s, numerator) / over)
+
+
+def _polynomial(s: ComplexArray, coefficients: Array) -> ComplexArray:
+    """Horner's scheme, as numpy's `polyval` has it, which looks at its arguments for longer."""
+    found = coefficients[-1] + s * 0.0
+    for coefficient in coefficients[-2::-1].tolist():
+        found = coefficient + found * s
+    return np.asarray(found)
 
 
 def _refined(
@@ -268,12 +286,13 @@ def _refined(
     held = up + 1 + int(np.argmax(np.max(powers, axis=0) * np.abs(start[up + 1 : -1])))
     start = np.append(start[:-1] / start[held], start[-1])
     size = np.append(np.maximum(np.abs(start[:-1]), 1e-12), 1.0 / (2.0 * np.pi * scale))
+    powers_of_s = _powers(s, start[: up + 1], start[up + 1 : -1])
 
     def function(scaled: Array) -> tuple[Array, Array]:
         theta = scaled * size
         model = _model(theta, s, up, scale)
         left = (model - values) / error
-        by = _log_jacobian(s, theta[: up + 1], theta[up + 1 : -1], scale)
+        by = _log_jacobian_of(powers_of_s, s, theta[: up + 1], theta[up + 1 : -1], scale)
         by = by * (model / error)[:, None] * size
         return np.concatenate([left.real, left.imag]), np.concatenate([by.real, by.imag])
 

@@ -46,26 +46,24 @@ def model_jacobian(
     coupling = spring / s + point[3]
     motor, load = first * s + point[4] + point[6] / s, first * ratio * s + point[5]
     under = motor * load + coupling * (motor + load)
-    own, nothing = load if side == "motor" else 0.0, np.zeros_like(s)
-    over = own + coupling
-    delay = float(point[7 + sides.index(side)])
-    value = over / under * np.exp(-s * delay)
-    columns = []
-    for of_motor, of_load, of_coupling in (
-        (first * s, first * ratio * s, nothing),
-        (nothing, first * ratio * s, nothing),
-        (nothing, nothing, spring / s),
-        (nothing, nothing, nothing + 1.0),
-        (nothing + 1.0, nothing, nothing),
-        (nothing, nothing + 1.0, nothing),
-        (1.0 / s, nothing, nothing),
+    over = load + coupling if side == "motor" else coupling
+    value = over / under * np.exp(-s * float(point[7 + sides.index(side)]))
+    of_motor, of_load, of_coupling = load + coupling, motor + coupling, motor + load
+    first_s, second_s, spring_s = first * s, first * ratio * s, spring / s
+    found = np.zeros((len(s), 7 + len(sides)), dtype=complex)
+    for column, below, above in (
+        (0, first_s * of_motor + second_s * of_load, second_s),
+        (1, second_s * of_load, second_s),
+        (5, of_load, 1.0),
     ):
-        below = of_motor * (load + coupling) + of_load * (motor + coupling)
-        below = below + of_coupling * (motor + load)
-        above = of_coupling + (of_load if side == "motor" else nothing)
-        columns.append(value * (above / over - below / under))
-    columns += [-s * value if each == side else nothing for each in sides]
-    return np.column_stack(columns)
+        raised = above / over if side == "motor" else 0.0
+        found[:, column] = value * (raised - below / under)
+    found[:, 2] = value * (spring_s / over - spring_s * of_coupling / under)
+    found[:, 3] = value * (1.0 / over - of_coupling / under)
+    found[:, 4] = value * (-of_motor / under)
+    found[:, 6] = value * (-(1.0 / s * of_motor) / under)
+    found[:, 7 + sides.index(side)] = -s * value
+    return found
 
 
 def polynomials(point: Array, side: Side) -> tuple[Array, Array]:

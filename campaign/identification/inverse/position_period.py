@@ -44,37 +44,46 @@ def find_period(position: Array, rate: Array, residuals: Array, interval: float)
     most = min(MOST, travel / (FEWEST_ROWS * float(np.quantile(steps[moving], SLOW))))
     counts = np.arange(FEWEST, most, 1.0 / FINE)
     rows = position[moving], rate[moving], residuals[moving], steps[moving]
-    gains = [_gain(travel / count, travel, *rows) for count in counts]
-    if not any(gains):
+    gains = _gains(travel / counts, travel, *rows)
+    if not np.any(gains):
         return None
     return float(travel / counts[int(np.argmax(gains))])
 
 
-def _gain(
-    period: float, travel: float, position: Array, rate: Array, residuals: Array, steps: Array
-) -> float:
-    """Rise of the log-likelihood, but for a factor, by waves of this period; 0 for too few rows.
+def _gains(
+    periods: Array, travel: float, position: Array, rate: Array, residuals: Array, steps: Array
+) -> Array:
+    """Rise of the log-likelihood, but for a factor, by waves of each period; 0 for too few rows.
 
     Beyond a spring and friction: a long wave looks like these.
     """
-    own = steps * FEWEST_ROWS <= period
-    if float(steps[own].sum()) < FEWEST_PERIODS * period:
-        return 0.0
-    angle, way = 2.0 * np.pi * position[own] / period, np.sign(rate[own])
-    line = np.column_stack([np.ones(len(angle)), position[own], way])
-    waves = np.column_stack(
-        [np.sin(angle), np.cos(angle), way * np.sin(angle), way * np.cos(angle)]
-    )
-    before, after = (
-        _unexplained(each, residuals[own]) for each in (line, np.column_stack([line, waves]))
-    )
-    if period > travel / CERTAIN and after > WIDE * before:
-        return 0.0
-    return len(angle) * float(np.log(before / max(after, 1e-12 * before))) if before > 0 else 0.0
+    squares = np.zeros((len(periods), 7, 7))
+    rights, (sizes, rows) = np.zeros((len(periods), 7)), np.zeros((2, len(periods)))
+    for k, period in enumerate(periods.tolist()):
+        own = steps * FEWEST_ROWS <= period
+        if float(steps[own].sum()) < FEWEST_PERIODS * period:
+            continue
+        at, way, values = position[own], np.sign(rate[own]), residuals[own]
+        angle = 2.0 * np.pi * at / period
+        columns = np.ones((7, len(at)))
+        columns[1], columns[2] = at, way
+        columns[3], columns[4] = np.sin(angle), np.cos(angle)
+        columns[5:] = way * columns[3:5]
+        squares[k], rights[k] = columns @ columns.T, columns @ values
+        sizes[k], rows[k] = values @ values, len(at)
+    before = _unexplained(squares[:, :3, :3], rights[:, :3], sizes)
+    after = _unexplained(squares, rights, sizes)
+    told = (before > 0) & ~((periods > travel / CERTAIN) & (after > WIDE * before))
+    gains = np.zeros(len(periods))
+    gains[told] = rows[told] * np.log(before[told] / np.maximum(after, 1e-12 * before)[told])
+    return gains
 
 
-def _unexplained(columns: Array, values: Array) -> float:
-    """Sum of squares (of `values`, shape (n,)) that columns of shape (n, k) leave."""
-    right = columns.T @ values
-    found = np.linalg.lstsq(columns.T @ columns, right, rcond=None)[0]
-    return max(float(values @ values - right @ found), 0.0)
+def _unexplained(squares: Array, rights: Array, sizes: Array) -> Array:
+    """Sums of squares that columns leave of values, shape (m,): of the products of k columns with
+    each other, shape (m, k, k), and with the values, (m, k), and of the values with themselves.
+    """
+    least = float(np.finfo(float).eps) * squares.shape[-1]
+    inverse = np.linalg.pinv(squares, rcond=least, hermitian=True)
+    told = np.einsum("mi,mij,mj->m", rights, inverse, rights)
+    return np.asarray(np.maximum(sizes - told, 0.0))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.identification.inverse.motion import Array, Motion, later, zero_phase
-from campaign.identification.inverse.terms import Terms, columns
+from campaign.identification.inverse.terms import Terms
 
 STRETCH = 1.0
 """s that the axis goes its own way."""
@@ -165,12 +165,16 @@ def _going(
     place, rate, change = (np.empty((len(q), steps)) for _ in range(3))
     tiny = 1e-9 * max(float(np.abs(motion.rate).max()), 1e-300)
 
+    still, asked = np.zeros(len(q)), np.empty((len(q), len(terms) - 1))
+
     def resisting(place: Array, at: Array, heat: Array | None) -> Array:
         """What the model's other terms ask for at a place and a rate, (count,)."""
         if len(terms) == 1:
-            return np.zeros_like(at)
-        here = Motion(at, place, at, np.zeros_like(at), at, heat)
-        return np.asarray(columns(here, terms[1:]) @ values[1:])
+            return still
+        here = Motion(at, place, at, still, at, heat)
+        for column, term in enumerate(terms[1:]):
+            asked[:, column] = term.column(here)
+        return np.asarray(asked @ values[1:])
 
     for k in range(steps):
         place[:, k], rate[:, k] = q, v

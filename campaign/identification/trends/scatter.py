@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Self
 
 import numpy as np
@@ -220,6 +221,7 @@ def fits(values: Array, columns: Array, own: Array) -> Fits:
     )
 
 
+@cache
 def _nodes() -> tuple[Array, Array]:
     places, weights = np.polynomial.legendre.leggauss(RHOS)
     return 0.5 * MOST_RHO * (places + 1.0), 0.5 * MOST_RHO * weights
@@ -232,6 +234,11 @@ def _shares(own: Array) -> tuple[Array, Array]:
     """
     if not own.any() or np.any(own != np.diag(np.diag(own))):
         return np.ones(1), np.zeros(1)
+    return _nodes_of_shares()
+
+
+@cache
+def _nodes_of_shares() -> tuple[Array, Array]:
     places, weights = np.polynomial.legendre.leggauss(OWNS - 1)
     shares = LEAST_OWN ** (0.5 * (places + 1.0))
     return np.append(1.0, shares), np.log(0.5 * np.append(1.0, 0.5 * weights))

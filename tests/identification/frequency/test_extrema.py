@@ -29,13 +29,14 @@ def measured(
 ) -> list[BestLinear]:
     """Motor rates with 1 % of noise, a period after rest; friction as a share of the rms torque."""
     count = (periods + 1) * SAMPLES
-    half_time = np.arange(2 * count + 2) / (2 * RATE)
+    half_time = np.arange(2 * SAMPLES) / (2 * RATE)
     grids = [odd_grid(1.0, 120.0, PERIOD, seed) for seed in range(len(drives))]
     halves = [
         [random_phases(grid, 1.0, 1000 * seed + k).sample(half_time) for k in range(realisations)]
         for seed, grid in enumerate(grids)
     ]
-    half = np.array(halves)  # of each drive and each realisation
+    period = np.array(halves)  # of each drive and each realisation
+    half = np.take(period, np.arange(2 * count + 2) % (2 * SAMPLES), axis=-1)
     if friction:
         each = [drive for drive in drives for _ in range(realisations)]
         torques = half.reshape(len(each), -1).T.copy()

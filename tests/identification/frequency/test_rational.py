@@ -39,7 +39,7 @@ def test_without_noise_the_function_is_found(delay: float) -> None:
 def test_modes_and_delay_are_held_as_often_as_is_said() -> None:
     held: dict[str, list[bool]] = {"pole": [], "zero": [], "damping": [], "delay": []}
     orders = []
-    for seed in range(30):
+    for seed in range(20):
         random = np.random.default_rng(seed)
         drive, delay = random_drive(random), random.uniform(0, 0.005)
         truth = delayed(drive.response(FREQUENCY, "motor"), delay)
@@ -64,7 +64,7 @@ def test_modes_and_delay_are_held_as_often_as_is_said() -> None:
         deviation = np.sqrt(chosen.fit.scatter[-1, -1])
         held["delay"].append(abs(chosen.fit.delay - delay) < 1.96 * deviation)
     assert not rejected(held)
-    assert orders.count((2, 3)) >= 28
+    assert orders.count((2, 3)) >= 19
 
 
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:

@@ -47,8 +47,9 @@ def test_from_simulated_multisines_blind() -> None:
         random = np.random.default_rng(seed)
         drive = random_drive(random)
         grid = odd_grid(0.5, 70.0, PERIOD, seed)
-        time = np.arange(int(PERIOD * 2 * FINE)) / FINE
+        time = np.arange(int(PERIOD * FINE)) / FINE
         u = np.array([random_phases(grid, 1.0, 100 * seed + m).sample(time) for m in range(7)])
+        u = np.tile(u, 2)
         rates = drive.rates(u, FINE)[..., :: FINE // RATE]
         u = u[:, :: FINE // RATE]
         rates += random.uniform(0.001, 0.05) * np.std(rates) * random.standard_normal(rates.shape)
@@ -131,7 +132,7 @@ def test_one_inertia_is_told_as_one(side: Side) -> None:
     """A rigid axis has no second inertia, and no interval of a sum of two that are not there."""
     truth = 1.0 / (2j * np.pi * FREQUENCY * 3.0 + 9.0) * np.exp(-2j * np.pi * FREQUENCY * 5e-4)
     held = []
-    for seed in range(20):
+    for seed in range(12):
         random = np.random.default_rng(seed)
         found = two_mass({side: noisy(FREQUENCY, truth, 0.02 * np.median(np.abs(truth)), random)})
         if not found.rigid:
@@ -140,7 +141,7 @@ def test_one_inertia_is_told_as_one(side: Side) -> None:
         assert found.load_inertia.reason in RIGID
         assert found.total_inertia.half_width < 0.05
         held.append(holds(found.total_inertia, 3.0))
-    assert len(held) >= 18
+    assert len(held) >= 11
     assert not rejected({"inertia": held}, "less")
     # A drive with a resonance in the band is none.
     assert not two_mass({side: measured(DRIVE, side, 1)}).rigid
