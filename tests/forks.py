@@ -1,8 +1,8 @@
 """Commands in forks of a process that has imported the program: each is a process, none starts one.
 
 A start of Python with all that the program imports takes 1 to 2 s of a core, a fork 0.05 s. What a
-command does, prints and leaves is that of `python -m campaign`, its exit included. A command that moves
-a bench has its guardian, whose program is a fork, too.
+command does, prints and leaves is that of `python -m campaign`, its exit included. A command that
+moves a bench has its guardian, whose program is a fork, too.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def run():
             code = 1
     leave(code or 0)
 def leave(code):
-    # All of an end but that a million objects are taken apart one by one, each on a page of its own.
+    # All of an end but that a million objects are taken apart one by one, each on its own page.
     threading._shutdown()
     atexit._run_exitfuncs()
     sys.stdout.flush()
