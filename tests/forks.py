@@ -41,7 +41,7 @@ import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, s
 """
 """What imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
-import atexit, contextlib, gc, json, os, signal, subprocess, sys, threading, time, types
+import atexit, contextlib, gc, importlib, json, os, signal, subprocess, sys, threading, time, types
 gc.freeze()  # a collection in a fork would copy every page
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # not ignored, also where the tests are under nohup
 begun = set()
@@ -77,6 +77,8 @@ if environment is not None:
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 def run():
+    if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
+        importlib.import_module(hook)
     from campaign.__main__ import main
     code = 0
     try:
@@ -164,6 +166,7 @@ class Forks:
         """`campaign` with these arguments in `folder`; its output must be UTF-8.
 
         `environment`: variables of this command alone, which count for what it has yet to import.
+        `BEFORE_THE_COMMAND` of them names a module that is imported just before it begins.
         """
         paths = [Path(self._folder.name, name) for name in ("out", "err")]
         streams = [os.devnull, *map(str, paths)]
