@@ -77,11 +77,11 @@ if environment is not None:
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 def run():
-    if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
-        importlib.import_module(hook)
-    from campaign.__main__ import main
     code = 0
     try:
+        if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
+            importlib.import_module(hook)
+        from campaign.__main__ import main
         main()
     except SystemExit as leaving:
         code = leaving.code
