@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
-import pickle
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -12,12 +10,7 @@ from types import ModuleType
 import pytest
 
 from campaign.report.build import Report
-from campaign.report.drawing.drawn import Drawn
-from campaign.report.drawing.pdf import keeps_pdf
-from campaign.report.page.drawings import Drawable, Drawing, Overview
-
-KEPT: dict[str, Drawn | None] = {}
-"""Drawings by what they show, for tests of what stands around them."""
+from tests.drawings import keep_drawings
 
 
 def _made_up() -> ModuleType:
@@ -53,19 +46,4 @@ def report(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Rep
 @pytest.fixture
 def drawings_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was drawn for one test is not drawn again for another: most of a page's time."""
-    for kind in (Drawing, Overview):
-        monkeypatch.setattr(kind, "made", _kept(kind))
-
-
-def _kept(kind: type[Drawing] | type[Overview]):
-    make = kind.made
-
-    def made(drawable: Drawable) -> Drawn | None:
-        if keeps_pdf():  # the sheet is wanted, too
-            return make(drawable)
-        shown = hashlib.sha256(pickle.dumps(drawable)).hexdigest()
-        if shown not in KEPT:
-            KEPT[shown] = make(drawable)
-        return KEPT[shown]
-
-    return made
+    keep_drawings(monkeypatch)

@@ -100,9 +100,7 @@ def test_two_workers_find_number_and_record_what_one_does(lab: Lab, whole: RunRe
 
 
 @pytest.mark.parametrize("number", [3, 14])
-def test_a_run_that_is_stopped_goes_on_to_the_same_samples(
-    lab: Lab, whole: RunReader, number: int
-):
+def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunReader, number: int):
     stopped = lab.stopped_in(number)
     assert len(stopped.plan) > len(stopped.trials) or len(stopped.plan) == PLANNED
     resumed = lab.resume(stopped)
