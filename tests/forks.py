@@ -35,6 +35,10 @@ for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
 from campaign.device.warm_up import warm_up
 from campaign.protocol.bench_file import simulable
 warm_up(simulable("simulink"))  # the engine is loaded, or compiled
+import functools, typer.main
+from campaign.cli.main import app
+typer.main.get_command = functools.cache(typer.main.get_command)
+typer.main.get_command(app)  # what can be typed, of all commands
 """
 LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
