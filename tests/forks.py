@@ -42,6 +42,8 @@ typer.main.get_command(app)  # what can be typed, of all commands
 """
 LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
+import jinja2, matplotlib.backends.backend_svg, matplotlib.figure, rich.console, rich.progress
+import rich.table, scipy.interpolate, scipy.ndimage, scipy.special, scipy.spatial, tomlkit, typer
 """
 """What imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
