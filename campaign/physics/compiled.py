@@ -161,9 +161,9 @@ class ByModule:
         self._line = function.__code__.co_firstlineno
 
     @classmethod
-    def from_function(cls, function: Callable[..., Any], file: str) -> ByModule:
-        """As numba asks for it."""
-        return cls(function, file)
+    def from_function(cls, function: Callable[..., Any], file: str) -> ByModule | None:
+        """As numba asks for it; None for a function without a file."""
+        return cls(function, file) if Path(file).is_file() else None
 
     def ensure_cache_path(self) -> None:
         """Raises OSError."""
