@@ -24,7 +24,8 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.measuring import Measuring
-from campaign.experiments import experiments, frequency_response
+from campaign.experiments import experiments
+from campaign.experiments.frequency_response import experiment as frequency_response
 from campaign.experiments.interface import TrialData
 from tests.system.test_stage_kills import FOLLOWING, PLANNED, PROTOCOL
 from tests.system.user import campaign, write
