@@ -1,7 +1,8 @@
 """Commands in forks of a process that has imported the program: each is a process, none starts one.
 
 A start of Python with all that the program imports takes 1 to 2 s of a core, a fork 0.05 s. What a
-command does, prints and leaves is that of `python -m campaign`, its exit included.
+command does, prints and leaves is that of `python -m campaign`, its exit included. A command that
+moves a bench has its guardian, whose program is a fork, too.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -33,13 +35,19 @@ for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
 from campaign.device.warm_up import warm_up
 from campaign.protocol.bench_file import simulable
 warm_up(simulable("simulink"))  # the engine is loaded, or compiled
+import functools, typer.main
+from campaign.cli.main import app
+typer.main.get_command = functools.cache(typer.main.get_command)
+typer.main.get_command(app)  # what can be typed, of all commands
 """
 LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
+import jinja2, matplotlib.backends.backend_svg, matplotlib.figure, rich.console, rich.progress
+import rich.table, scipy.interpolate, scipy.ndimage, scipy.special, scipy.spatial, tomlkit, typer
 """
 """What imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
-import atexit, gc, json, os, signal, sys, threading
+import atexit, contextlib, gc, importlib, json, os, signal, subprocess, sys, threading, time, types
 gc.freeze()  # a collection in a fork would copy every page
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # not ignored, also where the tests are under nohup
 begun = set()
@@ -74,21 +82,68 @@ if environment is not None:
     sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
-from campaign.__main__ import main
-code = 0
-try:
-    main()
-except SystemExit as leaving:
-    code = leaving.code
-    if isinstance(code, str):
-        print(code, file=sys.stderr)
-        code = 1
-# All of an end but that a million objects are taken apart one by one, each on a page of its own.
-threading._shutdown()
-atexit._run_exitfuncs()
-sys.stdout.flush()
-sys.stderr.flush()
-os._exit(code or 0)
+def run():
+    code = 0
+    try:
+        if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
+            importlib.import_module(hook)
+        from campaign.__main__ import main
+        main()
+    except SystemExit as leaving:
+        code = leaving.code
+        if isinstance(code, str):
+            print(code, file=sys.stderr)
+            code = 1
+    leave(code or 0)
+def leave(code):
+    # All of an end but that a million objects are taken apart one by one, each on its own page.
+    threading._shutdown()
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+def afresh(*kept):  # as after an exec
+    signal.set_wakeup_fd(-1)
+    for number in signal.valid_signals():
+        if callable(signal.getsignal(number)):
+            signal.signal(number, signal.SIG_DFL)
+    for name in os.listdir("/proc/self/fd"):
+        if int(name) > 2 and int(name) not in kept:
+            with contextlib.suppress(OSError):
+                os.close(int(name))
+    sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
+class Program:  # what a guardian starts, as one more fork
+    returncode = None
+    def __init__(self, command, pass_fds, env):
+        self.pid = os.fork()
+        if not self.pid:
+            afresh(*pass_fds)
+            os.environ.clear()
+            os.environ.update(env)
+            run()
+    def poll(self):
+        if self.returncode is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self.returncode = os.waitstatus_to_exitcode(status) if pid else None
+        return self.returncode
+    def wait(self, timeout):
+        ends = time.monotonic() + timeout
+        while self.poll() is None:
+            if time.monotonic() > ends:
+                raise subprocess.TimeoutExpired("campaign", timeout)
+            time.sleep(0.01)
+    def send_signal(self, number):
+        if self.poll() is None:
+            os.kill(self.pid, number)
+    def kill(self):
+        self.send_signal(signal.SIGKILL)
+def guard(path, command):  # for `os.execv`, by which a program that moves a bench gets its guardian
+    from campaign.execution import guardian
+    afresh()
+    guardian.subprocess = types.SimpleNamespace(**{**vars(subprocess), "Popen": Program})
+    leave(guardian.main(command[4:]))
+os.execv = guard
+run()
 """
 
 
@@ -102,6 +157,7 @@ class Forks:
 
     def __init__(self, environment: Mapping[str, str], imports: str = PROGRAM) -> None:
         self._folder = tempfile.TemporaryDirectory()
+        self._asking = threading.Lock()
         self._process = subprocess.Popen(
             [sys.executable, "-c", imports + SERVER],
             env=environment,
@@ -116,6 +172,7 @@ class Forks:
         """`campaign` with these arguments in `folder`; its output must be UTF-8.
 
         `environment`: variables of this command alone, which count for what it has yet to import.
+        `BEFORE_THE_COMMAND` of them names a module that is imported just before it begins.
         """
         paths = [Path(self._folder.name, name) for name in ("out", "err")]
         streams = [os.devnull, *map(str, paths)]
@@ -145,8 +202,9 @@ class Forks:
     def _answer(self, *request: object) -> int:
         assert self._process.stdin
         assert self._process.stdout
-        print(json.dumps(request), file=self._process.stdin, flush=True)
-        return int(self._process.stdout.readline())
+        with self._asking:  # of several threads each has its own answer
+            print(json.dumps(request), file=self._process.stdin, flush=True)
+            return int(self._process.stdout.readline())
 
     def close(self) -> None:
         """End the process that forks."""

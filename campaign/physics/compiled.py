@@ -148,16 +148,53 @@ def _libraries() -> list[str]:
     return sorted(f"{about.name} {about.stat().st_mtime_ns}" for about in abouts)
 
 
+class ByModule:
+    """Numba's name for where a function is kept: by its module, not by the path of its file.
+
+    The folder has a hash of the sources, so that machine code is that of every copy of them: an
+    environment made anew, or another checkout, compiles nothing again.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._folder = Path(_CONFIG.CACHE_DIR) / function.__module__
+        self._file = Path(file)
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> ByModule | None:
+        """As numba asks for it; None for a function without a file."""
+        return cls(function, file) if Path(file).is_file() else None
+
+    def ensure_cache_path(self) -> None:
+        """Raises OSError."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """What is kept under another one is not used."""
+        return hashlib.sha256(self._file.read_bytes()).hexdigest()
+
+    def get_disambiguator(self) -> str:
+        """What tells functions of one name apart."""
+        return str(self._line)
+
+
 @contextmanager
 def _kept_in(folder: Path | None) -> Iterator[None]:
     """Numba chooses the cache folder when it decorates; other packages keep their own."""
+    own = {"CACHE_DIR": str(folder), "CACHE_LOCATOR_CLASSES": f"{__name__}.{ByModule.__name__}"}
     with _DECORATING:
-        before = _CONFIG.CACHE_DIR
-        _CONFIG.CACHE_DIR = str(folder) if folder is not None else before
+        before = {name: getattr(_CONFIG, name, "") for name in own}
+        for name, value in (own if folder is not None else before).items():
+            setattr(_CONFIG, name, value)
         try:
             yield
         finally:
-            _CONFIG.CACHE_DIR = before
+            for name, value in before.items():
+                setattr(_CONFIG, name, value)
 
 
 def compiled(function: F, **options: Any) -> F:

@@ -31,7 +31,6 @@ from campaign.trial import Task
 
 WIDTHS = (1, LANES)
 """Lanes for which the engine is compiled."""
-_SOURCES = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ def make(part: Part) -> Made:
 
 
 def is_made(width: int) -> bool:
-    """Whether the engine was made already, by this installation on a machine of this kind."""
+    """Whether the engine was made already, on a machine of this kind."""
     note = _note(width)
     return note is not None and note.exists()
 
@@ -120,10 +119,8 @@ def _note(width: int) -> Path | None:
     kept = folder()
     if kept is None:
         return None
-    written = max(source.stat().st_mtime_ns for source in _SOURCES.rglob("*.py"))
-    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
-    what = "\n".join((str(_SOURCES), str(written), *processor))
-    return kept / f"made-{width}-{hashlib.sha256(what.encode()).hexdigest()[:16]}"
+    processor = f"{binding.get_host_cpu_name()}\n{binding.get_host_cpu_features().flatten()}"
+    return kept / f"made-{width}-{hashlib.sha256(processor.encode()).hexdigest()[:16]}"
 
 
 def _side_by_side(width: int) -> str:

@@ -1,5 +1,6 @@
 """What the tests of the archive write."""
 
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -95,13 +96,20 @@ def write_trial(writer: RunWriter, trial: Trial, count: int | None, block: int =
     recorder.finish(Ending(Outcome.COMPLETED), STARTED, ENDED)
 
 
-@pytest.fixture
-def sealed(tmp_path: Path) -> Path:
-    """A sealed run of two trials."""
-    return write_run(tmp_path / "results")
+@pytest.fixture(scope="session")
+def sealed_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sealed run of two trials; to be copied, not changed."""
+    return write_run(tmp_path_factory.mktemp("sealed"))
 
 
 @pytest.fixture
+def sealed(sealed_once: Path, tmp_path: Path) -> Path:
+    """A sealed run of two trials, of the test's own."""
+    (tmp_path / "results").mkdir()
+    return Path(shutil.copy(sealed_once, tmp_path / "results"))
+
+
+@pytest.fixture(scope="session")
 def kit() -> "type[Kit]":
     """The makers above, for tests: pytest imports no test module by name."""
     return Kit

@@ -1,10 +1,11 @@
 """The archive is valid NeXus by the judgement of the NeXus community's own checker."""
 
+import atexit
 import hashlib
+import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -17,6 +18,7 @@ from campaign.archive.writing.nexus import REQUIRED, VERSION, definition_path
 from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.backends.sim import CHANNELS
 from campaign.recording import ChannelInfo, Ending, Outcome
+from tests.forks import Forks
 
 
 def nxcheck(path: Path) -> tuple[int, int, str]:
@@ -31,12 +33,21 @@ def nxvalidate(path: Path, trial: int = 1) -> tuple[int, int, str]:
     )
 
 
+@cache
+def checkers() -> Forks:
+    """A process that has imported both."""
+    scripts = ", ".join(f"nexusformat.scripts.{name}" for name in ("nxcheck", "nxvalidate"))
+    made = Forks(os.environ, f"import {scripts}")
+    atexit.register(made.close)
+    return made
+
+
 def judged_by(script: str, *arguments: str) -> tuple[int, int, str]:
     """Errors, warnings and the output of a checker, which exits with 0 whatever it finds."""
-    command = f"import sys; from nexusformat.scripts.{script} import main; sys.exit(main())"
-    done = subprocess.run(
-        [sys.executable, "-c", command, *arguments], capture_output=True, text=True, check=True
-    )
+    checker = {"BEFORE_THE_COMMAND": "tests.archive.checker", "CHECKER": script}
+    python = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    done = checkers().run(Path.cwd(), *arguments, environment=python | checker)
+    assert done.returncode == 0, done.stderr
     output = done.stdout + done.stderr
     errors = re.search(r"Total number of errors: (\d+)", output)
     warnings = re.search(r"Total number of warnings: (\d+)", output)

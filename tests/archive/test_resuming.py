@@ -31,15 +31,22 @@ RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {"name": "other"}, "versions": 
 
 def content(path):
     """Every attribute and dataset of a file, as HDF5 has it: path to bytes."""
-    found = {}
+    found, names = {}, {}
+
+    def place(item):
+        return h5py.h5o.get_info(item.id).addr
+
+    def named(name, item):
+        names[place(item)] = f"/{name}"
 
     def attributes(name, item):
         for key in item.attrs:
             value = item.attrs[key]
+            # HDF5 itself would search the whole file for the name of each of them.
             if key == "DIMENSION_LIST":
-                value = [item.file[reference].name for (reference,) in value]
+                value = [names[place(item.file[reference])] for (reference,) in value]
             elif key == "REFERENCE_LIST":
-                value = sorted((item.file[reference].name, int(n)) for reference, n in value)
+                value = sorted((names[place(item.file[ref])], int(n)) for ref, n in value)
             found[f"{name}@{key}"] = np.asarray(value).tolist()
 
     def visit(name, item):
@@ -47,6 +54,7 @@ def content(path):
         found[f"/{name}"] = item[()].tobytes() if isinstance(item, h5py.Dataset) else "group"
 
     with h5py.File(path, locking=False) as file:
+        file.visititems(named)
         attributes("/", file)
         file.visititems(visit)
     return found

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import h5py
@@ -19,11 +20,11 @@ from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import put_text, text_of
 
 
-@pytest.fixture
-def sealed(tmp_path: Path, kit) -> Path:
-    """Three trials with benches of their own, the second one at its second attempt."""
+@pytest.fixture(scope="module")
+def sealed_once(tmp_path_factory: pytest.TempPathFactory, kit) -> Path:
+    """Three trials with benches of their own, the second at its second attempt; to be copied."""
     trials = [kit.trial(n).model_copy(update={"bench": {"name": f"bench {n}"}}) for n in (1, 2, 3)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    writer = RunWriter.create(tmp_path_factory.mktemp("sealed"), kit.header(), trials)
     kit.record(writer, trials[0], 20)
     failed = writer.begin(trials[1])
     failed.start(kit.CHANNELS)
@@ -32,6 +33,12 @@ def sealed(tmp_path: Path, kit) -> Path:
     kit.record(writer, trials[1], 40)
     kit.record(writer, trials[2], 50)
     return writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+
+
+@pytest.fixture
+def sealed(sealed_once: Path, tmp_path: Path) -> Path:
+    """That run, of the test's own."""
+    return Path(shutil.copy(sealed_once, tmp_path))
 
 
 def damage(path: Path, place: str, old: str, new: str) -> None:

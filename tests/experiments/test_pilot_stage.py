@@ -377,8 +377,9 @@ def narrowing(number: int, draws: int) -> float:
 
 
 @pytest.mark.slow
-def test_intervals_of_platform_are_narrower_than_those_of_the_plain_map() -> None:
-    assert narrowing(0, 1) < 1.0
+def test_intervals_of_a_bench_are_narrower_than_those_of_the_plain_map() -> None:
+    """Of the one with the least to gain: by 4 %."""
+    assert narrowing(3, 1) < 1.0
 
 
 @pytest.mark.statistics

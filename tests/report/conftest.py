@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 from campaign.report.build import Report
+from tests.drawings import keep_drawings
 
 
 def _made_up() -> ModuleType:
@@ -40,3 +41,9 @@ def report(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Rep
         experiments=made_up.EXPERIMENTS,
         packaged_templates=made_up.TEMPLATES,
     )
+
+
+@pytest.fixture
+def drawings_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was drawn for one test is not drawn again for another: most of a page's time."""
+    keep_drawings(monkeypatch)

@@ -18,6 +18,8 @@ from campaign.report.content.document import Document, document_of
 from campaign.report.content.held_values import Held, held_by
 from campaign.result import Result
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
 TWINS = ("static-identified", "lugre-identified", "observer-identified")
 

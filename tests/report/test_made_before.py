@@ -22,6 +22,8 @@ from campaign.report.made_before import MADE
 from tests.archives import simulated_run
 from tests.system.user import completed
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:

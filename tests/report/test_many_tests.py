@@ -19,6 +19,8 @@ from campaign.report.content.opening import MANY, Opening
 from campaign.report.formats import chosen_formats
 from campaign.result import Amount, Axis, Conclusion, Curve, Figure, Panel, Result
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 EXACT = Reason("test", "nothing scatters")
 
 

@@ -34,6 +34,8 @@ from campaign.result import (
     Result,
 )
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 DIFFERENCE = re.compile(r"\b(less|more|better|worse)\b")
 
 

@@ -25,8 +25,11 @@ from campaign.recording import Ending, Outcome
 from campaign.report.build import Report, build_report
 from campaign.report.one_figure import WRITTEN, write_figure
 from campaign.report.output import MARKER, replaced_folder
+from campaign.report.page.drawings import Drawing
 from campaign.report.page.folder import LINKED, Folder
 from campaign.result import Axis, Column, Curve, Figure, Panel, Result, Table
+
+pytestmark = pytest.mark.usefixtures("drawings_kept")
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 FOREIGN_VOID = {"path", "use", "rect", "circle", "image", "stop"}
@@ -215,10 +218,14 @@ DRAW = "campaign report 2026-11-21T09-36-58-made-up --only-figure stabilization/
 
 
 @pytest.mark.parametrize("figures", [1, 12, 47, 120])
-def test_any_figure_is_soon_reached(made_up: ModuleType, tmp_path: Path, figures: int) -> None:
+def test_any_figure_is_soon_reached(
+    made_up: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, figures: int
+) -> None:
     """By the second skip link and the list of figures: at most 25 stops from the top."""
     x = np.arange(3.0)
     panel = Panel(Axis("x"), Axis("y"), [Curve(x, x)])
+    drawn = Drawing(Figure("f", "Figure", "c", "a", (panel,))).made()
+    monkeypatch.setattr(Drawing, "made", lambda drawing: drawn)  # what they show is no matter
     many = [Figure(f"f{n}", f"Figure of {n}", "c", "a", (panel,)) for n in range(figures)]
 
     def analyse(data: TestData) -> Result:

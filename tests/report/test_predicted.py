@@ -20,6 +20,8 @@ from campaign.report.content.document import Document, document_of
 from campaign.resources import templates_folder
 from campaign.result import Finding, Result
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 CONDITIONS = {"direction": "positive"}
 
 

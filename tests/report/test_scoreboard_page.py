@@ -28,6 +28,8 @@ from campaign.report.build import build_report
 from campaign.report.content.lines import shown_line
 from campaign.result import Finding
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 TESTS = {"stabilization": ("5.2", "5.8")}
 AXIS = {"name": "azimuth", "inertia": "36 kg m^2"}
 

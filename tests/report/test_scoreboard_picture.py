@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from functools import cache
 
 import pytest
 
@@ -50,6 +51,12 @@ def drawn(scoreboard: Scoreboard) -> ET.Element:
     return ET.fromstring(svg)
 
 
+@cache
+def picture(*sizes: int) -> ET.Element:
+    """Of tables of these sizes; to be read only."""
+    return drawn(board([*sizes]))
+
+
 def size_of(root: ET.Element) -> tuple[float, float]:
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     return width, height
@@ -80,7 +87,7 @@ SIZES = {
 
 @pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
 def test_it_fits_a_screen_and_its_words_are_legible(sizes: list[int]) -> None:
-    root = drawn(board(sizes))
+    root = picture(*sizes)
     width, height = size_of(root)
     assert SHEET * height / width <= 900
     told = ET.tostring(root).decode()
@@ -91,7 +98,7 @@ def test_it_fits_a_screen_and_its_words_are_legible(sizes: list[int]) -> None:
 
 @pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
 def test_each_cell_has_one_sign_that_tells_which_it_is(sizes: list[int]) -> None:
-    root = drawn(board(sizes))
+    root = picture(*sizes)
     told = [text for text in titles(root) if "published" in text]
     signs = [g for g in root.iter(f"{SVG}g") if is_sign(g)]
     assert len(signs) == sum(sizes)
@@ -159,7 +166,7 @@ def test_signs_of_one_place_do_not_cover_each_other() -> None:
 
 
 def test_tables_without_a_row_of_their_own_are_counted() -> None:
-    shown = words(drawn(board([1] * 600)))
+    shown = words(picture(*[1] * 600))
     assert any(re.fullmatch(r"\d+ further tables \(\d+\)", word) for word in shown)
 
 

@@ -12,6 +12,8 @@ from campaign.errors import UsageError
 from campaign.report.build import build_report
 from campaign.report.page.templates import Templates
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 
 @pytest.fixture
 def page(made_up: ModuleType, tmp_path: Path):

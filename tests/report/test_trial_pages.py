@@ -52,6 +52,8 @@ from campaign.report.palette import SERIES
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Task, Trial
 
+pytestmark = pytest.mark.usefixtures("drawings_kept")
+
 AT = "2026-11-21T09:36:58Z"
 HOSTILE = "<script>alert(1)</script>\"'&"
 RATE = ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s")

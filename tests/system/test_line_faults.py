@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import random
-import subprocess
 import time
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +23,7 @@ from campaign.errors import ExitCode
 from campaign.recording import Fault, Outcome, Recording, SafeState
 from tests.link.bad_line import Block, Trouble, bad_line, schedule
 from tests.link.controllers import controller
-from tests.system.user import campaign, command, environment, write
+from tests.system.user import begun, campaign, write
 
 PROTOCOL = """\
 title = "Short on a bad line"
@@ -145,27 +144,22 @@ def run_over(
         controller("--speed", "max", *options, *patient, bench="simulink") as port,
         bad_line(port, there, back) as line,
     ):
-        done = subprocess.run(
-            command("run", "protocol.toml", *ON, *SOON, "--port", line.port),
-            cwd=folder,
-            env=environment(),
-            capture_output=True,
-            text=True,
-            stdin=subprocess.DEVNULL,
-            timeout=PATIENCE,
-        )
-        assert "Traceback" not in done.stderr, done.stderr
+        run = begun(folder, "run", "protocol.toml", *ON, *SOON, "--port", line.port)
+        out, err = run.communicate(timeout=PATIENCE)
+        assert "Traceback" not in err, err
         deadline = time.monotonic() + PATIENCE
         while not drive_is_off(log):  # by itself, where nobody could tell it
             assert time.monotonic() < deadline, log.read_text()
             time.sleep(0.05)
-    if done.stdout.strip():
-        judge_archive(folder / done.stdout.splitlines()[-1], truth, done.returncode)
+    code = run.returncode
+    assert code is not None
+    if out.strip():
+        judge_archive(folder / out.splitlines()[-1], truth, code)
     else:  # the controller never answered, or told who stopped it
-        assert done.returncode in (ExitCode.USAGE, ExitCode.LIMIT_OR_FAULT), done.stderr
-        assert done.stderr.strip()
+        assert code in (ExitCode.USAGE, ExitCode.LIMIT_OR_FAULT), err
+        assert err.strip()
         assert "drive on" not in log.read_text(encoding="utf-8")
-    return done.returncode
+    return code
 
 
 def attacks(folder: Path, seeds: range, truth: tuple[Recording, ...]) -> list[int]:

@@ -89,8 +89,9 @@ def test_report_takes_the_newest_run_when_none_is_named(tmp_path: Path):
     assert page == str(Path(newest).with_suffix("")) + "-report/report.html"
 
 
-def test_own_templates_win_only_when_asked_for(quickstart, tmp_path: Path):
-    _, archive = quickstart
+def test_own_templates_win_only_when_asked_for(tmp_path: Path):
+    write(tmp_path, SEA)
+    archive = tmp_path / campaign(tmp_path, "run", "protocol.toml", "--only", "sea").last_line
     (tmp_path / "templates").mkdir()
     write(tmp_path / "templates", "own page of {{ run.name }}\n", "report.html")
     campaign(tmp_path, "report", str(archive), "--output", "packaged")

@@ -96,7 +96,7 @@ def test_a_broken_package_harms_nothing_that_does_not_name_it(odd: Laboratory) -
     """`plan`, `kinds` and `report` ended with exit code 70, "This is a bug"."""
     odd.does("plan", "sea.toml")
     odd.does("check", "simulink")
-    archive = odd.does("run", "sea.toml", "--report").stdout.splitlines()[-1]
+    archive = odd.does("run", "sea.toml").stdout.splitlines()[-1]
     odd.does("show", archive)
     odd.does("report", archive)
     odd.does("export", archive, "--to", "csv")

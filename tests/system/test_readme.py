@@ -12,16 +12,20 @@ from tests.system.user import campaign
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 LINES = README.split("## Identify a rig")[1].split("```console\n")[1].split("```")[0].splitlines()
 """Commands of that section, with their comments."""
+SMALLER = (
+    "--set", "response.realisations=2", "--set", 'response.matrix.amplitude=["9 deg/s"]',
+    "--set", "dynamics.periods=2", "--set", 'dynamics.period="4 s"',
+)  # fmt: skip
+"""Fewer and shorter trials than the shipped ones: how good the numbers are is tried elsewhere."""
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """A folder with the run of the section's first command, and a later one."""
     folder = tmp_path_factory.mktemp("readme")
-    run = campaign(folder, *shlex.split(LINES[0], comments=True)[1:]).last_line
-    later = campaign(
-        folder, "run", "excitation", "--only", "dynamics", "--set", "dynamics.seed=7"
-    ).last_line
+    run = campaign(folder, *shlex.split(LINES[0], comments=True)[1:], *SMALLER).last_line
+    only = ("--only", "dynamics", *SMALLER[4:])
+    later = campaign(folder, "run", "excitation", *only, "--set", "dynamics.seed=7").last_line
     return folder, {"<run>": Path(run).stem, "<later run>": Path(later).stem}
 
 

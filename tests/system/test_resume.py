@@ -218,7 +218,7 @@ def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: 
 
 def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
     """The real thing, from the command line: Ctrl-C once, and the command that is then shown."""
-    write(tmp_path, SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 30\n", 1))
+    write(tmp_path, SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 15\n", 1))
     with begun(tmp_path, "run", "protocol.toml", "--workers", "1") as process:
         process.stderr.readline()
         process.send_signal(signal.SIGINT)
@@ -231,4 +231,4 @@ def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
     assert re.search(r"\d+ interrupted, in ", err)
     done = campaign(tmp_path, "resume", name)
     assert done.last_line == f"results/{name}.nxs"
-    assert done.err.splitlines()[-1].startswith("complete: 60 trials done")
+    assert done.err.splitlines()[-1].startswith("complete: 30 trials done")

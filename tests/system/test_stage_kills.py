@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +10,7 @@ import pytest
 from campaign.archive import RunStatus, find_run, open_run
 from campaign.archive.verifying.verification import verify_run
 from tests.archive.test_resuming import content, documented_differences
-from tests.system.user import environment, write
+from tests.system.user import environment, forks, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 
@@ -55,41 +53,6 @@ LINES = 2 * (PLANNED + FOLLOWING) + 3
 STAGES = (11, 50)
 """Which of them tell of the stages: each follows its point's five trials."""
 
-# The program is imported once; each life is a fork of it. In the journal line of the number that it
-# is told, it is killed: before it is written, after half of it, or when it is on the disk.
-NURSERY = """
-import os, signal, sys
-import campaign.cli.run, campaign.cli.resume, campaign.archive.writing.trial_file
-import campaign.archive.writing.sealing, campaign.archive.writing.unsealing
-import campaign.physics.simulate, campaign.backends.sim
-from campaign.archive.layout.journal import Journal
-from campaign.cli import main
-
-def dies(where, number):
-    append, lines = Journal.append, []
-    def dying(journal, entry):
-        lines.append(entry)
-        if len(lines) == number and where == "before":
-            os.kill(os.getpid(), signal.SIGKILL)
-        if len(lines) == number and where == "torn":
-            os.write(journal._descriptor, entry.model_dump_json().encode()[:40])
-            os.kill(os.getpid(), signal.SIGKILL)
-        append(journal, entry)
-        if len(lines) == number and where == "after":
-            os.kill(os.getpid(), signal.SIGKILL)
-    Journal.append = dying
-
-for line in sys.stdin:
-    where, number, *arguments = line.split()
-    child = os.fork()
-    if child == 0:
-        dies(where, int(number))
-        sys.argv = ["campaign", *arguments]
-        main()
-        os._exit(0)
-    print("ended", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
-"""
-
 
 class Nursery:
     """Lives of the program in one folder."""
@@ -97,15 +60,6 @@ class Nursery:
     def __init__(self, folder: Path, protocol: str = PROTOCOL) -> None:
         self.folder = folder
         write(folder, protocol)
-        self.process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-c", NURSERY],
-            cwd=folder,
-            env=environment(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
         assert self.live("run protocol.toml --results whole") == 0
         self.whole = content(find_run(folder / "whole"))
         whole = open_run(find_run(folder / "whole"))
@@ -114,11 +68,11 @@ class Nursery:
 
     def live(self, arguments: str, where: str = "never", number: int = 0) -> int:
         """The exit code of a command, or -9 when it was killed."""
-        print(where, number, arguments, "--workers 1", file=self.process.stdin, flush=True)
-        for line in self.process.stdout:
-            if line.startswith("ended "):
-                return int(line.split()[1])
-        raise AssertionError("the nursery has closed")
+        variables = environment()
+        if number:
+            variables |= {"BEFORE_THE_COMMAND": "tests.system.dying", "DIES": f"{where} {number}"}
+        words = [*arguments.split(), "--workers", "1"]
+        return forks().run(self.folder, *words, environment=variables).returncode
 
     def goes_on(self, results: str, where: str, number: int, again: int = 0) -> None:
         """Killed at a line, gone on with (and killed at line `again` of that), and compared."""
@@ -141,7 +95,8 @@ class Nursery:
         differing = {
             name
             for name in ours.keys() | self.whole.keys()
-            if str(ours.get(name, missing)) != str(self.whole.get(name, missing))
+            if (mine := ours.get(name, missing)) != (theirs := self.whole.get(name, missing))
+            and str(mine) != str(theirs)  # not a number is not itself
         }
         allowed = documented_differences()
         drawn = {"/run/provenance/seed", "/run/provenance/seed@sha256"}  # the test has its own
@@ -149,20 +104,13 @@ class Nursery:
 
 
 @pytest.fixture(scope="module")
-def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
-    yield from lived(Nursery(tmp_path_factory.mktemp("kills")))
+def nursery(tmp_path_factory: pytest.TempPathFactory) -> Nursery:
+    return Nursery(tmp_path_factory.mktemp("kills"))
 
 
 @pytest.fixture(scope="module")
-def of_a_map(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
-    yield from lived(Nursery(tmp_path_factory.mktemp("maps"), MAP))
-
-
-def lived(nursery: Nursery) -> Iterator[Nursery]:
-    yield nursery
-    nursery.process.stdin.close()
-    nursery.process.wait(60)
-    nursery.process.stdout.close()
+def of_a_map(tmp_path_factory: pytest.TempPathFactory) -> Nursery:
+    return Nursery(tmp_path_factory.mktemp("maps"), MAP)
 
 
 def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):

@@ -24,7 +24,8 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.measuring import Measuring
-from campaign.experiments import experiments, frequency_response
+from campaign.experiments import experiments
+from campaign.experiments.frequency_response import experiment as frequency_response
 from campaign.experiments.interface import TrialData
 from tests.system.test_stage_kills import FOLLOWING, PLANNED, PROTOCOL
 from tests.system.user import campaign, write
@@ -79,6 +80,12 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
     return Lab(tmp_path, monkeypatch)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> RunReader:
+    """A run that nobody stopped, by one worker; to be read only."""
+    return Lab(tmp_path_factory.mktemp("whole"), pytest.MonkeyPatch()).run()
+
+
 def samples(run: RunReader) -> dict[int, tuple[str, bytes]]:
     return {
         each.trial.number: (each.trial.fingerprint, each.recording()["gyro_rate"].tobytes())
@@ -86,28 +93,29 @@ def samples(run: RunReader) -> dict[int, tuple[str, bytes]]:
     }
 
 
-def test_two_workers_find_number_and_record_what_one_does(lab: Lab):
-    one, two = lab.run("one"), lab.run("two", workers=2)
-    assert len(one.trials) == ALL
-    assert samples(one) == samples(two)
-    assert [stage.point for stage in two.stages] == [stage.point for stage in one.stages]
+def test_two_workers_find_number_and_record_what_one_does(lab: Lab, whole: RunReader):
+    two = lab.run(workers=2)
+    assert len(whole.trials) == ALL
+    assert samples(whole) == samples(two)
+    assert [stage.point for stage in two.stages] == [stage.point for stage in whole.stages]
 
 
 @pytest.mark.parametrize("number", [3, 14])
-def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, number: int):
+def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunReader, number: int):
     stopped = lab.stopped_in(number)
     assert len(stopped.plan) > len(stopped.trials) or len(stopped.plan) == PLANNED
     resumed = lab.resume(stopped)
-    assert samples(resumed) == samples(lab.run("whole"))
+    assert samples(resumed) == samples(whole)
     assert verify_run(resumed.path).problems == ()
 
 
 @pytest.mark.parametrize("number", [3, 14])
-def test_a_protocol_that_is_gone_leaves_its_stages_in_the_archive(lab: Lab, number: int):
-    whole = samples(lab.run("whole"))
+def test_a_protocol_that_is_gone_leaves_its_stages_in_the_archive(
+    lab: Lab, whole: RunReader, number: int
+):
     stopped = lab.stopped_in(number)
     lab.protocol.unlink()
-    assert samples(lab.resume(stopped)) == whole
+    assert samples(lab.resume(stopped)) == samples(whole)
 
 
 def test_what_followed_on_one_bench_does_not_move_a_changed_one(lab: Lab):
@@ -154,25 +162,23 @@ def test_a_user_sees_the_stages_before_during_and_after(lab: Lab):
     assert "not executed" not in page
 
 
-def test_they_are_trials_for_whoever_opens_the_run(lab: Lab):
-    run = lab.run()
-    assert f"{ALL} of {ALL} trials executed" in repr(program.open(str(run.path)))
-    swept = [float(str(each.trial.point["frequency"])) for each in run.trials_of("sweep")]
+def test_they_are_trials_for_whoever_opens_the_run(whole: RunReader):
+    assert f"{ALL} of {ALL} trials executed" in repr(program.open(str(whole.path)))
+    swept = [float(str(each.trial.point["frequency"])) for each in whole.trials_of("sweep")]
     assert len(set(swept)) == 5 + FOLLOWING
     # Seven within 12 % of the -3 dB crossing of each, and seven around 0 dB.
     for first, last in ((PLANNED, PLANNED + 14), (PLANNED + 14, ALL)):
         assert swept[last - 1] / swept[first] > 1.12 / 0.88
 
 
-def test_a_replay_finds_the_same_trials_and_serves_them(lab: Lab):
-    first = lab.run()
+def test_a_replay_finds_the_same_trials_and_serves_them(lab: Lab, whole: RunReader):
     again = campaign(
-        lab.folder, "run", "protocol.toml", "--backend", "replay", "--from", str(first.path),
+        lab.folder, "run", "protocol.toml", "--backend", "replay", "--from", str(whole.path),
         "--results", "replayed",
     )  # fmt: skip
     assert f"complete: {ALL} trials done" in again.err
     replayed = open_run(find_run(lab.folder / "replayed"))
-    assert samples(replayed) == samples(first)
+    assert samples(replayed) == samples(whole)
 
 
 def test_a_stage_measures_in_a_limited_time(lab: Lab):

@@ -7,10 +7,14 @@ import random
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import h5py
 import pandas as pd
+import typer.testing
+from typer.main import get_command
 from typer.testing import CliRunner
 
 import campaign
@@ -145,7 +149,12 @@ def _columns(content: object) -> set[tuple[bytes, ...]]:
 
 
 def run_campaign(*arguments: object):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+    with patch.object(typer.testing, "_get_command", what_can_be_typed):
+        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+what_can_be_typed = cache(get_command)
+"""It takes as long to find out as many a command."""
 
 
 def code_of(done) -> int:

@@ -11,10 +11,12 @@ import re
 import traceback
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from jinja2 import (
     BaseLoader,
+    BytecodeCache,
     ChoiceLoader,
     Environment,
     FileSystemLoader,
@@ -25,6 +27,7 @@ from jinja2 import (
     TemplateSyntaxError,
     UndefinedError,
 )
+from jinja2.bccache import Bucket
 from jinja2.environment import TemplateModule
 from jinja2.utils import missing
 
@@ -34,6 +37,25 @@ from campaign.report.page.own_templates import check_own_templates, meant
 
 PREFIX = "campaign"
 """What the packaged templates are called by, where a laboratory's own has taken their name."""
+
+
+class _Compiled(BytecodeCache):
+    """Templates that this process has compiled, by name, file and text: half of their time."""
+
+    def __init__(self) -> None:
+        self._codes: dict[tuple[str, str], CodeType] = {}
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """The code of a template; none, where its text is another now."""
+        bucket.code = self._codes.get((bucket.key, bucket.checksum))
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep what was compiled."""
+        if bucket.code is not None:
+            self._codes[bucket.key, bucket.checksum] = bucket.code
+
+
+_COMPILED = _Compiled()
 
 
 class Templates:
@@ -51,6 +73,7 @@ class Templates:
             undefined=_Told,
             trim_blocks=True,
             lstrip_blocks=True,
+            bytecode_cache=_COMPILED,
         )
         if own is not None:
             check_own_templates(self._environment, own, packaged, PREFIX)

@@ -1,0 +1,35 @@
+"""Drawings that are made once, for tests of what stands around them."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.pdf import keeps_pdf
+from campaign.report.page.drawings import Drawing, Overview
+
+KEPT: dict[str, Drawn | None] = {}
+"""By all that is drawn."""
+
+
+def keep_drawings(patch: pytest.MonkeyPatch) -> None:
+    """From now on what was drawn in this process is not drawn again."""
+    for kind in (Drawing, Overview):
+        patch.setattr(kind, "made", _kept(kind.made))
+
+
+def _kept(make: Callable[[Any], Drawn | None]) -> Callable[[object], Drawn | None]:
+    def made(drawable: object) -> Drawn | None:
+        if keeps_pdf():  # the sheet is wanted, too
+            return make(drawable)
+        shown = hashlib.sha256(pickle.dumps(drawable)).hexdigest()
+        if shown not in KEPT:
+            KEPT[shown] = make(drawable)
+        return KEPT[shown]
+
+    return made
